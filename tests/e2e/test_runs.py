@@ -433,3 +433,37 @@ def test_an_unusable_state_directory_is_an_error_that_names_it(
         assert (arguments, code, out) == (arguments, 2, "")
         assert err.startswith(f"throwcollect: {tmp_path / 'file'}: runs cannot be remembered there: ")
     assert not (tmp_path / "data").exists()
+
+
+@pytest.fixture
+def viewed() -> Iterator[str]:
+    """The address of a server that `view` has begun."""
+    yield json.loads(call_here("view", "--json").stdout)["url"]
+    call_here("down", "--run", "server")
+
+
+def test_ps_lists_the_server_that_view_begins_and_stop_ends_it_if_no_run_lives(
+    config: Path, viewed: str, tmp_path: Path
+) -> None:
+    (listed,) = list_runs()
+    assert json.loads(call_here("view", "--json").stdout)["url"] == viewed
+    assert listed == {"run": "server", "kind": "server", "status": "running", "url": viewed, "pid": listed["pid"]}
+    row = ("server", "-", "-", "-", "running", "at", f"{viewed},", "pid", str(listed["pid"]), "-")
+    assert tuple(say("ps")[1].splitlines()[1].split()) == row
+    run = detach(config, tmp_path / "data", *UNTIL_STOPPED)
+    assert [each["run"] for each in list_runs()] == [run, "server"]
+    assert say("stop")[1].startswith(f"{run}: stopped")
+    assert list_runs() == [listed]
+    assert say("stop") == (0, f"server: stopped; it was at {viewed}\n", "")
+    assert list_runs() == []
+    assert say("stop", "--run", "server")[0] == 2
+
+
+@pytest.mark.usefixtures("viewed")
+def test_down_ends_a_server_by_its_name_even_if_it_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.serve.finding._END_S", 0.5)
+    server = psutil.Process(list_runs()[0]["pid"])
+    server.suspend()
+    assert say("down", "--run", "server")[0] == 0
+    assert not server.is_running() or server.status() == psutil.STATUS_ZOMBIE
+    assert list_runs() == []

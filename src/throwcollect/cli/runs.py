@@ -32,10 +32,11 @@ def ps(
     everything: Annotated[bool, typer.Option("-a", "--all", help="Runs that have ended, too.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """List the runs of this machine, with their nodes."""
+    """List the runs of this machine, with their nodes, and the server."""
     from throwcollect.cli import cluster_runs
     from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_held_runs
+    from throwcollect.serve.finding import SERVER, find_living
 
     records = Records()
     ids = records.ids()
@@ -49,17 +50,24 @@ def ps(
     shown.sort(key=lambda run: run.record.started)
     held = find_held_runs()
     unrecorded = [each for run, each in held.items() if run not in ids]
+    server = find_living()
     if json:
         documents = [_make_document(run) for run in shown]
         for runtime, found in unrecorded:
             documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
         documents += cluster_runs.list_queued(cluster_runs.make_document)
+        if server is not None:
+            documents.append(
+                {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
+            )
         # Times are written as in events.
         print_json(documents, default=lambda time: time.isoformat(timespec="milliseconds"))
         return
     rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
     rows += [(row, []) for row in cluster_runs.list_queued(cluster_runs.make_row)]
+    if server is not None:
+        rows.append(((SERVER, "-", "-", "-", f"running at {server.url}, pid {server.pid}", "-"), []))
     for line in _make_table(rows):
         typer.echo(line)
 
@@ -142,11 +150,13 @@ def scale(
 
 
 def stop(run: RunOption = None) -> None:
-    """Finish the running trials of a run, close its files and end it."""
+    """Finish the running trials of a run, close its files and end it; if no run lives, end the server."""
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import end
 
         end(submitted)
+        return
+    if _end_server(run):
         return
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
@@ -183,6 +193,8 @@ def down(
 
         end(submitted)
         return
+    if _end_server(run):
+        return
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_run_to_change
@@ -194,6 +206,25 @@ def down(
     for name in removed:
         tell(f"removed {name}")
     typer.echo(f"{ended}: ended and forgotten")
+
+
+def _end_server(named: str | None) -> bool:
+    """End the server if a command means it: by its name, unless a run has that, or as no run is there to end.
+
+    Returns:
+        Whether there was one to end.
+    """
+    from throwcollect.runs.records import Records
+    from throwcollect.serve.finding import SERVER, end_server
+
+    if named is None:
+        is_run = any(run.status in ("running", "died") for run in Records().all())
+    else:
+        is_run = named != SERVER or named in Records().ids()
+    if is_run or (address := end_server()) is None:
+        return False
+    typer.echo(f"{SERVER}: stopped; it was at {address.url}")
+    return True
 
 
 def _find_submitted(run: str | None) -> ClusterRun | None:

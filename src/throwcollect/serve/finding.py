@@ -1,4 +1,4 @@
-"""Find the server of this user, start one in the background, and get an address of its page."""
+"""Find the server of this user, start one in the background, end it, and get an address of its page."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import fcntl
 import http.client
 import json
 import os
+import select
+import signal
 import ssl
 import subprocess
 import threading
@@ -27,7 +29,11 @@ from throwcollect.state_directory import is_locked, state_directory
 _FILE = "serve.json"
 _LOCK = "serve.lock"
 _LOG = "serve.log"
+SERVER = "server"
+"""What commands that list and end runs call the server."""
 _START_S = 20.0
+_END_S = 5.0
+"""A server needs less to end."""
 _ANSWER_S = 5.0
 _POLL_S = 0.05
 
@@ -111,15 +117,44 @@ def log_path() -> Path:
     return state_directory() / _LOG
 
 
+def find_living() -> Address | None:
+    """Find the server of this user, even one that does not answer; returns None if none lives.
+
+    Raises:
+        ConfigError: If runs cannot be remembered.
+    """
+    # If a server was killed, another process may have got its port or pid. Only the lock proves that a server lives.
+    return _read() if is_locked(_find_path().with_name(_LOCK)) else None
+
+
+def end_server() -> Address | None:
+    """End the server of this user, by force if it does not end on its own; returns None if none lives.
+
+    Raises:
+        ConfigError: If runs cannot be remembered.
+    """
+    if (address := find_living()) is None:
+        return None
+    with suppress(ProcessLookupError):
+        # If the server lives after this, the descriptor is that of its process, and of no later one with the same id.
+        process = os.pidfd_open(address.pid)
+        try:
+            for number in (signal.SIGTERM, signal.SIGKILL):
+                if find_living() == address:
+                    signal.pidfd_send_signal(process, number)
+                    select.select([process], [], [], _END_S)
+        finally:
+            os.close(process)
+    return address
+
+
 def find_server() -> Address | None:
     """Find the server of this user; returns None if none answers.
 
     Raises:
         ConfigError: If runs cannot be remembered.
     """
-    address = _read()
-    # If a server was killed, another process may have got its port or pid. Only the lock proves that a server lives.
-    if address is None or not is_locked(_find_path().with_name(_LOCK)):
+    if (address := find_living()) is None:
         return None
     try:
         _ask(address, "GET", "/api/v1/health")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import stat
 import subprocess
 import sys
@@ -17,7 +18,16 @@ import pytest
 
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.serve import finding
-from throwcollect.serve.finding import Address, ensure_server, find_server, log_path, make_page_address, publish
+from throwcollect.serve.finding import (
+    Address,
+    end_server,
+    ensure_server,
+    find_living,
+    find_server,
+    log_path,
+    make_page_address,
+    publish,
+)
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -71,6 +81,39 @@ def test_the_file_of_a_killed_server_is_ignored(state: Path) -> None:
         subprocess.run([sys.executable, "-c", code, text], check=True)
         assert json.loads((state / "serve.json").read_text()) == vars(address)
         assert find_server() is None
+
+
+ENDLESS = """
+import os, signal
+from throwcollect.serve.finding import Address, publish
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+with publish(Address("http://127.0.0.1:1", "full", "read-only", os.getpid())):
+    print("published", flush=True)
+    signal.pause()
+"""
+
+
+def test_a_server_that_does_not_end_is_ended_by_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(finding, "_END_S", 0.2)
+    with subprocess.Popen([sys.executable, "-c", ENDLESS], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert (ended := end_server()) is not None
+        assert ended.pid == process.pid
+        assert process.wait(timeout=10) == -signal.SIGKILL
+    assert find_living() is None
+    assert end_server() is None
+
+
+def test_no_other_process_is_ended_that_has_the_pid_of_a_killed_server(state: Path) -> None:
+    with subprocess.Popen(["sleep", "60"]) as other:
+        address = Address("http://127.0.0.1:1", "full", "read-only", other.pid)
+        with publish(address):
+            text = (state / "serve.json").read_bytes()
+        (state / "serve.json").write_bytes(text)
+        assert end_server() is None
+        assert other.poll() is None
+        other.kill()
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"url": 7}', '{"url": "x", "token": "y"}', "\xff"])
