@@ -13,7 +13,6 @@ import tempfile
 import time
 from pathlib import Path
 
-from throwcollect.build import build_digest
 from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.judging import judge_episode
@@ -23,7 +22,7 @@ from throwcollect.episode.episode_message import Delivery, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
-from throwcollect.trial.conditions import Conditions, Settings
+from throwcollect.trial.conditions import Conditions, Settings, build_of
 
 _SECRET = b"key of a run"
 _SIGNER = Signer(_SECRET)
@@ -37,7 +36,7 @@ def measure(directory: Path) -> tuple[float, float]:
     """
     dataset = Dataset.open(directory)
     acceptance, settings = Acceptance(dataset.config), Settings(dataset.config)
-    build = build_digest(dataset.config.sim.engine)
+    build = build_of(dataset.config)
     columns = task_of(dataset.config).columns
     messages = []
     for episode in dataset.episodes():

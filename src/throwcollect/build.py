@@ -1,6 +1,7 @@
 """Computes one digest over everything that computes episodes: sources, physics engine, robot model, compression.
 
 Two processes with the same digest compute the same episodes. A coordinator takes only episodes with its own digest.
+Other packages count only if they bring a part that computes, so machines with different packages can share a run.
 """
 
 from __future__ import annotations
@@ -8,12 +9,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import PackageNotFoundError, entry_points, version
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
 import rclzenoh
 from throwcollect.engine_packages import PACKAGES
+from throwcollect.members import list_origins
 
 _PACKAGES = ("example-robot-data", "zstandard")
 """Packages whose versions count for every engine."""
@@ -21,8 +23,16 @@ _SOURCES = (".py", ".msg", ".srv", ".action", ".json")
 
 
 @cache
-def build_digest(engine: str) -> str:
-    """Hash the installed sources, and versions of engine, model and added packages; SHA-256, in hexadecimal."""
+def build_digest(engine: str, robot: str = "talos", tool: str = "spoon", task: str = "throw") -> str:
+    """Hash the installed sources, and versions of the packages of these parts; SHA-256, in hexadecimal."""
+    digest = hashlib.sha256(_hash_sources())
+    for fact in _list_facts(engine, robots=robot, tools=tool, tasks=task):
+        digest.update(fact.encode() + b"\n")
+    return digest.hexdigest()
+
+
+@cache
+def _hash_sources() -> bytes:
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
     # The ROS client counts, too, because it lays out the messages of an episode.
@@ -31,12 +41,11 @@ def build_digest(engine: str) -> str:
         content = path.read_bytes()
         # Each file's name and length come before its bytes, so bytes cannot move from one file to the next unnoticed.
         digest.update(f"{path.relative_to(root).as_posix()}\0{len(content)}\0".encode() + content)
-    for fact in _list_facts(engine):
-        digest.update(fact.encode() + b"\n")
-    return digest.hexdigest()
+    return digest.digest()
 
 
-def _list_facts(engine: str) -> Iterator[str]:
+def _list_facts(engine: str, **others: str) -> Iterator[str]:
+    """List what counts besides the sources: of an engine, and of members of other families, by family."""
     for distribution in _PACKAGES:
         yield _version_of(distribution)
     if engine in PACKAGES:
@@ -47,11 +56,8 @@ def _list_facts(engine: str) -> Iterator[str]:
         beside = Path(found.origin).parent.glob(package.compiled) if found and found.origin else []
         sizes = [path.stat().st_size for path in sorted(beside)]
         yield f"{package.module} {sizes or 'missing'} bytes"
-    # Other packages may add robots, tools, engines and tasks.
-    for group in sorted(group for group in entry_points().groups if group.startswith("throwcollect.")):
-        for point in sorted(entry_points(group=group), key=lambda point: point.name):
-            owner = f"{point.dist.name} {point.dist.version}" if point.dist else "an unknown package"
-            yield f"{group} {point.name}: {point.value} of {owner}"
+    for family, name in {"engines": engine, **others}.items():
+        yield from list_origins(family, name)
 
 
 def _version_of(distribution: str) -> str:

@@ -145,6 +145,14 @@ def is_own(family: str, name: str) -> bool:
     return name in _OWN[family]
 
 
+def list_origins(family: str, name: str) -> list[str]:
+    """List the packages that bring a member, with their versions and what they bring; none if it is our own."""
+    if is_own(family, name):
+        return []
+    namesakes = _find_namesakes(family, name)
+    return sorted(f"{each.group} {name}: {each.value} of {_name_owner(each)}" for each in namesakes)
+
+
 def load_part(family: str, name: str, path: str, kind: type | None = None) -> Any:
     """Import the object ``module:name`` that a member names; of a given kind, it has to be a complete class.
 

@@ -1,6 +1,9 @@
 """The digest of a build covers engines and packages that have an effect on episodes."""
 
-from importlib.metadata import EntryPoint, EntryPoints, version
+import os
+import subprocess
+import sys
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,15 +12,39 @@ import pytest
 from throwcollect import build
 
 
-def test_packages_that_add_members_are_part_of_the_build(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = build.build_digest.__wrapped__("bullet")
-    points = EntryPoints([EntryPoint("free_fall", "lab:FreeFall", "throwcollect.engines"), EntryPoint("x", "y:z", "x")])
-    monkeypatch.setattr(build, "entry_points", points.select)
-    assert [fact for fact in build._list_facts("bullet") if "lab" in fact] == [
-        "throwcollect.engines free_fall: lab:FreeFall of an unknown package"
+def compute_with(directory: Path, *packages: str, **parts: str) -> str:
+    """Digest in a process that finds packages, named with their versions, of which each adds one part of its name."""
+    for package in packages:
+        family, name, given = package.split()
+        info = directory / f"{name}-{given}.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {given}\n")
+        (info / "entry_points.txt").write_text(f"[throwcollect.{family}]\n{name} = {name}:PART\n")
+    code = "import sys; from throwcollect.build import build_digest; print(build_digest(**eval(sys.argv[1])))"
+    arguments = [sys.executable, "-c", code, repr({"engine": "bullet", **parts})]
+    environment = {**os.environ, "PYTHONPATH": str(directory)}
+    return subprocess.run(arguments, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+def test_packages_that_the_configuration_does_not_name_are_no_part_of_the_build(tmp_path: Path) -> None:
+    others = [
+        f"{family} other_{family} 1.0" for family in ("robots", "tools", "engines", "tasks", "runtimes", "exporters")
     ]
-    assert not [fact for fact in build._list_facts("bullet") if "y:z" in fact]
-    assert build.build_digest.__wrapped__("bullet") != before
+    # A member of our own is taken even where another package uses its name.
+    installed = compute_with(tmp_path / "all", *others, "engines bullet 1.0", "robots talos 1.0")
+    assert installed == compute_with(tmp_path / "none")
+
+
+@pytest.mark.parametrize("family", ["engine", "robot", "tool", "task"])
+def test_the_version_of_a_package_that_the_configuration_names_is_a_part_of_the_build(
+    family: str, tmp_path: Path
+) -> None:
+    versions = [[f"{family}s mine 1.0"], [f"{family}s mine 1.1"], [f"{family}s mine 1.0", "tools unrelated 3.0"], []]
+    first, later, beside, none = (
+        compute_with(tmp_path / str(number), *packages, **{family: "mine"}) for number, packages in enumerate(versions)
+    )
+    assert first == beside
+    assert len({first, later, none}) == 3
 
 
 def test_the_package_of_the_engine_that_computes_is_part_of_the_build_and_no_other(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from throwcollect.build import build_digest
 from throwcollect.config.schema import Config
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.task import trajectory_of
-from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
+from throwcollect.trial.conditions import Conditions, Settings, build_of, conditions_from_json
 
 _MOST_TOLD = 3
 """Largest number of differences that the reason for refusing one episode names."""
@@ -18,7 +17,7 @@ class Acceptance:
     """Works out the conditions that each trial of a plan has to be simulated under."""
 
     def __init__(self, config: Config) -> None:
-        self._build = build_digest(config.sim.engine)
+        self._build = build_of(config)
         self._settings = Settings(config)
 
     def find_difference(self, text: str, plan: Plan, trial: Trial, *, token: str) -> str | None:

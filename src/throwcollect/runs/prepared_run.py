@@ -86,15 +86,24 @@ class PreparedRun:
         Raises:
             ConfigError: If the router listens to this machine alone, or the key of the run cannot be read.
         """
-        from throwcollect.build import build_digest
+        from throwcollect.trial.conditions import build_of
 
         if self.config.run.listen is None:
             raise ConfigError("other machines cannot join the run", hint="run.listen says where they can")
         host, port = split_address(self.config.run.listen)
         endpoint = format_endpoint("tls", reach_from_elsewhere(host), port)
-        run, secret, engine = self.record.run, self._run.key.secret.hex(), self.config.sim.engine
-        domain_id = self.config.run.domain_id
-        return JoinToken(run, endpoint, secret, domain_id, engine, build_digest(engine)).encode()
+        config = self.config
+        return JoinToken(
+            self.record.run,
+            endpoint,
+            self._run.key.secret.hex(),
+            config.run.domain_id,
+            config.sim.engine,
+            build_of(config),
+            config.robot.name,
+            config.tool.name,
+            config.task.name,
+        ).encode()
 
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
         """Launch the run in this process, and return when it has ended; see `launcher.launch`.

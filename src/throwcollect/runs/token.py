@@ -24,7 +24,8 @@ class JoinToken:
     Attributes:
         endpoint: Endpoint at which other machines reach the router.
         secret: Secret of the key of the run, in hexadecimal.
-        build: Digest over the code that computes the run's throws; see `throwcollect.build`.
+        build: Digest over the code that computes the run's throws with this engine, robot, tool and task; see
+            `throwcollect.build`.
     """
 
     run: str
@@ -33,6 +34,9 @@ class JoinToken:
     domain_id: int
     engine: str
     build: str
+    robot: str = "talos"
+    tool: str = "spoon"
+    task: str = "throw"
 
     def encode(self) -> str:
         """The token as one word."""
@@ -63,13 +67,14 @@ class JoinToken:
         """Check that this machine would compute the same throws as the run's own machine.
 
         Raises:
-            ConfigError: If sources, engine or robot model differ.
+            ConfigError: If sources, engine, or packages of robot, tool and task differ.
         """
-        if self.build != build_digest(self.engine):
+        if self.build != build_digest(self.engine, self.robot, self.tool, self.task):
             raise ConfigError(
                 f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
-                "robot model, and would collect other bytes",
-                hint="install the same version on both machines, or the image on both; throwcollect doctor shows the "
+                f"package of the robot {self.robot}, the tool {self.tool} or the task {self.task}, and would collect "
+                "other bytes",
+                hint="install the same versions on both machines, or the image on both; throwcollect doctor shows the "
                 "build of each",
             )
 

@@ -361,7 +361,6 @@ def _prepare_for(values: Mapping[str, Any]) -> None:
     This is the parsed text of the configuration, the digest of the build, the types and layouts of messages, a model of
     the robot and, if the physics engine allows it, the world. The task is only imported.
     """
-    from throwcollect.build import build_digest
     from throwcollect.config.loader import dump_yaml
     from throwcollect.config.yaml_nodes import compose
     from throwcollect.episode.channels import Channels
@@ -369,11 +368,12 @@ def _prepare_for(values: Mapping[str, Any]) -> None:
     from throwcollect.robots.tool_motion import ToolMotion
     from throwcollect.sim.simulation_process import make_ahead
     from throwcollect.tasks.task import task_of
+    from throwcollect.trial.conditions import build_of
 
     with contextlib.suppress(ImportError, ValueError, ThrowcollectError):
         config = Config.model_validate(values)
         task_of(config)
-        build_digest(config.sim.engine)
+        build_of(config)
         compose(dump_yaml(config))
         Channels(config, full_description(config))
         ToolMotion(config)

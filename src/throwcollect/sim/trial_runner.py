@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from throwcollect.build import build_digest
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.episode.channels import Channels
@@ -18,7 +17,7 @@ from throwcollect.robots.description import full_description, robot_of, start_po
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sim.simulation import Simulation
 from throwcollect.tasks.task import task_of, trajectory_of
-from throwcollect.trial.conditions import Conditions, Settings
+from throwcollect.trial.conditions import Conditions, Settings, build_of
 from throwcollect.trial.goals import trial_goals
 
 
@@ -115,7 +114,7 @@ class TrialRunner:
             # A trial that a client sets up later starts from the configuration, and not from the values of this trial.
             trial.set_up_nothing()
         conditions = Conditions(
-            build=build_digest(config.sim.engine),
+            build=build_of(config),
             settings=self._settings.digest,
             values=self._settings.find_replaced(config),
             trajectory=begun.trajectory.digest if begun else "",

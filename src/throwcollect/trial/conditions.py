@@ -14,6 +14,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from throwcollect.build import build_digest
 from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves, sweepable_keys
@@ -27,7 +28,7 @@ class Conditions:
     """The conditions of one episode.
 
     Attributes:
-        build: Digest of sources, engine and model (`build.build_digest`).
+        build: Digest of sources, engine and model (`build_of`).
         settings: Digest of the keys of the collection's configuration that concern the simulation.
         values: Values of the trial that replace those of the configuration, by dotted key.
         trajectory: Digest of the joint trajectory that the controllers were given.
@@ -58,6 +59,11 @@ class Conditions:
                 yield f"{key} was {_describe(used)}, not {_describe(planned)}"
         if self.trajectory != expected.trajectory:
             yield "its controllers were given another trajectory"
+
+
+def build_of(config: Config) -> str:
+    """Digest of what computes the episodes of a configuration here (`build.build_digest`)."""
+    return build_digest(config.sim.engine, config.robot.name, config.tool.name, config.task.name)
 
 
 def _describe(value: float | None) -> str:

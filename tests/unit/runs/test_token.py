@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
+from throwcollect import build
 from throwcollect.build import build_digest
 from throwcollect.errors import ConfigError
 from throwcollect.runs.token import JoinToken
@@ -31,6 +33,18 @@ def test_an_incomplete_token_is_refused(cut: int) -> None:
 def test_a_token_with_a_malformed_secret_is_refused() -> None:
     with pytest.raises(ConfigError, match="no token"):
         JoinToken.decode(JoinToken("many", "tls/x:1", "secret", 0, "bullet", "").encode())
+
+
+@pytest.mark.parametrize("part", ["robot", "tool", "task"])
+def test_a_token_of_a_run_with_a_part_of_another_package_is_refused_where_that_differs(
+    part: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "list_origins", lambda family, name: [f"{family} {name}"])
+    digest = build_digest("bullet", **{part: "mine"})
+    token = JoinToken.decode(replace(make(digest), **{part: "mine"}).encode())
+    token.check_build()
+    with pytest.raises(ConfigError, match=f"another package of .*the {part} mine"):
+        replace(token, build=build_digest("bullet")).check_build()
 
 
 def test_a_token_of_a_run_with_other_sources_is_refused() -> None:

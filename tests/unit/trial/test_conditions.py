@@ -7,6 +7,7 @@ from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
 from throwcollect.config.values import sweepable_keys, values_by_key, with_values
 from throwcollect.errors import DatasetError
+from throwcollect.trial import conditions
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 
 CONFIG = Config()
@@ -98,3 +99,8 @@ def test_find_replaced_names_each_physics_key_that_a_trial_changes() -> None:
 def test_the_digest_of_a_build_is_the_same_when_it_is_computed_anew() -> None:
     assert build_digest.__wrapped__("bullet") == build_digest("bullet")
     assert len(build_digest("bullet")) == 64
+
+
+def test_the_build_of_a_configuration_is_that_of_the_parts_that_it_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(conditions, "build_digest", lambda *parts: parts)
+    assert conditions.build_of(CONFIG) == ("bullet", "talos", "spoon", "throw")
