@@ -23,17 +23,17 @@ def throws(engine: str) -> Iterator[Throw]:
         yield from simulator.throw_many(POINTS)
 
 
-def test_throws_of_both_engines_land_within_centimetres_of_each_other() -> None:
+def test_throws_of_both_engines_land_within_4_mm_of_each_other() -> None:
     for point, bullet, mujoco in zip(POINTS, throws("bullet"), throws("mujoco"), strict=True):
         one, other = bullet.row, mujoco.row
         assert one["outcome"] == other["outcome"] == "landed", point
         for key, tolerance in {
-            "landing_x_m": 0.015,
-            "landing_y_m": 0.015,
-            "landing_time_s": 0.003,
-            "release_time_s": 0.006,
-            "release_speed_mps": 0.03,
-            "effort_peak_share": 0.005,
+            "landing_x_m": 0.004,
+            "landing_y_m": 0.004,
+            "landing_time_s": 0.001,
+            "release_time_s": 0.0041,
+            "release_speed_mps": 0.01,
+            "effort_peak_share": 0.002,
         }.items():
             assert other[key] == pytest.approx(one[key], abs=tolerance), (key, point)
         assert one["recontacts"] == other["recontacts"] == 0

@@ -33,9 +33,11 @@ def thrown():
 
 
 # The references are rounded to 1 mm, and at 1 kHz the release is known to 1 ms, which scatters landings by up to 1 mm.
-# The long throw saturates the shoulder and so depends a little on the spoon's inertia, which is not part of them.
+# The long throw saturates the shoulder and so depends a little on the spoon's inertia, which is not part of them. Their
+# friction was up to 1.4 times as strong between two directions as along them, which held the ball of the long throw
+# back: with Coulomb's friction both engines release it 2 ms later, and it lands 3 mm farther.
 @pytest.mark.parametrize(
-    ("number", "expected", "tolerance_m"), [(0, (1.688, -0.272), 0.001), (1, (2.201, -0.309), 0.002)]
+    ("number", "expected", "tolerance_m"), [(0, (1.688, -0.272), 0.001), (1, (2.201, -0.309), 0.003)]
 )
 def test_reference_throws_land_at_the_reference_point(number, expected, tolerance_m, thrown, landing):
     point, _ = landing(thrown[number][0])
@@ -43,11 +45,14 @@ def test_reference_throws_land_at_the_reference_point(number, expected, toleranc
 
 
 @pytest.mark.parametrize(
-    ("number", "expected_s", "velocity"), [(0, 0.638, (2.18, -0.16, 0.34)), (1, 0.598, (2.85, -0.20, 0.06))]
+    ("number", "expected_s", "tolerance_s", "velocity"),
+    [(0, 0.638, 0.0015, (2.18, -0.16, 0.34)), (1, 0.598, 0.0025, (2.85, -0.20, 0.06))],
 )
-def test_reference_throws_are_released_at_the_reference_time_and_velocity(number, expected_s, velocity, thrown):
+def test_reference_throws_are_released_at_the_reference_time_and_velocity(
+    number, expected_s, tolerance_s, velocity, thrown
+):
     samples, release_s = thrown[number]
-    assert release_s == pytest.approx(expected_s, abs=0.0015)
+    assert release_s == pytest.approx(expected_s, abs=tolerance_s)
     # A step earlier or later changes the vertical velocity by 0.01 m/s.
     at_release = samples.ball_linear_velocity[round(release_s * 1000)]
     assert at_release == pytest.approx(velocity, abs=0.015)

@@ -129,17 +129,6 @@ def test_a_ball_bounces_off_the_ground_by_its_restitution(
     assert min(ball_of(sample).position[2] for _, sample in seen.samples) > SCENE.ball_radius_m - 1e-3
 
 
-def test_friction_is_the_product_of_ball_and_surface_and_equal_in_all_directions(engine: MujocoEngine) -> None:
-    for angle in (0.0, 0.4, np.pi / 4):
-        engine.place_ball(
-            BodyState((2.0, 0.0, SCENE.ball_radius_m), linear_velocity=(2 * np.cos(angle), 2 * np.sin(angle), 0.0))
-        )
-        engine.run(still(engine, 50), Observer())
-        lost = 2 - np.hypot(*ball_of(engine.state.sample).linear_velocity[:2])
-        friction = PHYSICS.ball_friction * PHYSICS.surface_friction
-        assert lost == pytest.approx(friction * PHYSICS.gravity_mps2 * 50 / PHYSICS.hz, rel=0.01)
-
-
 def test_a_resized_ball_gives_the_same_model_as_one_compiled_at_that_size() -> None:
     spec, _ = make_spec(SCENE)
     resized = spec.compile()

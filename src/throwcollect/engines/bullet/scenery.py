@@ -208,7 +208,8 @@ def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> N
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,
-        enableConeFriction=0,
+        # Otherwise friction acts along two directions separately, and turns what slides between them.
+        enableConeFriction=1,
         # Bullet sorts the pairs of shapes, so that contacts are solved in the same order each time.
         deterministicOverlappingPairs=1,
         physicsClientId=client,
