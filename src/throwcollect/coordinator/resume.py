@@ -29,10 +29,10 @@ from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import find_damage
 from throwcollect.dataset.verify_tables import find_wrong_trials
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.point_file import encode_points
+from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
@@ -134,13 +134,31 @@ def _make_plan(
         ConfigError: If the sweep cannot be drawn, or draws other trials.
     """
     config = make_self_contained(given)
-    if old is not None and TRIALS not in damaged and old.config.without_run() == config.without_run():
+    own_list = given.sweep.file is not None and sweep_directory.samefile(directory)
+    if (
+        old is not None
+        and TRIALS not in damaged
+        and old.config.without_run() == config.without_run()
+        and (given.sweep.file is None or own_list or _has_list(directory, given, sweep_directory))
+    ):
         # The digest of the plan also depends on the order of keys, which may have been changed in the file.
         return replace(old, config=old.config.run_as(config)), None
     check_room(directory, count_before(given))
-    drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
+    try:
+        drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
+    except PlanError as error:
+        if own_list:
+            longer = f"{command('up', 'CONFIG', '--resume', directory)} takes further rows of the list of CONFIG"
+            error.hint = error.hint or longer
+        raise
     plan = _extend(directory, old, replace(drawn, config=config))
     return plan, read_listed_points(given, directory=sweep_directory)
+
+
+def _has_list(directory: Path, config: Config, elsewhere: Path) -> bool:
+    """Whether a dataset has the list of trials that a configuration names, which may have more rows by now."""
+    path = directory / TRIALS
+    return is_there(path) and read_points(path, config) == read_listed_points(config, directory=elsewhere)
 
 
 def _write(plan: Plan, directory: Path, stored: Config | None, old: Plan | None, *, replan: bool, ended: bool) -> None:
@@ -276,12 +294,13 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             hint="throwcollect dataset sample takes some of them into a new dataset",
         )
     before, after = old.trials[:count], new.trials[:count]
-    if before.targets != after.targets:
+    are_same = np.array_equal(before.digests, after.digests) and before.refused.keys() == after.refused.keys()
+    if new.config.sweep.file is not None and not (are_same and before.targets == after.targets):
         raise ConfigError(
-            [Problem(f"the list has other targets than {directory} was begun with", key="sweep.file")],
-            expected="the same targets for all trials that are in the plan",
+            [Problem(f"the list begins with other trials or targets than {directory} has", key="sweep.file")],
+            expected="the same rows, and further ones below them",
         )
-    if not np.array_equal(before.digests, after.digests) or before.refused.keys() != after.refused.keys():
+    if not are_same:
         raise ConfigError(
             [Problem(f"the sampler {new.config.sweep.sampler} draws other trials when there are more", key="trials")],
             expected=f"{len(old.trials)}, as {directory} was begun with",

@@ -16,7 +16,7 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.resume import has_all_trials, prepare_or_resume, resume
 from throwcollect.dataset.manifest import entry_of_file, is_begun, manifest_text
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, PlanError
 
 SETTINGS: dict[str, Any] = {
     "name": "small",
@@ -243,12 +243,18 @@ def test_resume_with_more_trials_takes_the_next_points_of_the_list(listed: Path)
     assert [trial.values["task.duration_s"] for trial in plan.trials] == [1.0, 1.1, 1.2]
 
 
-def test_resume_takes_points_that_were_added_to_the_list(listed: Path) -> None:
-    prepare(Config.model_validate({**LISTED, "trials": 3}), listed / "data", sweep_directory=listed)
+@pytest.mark.parametrize(("begun", "more"), [({"trials": 3}, {"trials": 4}), ({}, {})])
+def test_resume_takes_points_that_were_added_to_the_list(
+    listed: Path, begun: dict[str, int], more: dict[str, int]
+) -> None:
+    prepare(Config.model_validate({**LISTED, **begun}), listed / "data", sweep_directory=listed)
     with (listed / "lists" / "points.csv").open("a") as file:
         file.write("1.25,0.06\n")
-    plan = resume(Config.model_validate({**LISTED, "trials": 4}), listed / "data", sweep_directory=listed)
+    own = load(listed / "data" / "config.yaml").model_copy(update={"trials": 4})
+    with pytest.raises(PlanError, match=r"at most 3, .*\n  try: throwcollect up CONFIG --resume \S+/data takes fur"):
+        resume(own, listed / "data", sweep_directory=listed / "data")
+    plan = resume(Config.model_validate({**LISTED, **more}), listed / "data", sweep_directory=listed)
     assert len(plan.trials) == 4
-    fresh = prepare(Config.model_validate({**LISTED, "trials": 4}), listed / "fresh", sweep_directory=listed)
+    fresh = prepare(Config.model_validate({**LISTED, **more}), listed / "fresh", sweep_directory=listed)
     assert plan == fresh
     assert contents(listed / "data") == contents(listed / "fresh")
