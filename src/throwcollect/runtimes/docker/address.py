@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 import os
 from pathlib import Path
 
@@ -12,13 +14,39 @@ _DEFAULT_HOST = "unix:///var/run/docker.sock"
 
 
 def engine_address() -> str:
-    """Address of the engine: ``DOCKER_HOST``, or the usual socket."""
-    return os.environ.get("DOCKER_HOST") or _DEFAULT_HOST
+    """Find the address of the engine as the command ``docker`` does: by ``DOCKER_HOST`` or its context.
+
+    Raises:
+        WorkerError: If the context does not exist, or its file is damaged.
+    """
+    if address := os.environ.get("DOCKER_HOST"):
+        return address
+    settings = Path(os.environ.get("DOCKER_CONFIG") or os.path.expanduser("~/.docker"))
+    context = os.environ.get("DOCKER_CONTEXT") or _read_current_context(settings / "config.json")
+    if context in ("", "default"):
+        return _DEFAULT_HOST
+    path = settings / "contexts" / "meta" / hashlib.sha256(context.encode()).hexdigest() / "meta.json"
+    try:
+        return str(json.loads(path.read_bytes())["Endpoints"]["docker"]["Host"])
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        problem = f"the command docker has no usable context {context!r}"
+        raise WorkerError(problem, hint="docker context ls lists all; or use processes: --runtime local") from error
+
+
+def _read_current_context(path: Path) -> str:
+    try:
+        return str(json.loads(path.read_bytes()).get("currentContext") or "")
+    except (OSError, ValueError, AttributeError):
+        # The command, too, takes the usual socket if its settings cannot be read.
+        return ""
 
 
 def has_socket() -> bool:
     """Whether the engine's socket exists; true also for an engine that has no socket in the file system."""
-    path = engine_address().removeprefix("unix://")
+    try:
+        path = engine_address().removeprefix("unix://")
+    except WorkerError:
+        return False
     return not path.startswith("/") or Path(path).exists()
 
 
@@ -26,8 +54,9 @@ def check_socket() -> None:
     """Raise the error of `docker_engine.connect` if the engine's socket does not exist, without importing the client.
 
     Raises:
-        WorkerError: If the socket does not exist.
+        WorkerError: If the socket or the context does not exist.
     """
+    engine_address()
     if not has_socket():
         raise no_answer(os.strerror(errno.ENOENT))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import struct
 from collections.abc import Iterator
@@ -28,13 +29,15 @@ _TIMEOUTS = (Timeout, PoolTimeoutError, TimeoutError)
 
 
 def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
-    """Connect to the engine that ``DOCKER_HOST`` names; each request waits for `timeout_s` [s] at most.
+    """Connect to the engine at `engine_address`; each request waits for `timeout_s` [s] at most.
 
     Raises:
         WorkerError: If no engine answers.
     """
+    # Not all versions of the client look at the context.
+    environment = {**os.environ, "DOCKER_HOST": engine_address()}
     try:
-        return DockerClient.from_env(timeout=timeout_s)
+        return DockerClient.from_env(timeout=timeout_s, environment=environment)
     except ENGINE_ERRORS as error:
         raise no_answer(in_words(error)) from error
 

@@ -59,7 +59,7 @@ class DockerNodes(NodeHost):
     Args:
         place: The place of the run; its id has to be unique on the engine.
         warn: Gets a line of text when the engine is silent for long.
-        client: Client of the engine; None connects to the engine that ``DOCKER_HOST`` names.
+        client: Client of the engine; None connects to the one that `engine_address` finds.
 
     Raises:
         ConfigError: If a mount or a network of the configuration does not exist, or a port is taken.
