@@ -226,9 +226,11 @@ def check_some_left(trials: Trials) -> None:
     # A dictionary keeps the last reason of each kind, so the order is reversed.
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
+    # Other reasons begin with the key that is wrong, and say what is right.
+    of_motions = any("." not in reason.split(" ", 1)[0] for reason in examples.values())
     raise PlanError(
         [Problem(f"{format_count(len(trials), 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
-        hint="sweep over smaller ranges or slower motions, or change task.start and task.end",
+        hint="sweep over smaller ranges or slower motions, or change task.start and task.end" if of_motions else None,
     )
 
 

@@ -85,6 +85,15 @@ def test_a_plan_of_refused_trials_is_an_error_that_lists_the_commonest_reasons()
         make_plan(config, check=check)
 
 
+def test_reasons_that_name_a_key_get_no_advice_on_motions():
+    def check(config: Config) -> str:
+        return "task.start does not hold the ball: it tilts the spoon by 1.2 rad, so that the ball rolls out"
+
+    with pytest.raises(PlanError, match=r"2 × task\.start does not hold the ball") as caught:
+        make_plan(make_config(trials=2), check=check)
+    assert caught.value.hint is None
+
+
 def test_a_list_of_points_is_read_from_beside_the_configuration(tmp_path):
     (tmp_path / "list.csv").write_text("ball.mass_kg\n0.5\n0.6\n0.7\n")
     config = Config(trials=2, sweep=SweepConfig(sampler="list", file="list.csv"))
