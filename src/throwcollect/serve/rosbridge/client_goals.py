@@ -123,7 +123,7 @@ class Goals(Errands[Goal]):
         if not goal.is_open:
             return
         if not handle.accepted:
-            self.fail(goal, f"{goal.name}: the goal was rejected")
+            self.fail(goal, f"{goal.name}: the goal was rejected, and /rosout has the reason (docs/rosbridge.md)")
             return
         goal.handle = handle
         handle.get_result_async().add_done_callback(partial(self._take_result, goal))
