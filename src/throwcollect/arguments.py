@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.wording import suggest
 
 _LONGEST_QUOTE = 80
 """Characters of a value that a message shows."""
@@ -140,5 +141,5 @@ def read_word(argument: str, given: str, words: type[_Word]) -> _Word:
     try:
         return words(given)
     except ValueError:
-        known = ", ".join(each.value for each in words)
-        raise refuse_argument(argument, repr(given), expected=f"one of {known}") from None
+        meant = suggest(given, [each.value for each in words])
+        raise refuse_argument(argument, f"{given!r}{meant}") from None

@@ -17,10 +17,21 @@ from pathlib import Path
 
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.own_directory import make_own_directory
+from throwcollect.wording import did_you_mean, find_near
 
 StrPath = str | os.PathLike[str]
 """A path, for functions that other programs call."""
 
+_POINTER = b"version https://git-lfs"
+_POINTER_BYTES = 1000
+"""Git LFS takes no longer file for a pointer."""
+_BEGINNINGS = {
+    _POINTER: "a Git LFS pointer, in whose place `git lfs pull` puts the file",
+    b"\xff\xfe": "UTF-16",
+    b"\xfe\xff": "UTF-16",
+    b"PK\x03\x04": "a ZIP archive, as those of spreadsheets are",
+    b"PAR1": "Parquet",
+}
 _MOVE_HERE = "put the file itself, or a copy of it, in that place; or remove it"
 _HINTS = {
     errno.ENOSPC: "free space on that disk",
@@ -56,6 +67,47 @@ def _find_reason(error: OSError) -> str:
     # Some libraries put a text of their own into the error, but keep the error number of the system.
     number = error.errno or 0
     return _REASONS.get(number) or (os.strerror(number) if number else str(error))
+
+
+def suggest_path(path: Path) -> str:
+    """Write the end of a message on a file or directory that does not exist: which ones in its place may be meant."""
+    try:
+        names = [] if is_there(path) else os.listdir(path.parent)
+    except OSError:
+        return ""
+    # A common ending alone does not make two names similar.
+    near = [each for each in find_near(path.name, names) if find_near(path.stem, [Path(each).stem])]
+    return did_you_mean([str(path.with_name(each)) for each in near])
+
+
+def recognise(path: Path) -> str:
+    """Say what a file is that should be text, by the bytes that it begins with; empty if it may be text.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    with path.open("rb") as file:
+        head = file.read(_POINTER_BYTES)
+    for beginning, kind in _BEGINNINGS.items():
+        if head.startswith(beginning):
+            return kind
+    return "bytes that are no text" if b"\0" in head else ""
+
+
+def refuse_pointers(directory: Path) -> None:
+    """Refuse a directory in which Git LFS has put pointers in the place of files.
+
+    Raises:
+        DatasetError: If it has one, or cannot be read.
+    """
+    try:
+        for path in directory.iterdir():
+            status = path.lstat()
+            is_small = stat.S_ISREG(status.st_mode) and status.st_size < _POINTER_BYTES
+            if is_small and path.read_bytes().startswith(_POINTER):
+                raise DatasetError("a Git LFS pointer is in its place", path=path, hint="git lfs pull")
+    except OSError as error:
+        raise unreadable(directory, error) from error
 
 
 def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = None) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 NS_PER_S = 1_000_000_000
 """Nanoseconds in a second: stamps are integers [ns], times are floats [s]."""
@@ -21,6 +22,9 @@ _SUFFIXES = {
     "_m": "m",
     "_s": "s",
 }
+DECIMALS = "decimals are written with a point, as in 1.5"
+_DEGREES = ("°", "deg", "degree", "degrees")
+_NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?)\s*([^-+.,\d\s].*?|)\s*")
 _SHOWN_AS = {"m": (100.0, "cm"), "rad": (math.degrees(1), "°")}
 _LEAST_SHOWN = 0.01
 """A smaller number is shown with two significant digits, because its first two decimals would be zeros."""
@@ -29,6 +33,25 @@ _LEAST_SHOWN = 0.01
 def unit_of_name(name: str) -> str:
     """Find the unit that a name of a key or column ends with, such as ``m/s²`` for ``gravity_mps2``, or empty."""
     return next((unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix)), "")
+
+
+def explain_number(given: object, unit: str) -> str:
+    """Write the end of a message on a value that is not allowed where a number of a unit should be.
+
+    Returns:
+        How such a number is written, if the value is one in degrees, with a unit or with a decimal comma; else nothing.
+    """
+    if isinstance(given, bool) or not isinstance(given, str | int | float):
+        return ""
+    match = _NUMBER_AND_UNIT.fullmatch(given if isinstance(given, str) else f"{given}{_DEGREES[0] * (unit == 'rad')}")
+    if match is None:
+        return ""
+    text, word = match[1].replace(",", "."), match[2]
+    if unit == "rad" and word.lower() in _DEGREES:
+        return f"; angles are in radians: {float(text):g} degrees are {math.radians(float(text)):.4f}"
+    if text != match[1]:
+        return f"; {DECIMALS}"
+    return f"; write the number alone{unit and f', in {unit}'}" if word else ""
 
 
 def choose_shown_unit(unit: str) -> tuple[float, str]:

@@ -32,9 +32,8 @@ def test_an_error_of_an_argument_names_it() -> None:
 def test_an_unknown_word_is_refused_with_the_known_ones() -> None:
     assert read_word("kind", "local", Kind) is Kind.LOCAL
     for given in ("magic", 1, ["local"]):
-        with pytest.raises(ConfigError, match=r"^kind: ") as caught:
+        with pytest.raises(ConfigError, match=r"^kind: .*; known: local and polynomial$"):
             read_word("kind", given, Kind)
-        assert caught.value.expected == "one of local, polynomial"
 
 
 @pytest.mark.parametrize(

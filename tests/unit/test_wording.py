@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.wording import command, format_count, is_text, join_names, printable
+from throwcollect.wording import command, format_count, is_text, join_names, printable, suggest
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "0 trials"), (1, "1 trial"), (2, "2 trials")])
@@ -17,6 +17,29 @@ def test_a_count_of_one_is_singular(number: int, said: str) -> None:
 )
 def test_join_names_counts_the_names_after_the_fifth(names: str, said: str) -> None:
     assert join_names(names) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("landing_x", "'landing_x_m'"),
+        ("landing", "'landing_x_m', 'landing_y_m' or 'landing_vx_mps'"),
+        ("Duration_S", "'task.duration_s'"),
+        ("lnading_y_m", "'landing_y_m'"),
+    ],
+)
+def test_a_wrong_name_is_answered_by_those_that_contain_it_or_else_by_similar_ones(name: str, near: str) -> None:
+    known = ["trial", "outcome", "task.duration_s", "landing_x_m", "landing_vx_mps", "landing_y_m", "landing_vy_mps"]
+    assert suggest(name, known, "docs/dataset.md") == f"; did you mean {near}?"
+
+
+@pytest.mark.parametrize("name", ["x", "", "distance", "landing" * 100, None, 3])
+def test_a_name_that_is_like_none_is_answered_by_all_or_by_the_page(name: object) -> None:
+    few, many = ["grid", "list", "sobol"], [f"landing_{each}_m" for each in "uvwxyzabc"]
+    assert suggest(name, few, "docs/targets.md") == "; known: grid, list and sobol"
+    assert suggest(name, many, "docs/dataset.md") == "; docs/dataset.md lists all"
+    assert suggest(name, many).endswith("and 4 more")
+    assert suggest(name, []) == "; there is none"
 
 
 def test_a_recommended_command_is_quoted_for_the_shell() -> None:

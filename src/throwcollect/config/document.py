@@ -14,10 +14,11 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from throwcollect.config.default_path import DEFAULT_CONFIG
-from throwcollect.config.problems import Location, join_key, quote
+from throwcollect.config.problems import Location, join_key, quote, split_key
 from throwcollect.config.shape import index_or_key
 from throwcollect.config.yaml_nodes import MOST_LEVELS, MOST_VALUES, compose, line, reason
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.files import recognise, suggest_path
 from throwcollect.wording import command
 
 Plain = bool | float | str | list[float] | None
@@ -28,8 +29,6 @@ _MOST_BYTES = 5_000_000
 _MOST_BITS = 1023
 """Most binary digits of a whole number; every such number can be a float."""
 _NO_MERGING = "merge keys (<<) are not supported; write the keys out, or put an alias in place of the whole value"
-_SWEPT = ("sweep", "parameters")
-_SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
 
 class Document:
@@ -81,7 +80,7 @@ class Document:
             return problem
         location: Location = ()
         holder: Any = self.values
-        for part in _split_key(problem.key):
+        for part in split_key(problem.key):
             index = _read_index(holder, part)
             location = (*location, index)
             holder = holder[index] if _has_item(holder, index) else None
@@ -107,7 +106,7 @@ class Document:
         except YAMLError as error:
             self.problems.append(Problem(f"not valid YAML: {reason(error)}; got {quote(text)}", key))
             return
-        *above, last = _split_key(key)
+        *above, last = split_key(key)
         if len(above) >= MOST_LEVELS:
             self.problems.append(Problem("the key is nested too deeply", key))
             return
@@ -196,6 +195,8 @@ def _read_text(path: Path) -> str:
             # To read a pipe or a device may block for ever.
             got = "a directory" if stat.S_ISDIR(kind) else "a pipe or a device"
             raise ConfigError([Problem(f"should be a YAML file, got {got}", path=path)])
+        if other := recognise(path):
+            raise ConfigError([Problem(f"should be YAML in UTF-8, got {other}", path=path)])
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
         if len(data) > _MOST_BYTES:
@@ -203,7 +204,7 @@ def _read_text(path: Path) -> str:
         return data.decode("utf-8")
     except FileNotFoundError as error:
         hint = f"{command('init')} writes one to begin with" if path == DEFAULT_CONFIG else None
-        raise ConfigError([Problem("no such file", path=path)], hint=hint) from error
+        raise ConfigError([Problem(f"no such file{suggest_path(path)}", path=path)], hint=hint) from error
     except PermissionError as error:
         raise ConfigError([Problem("no permission to read the file", path=path)]) from error
     except OSError as error:
@@ -248,18 +249,6 @@ def _read_scalar(node: Node) -> Any:
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:
         raise ValueError("the number is too large")
     return value
-
-
-def _split_key(key: str) -> tuple[str, ...]:
-    """Split a dotted key, but not the key of a swept parameter in it, which has dots itself."""
-    parts = tuple(key.split("."))
-    if parts[:2] != _SWEPT or len(parts) < 3:
-        return parts
-    rest = parts[2:]
-    # The first part always belongs to the swept key, even if it has the name of a field, such as `min`.
-    within = 1 if rest[-1] in _SWEPT_FIELDS and rest[1:] else 2 if rest[1:-1][-1:] == ("values",) else 0
-    swept, field = rest[: len(rest) - within], rest[len(rest) - within :]
-    return (*_SWEPT, ".".join(swept), *field)
 
 
 def _read_index(holder: Any, part: str) -> str | int:

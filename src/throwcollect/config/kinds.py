@@ -9,7 +9,9 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
 from pydantic_core import CoreSchema
 
+from throwcollect.arguments import show_value
 from throwcollect.members import load_member, usable_names
+from throwcollect.wording import suggest
 
 
 class ContradictionError(ValueError):
@@ -25,11 +27,16 @@ class ContradictionError(ValueError):
 
 
 class UnknownJointError(ValueError):
-    """A name that is no joint of the robot; the message that `problems` makes of it proposes a similar joint."""
+    """A name that is no joint of the robot; `problems` makes a message of the first ones, as that takes a search."""
 
-    def __init__(self, name: str, robot: str, joints: tuple[str, ...]) -> None:
-        self.name, self.robot, self.joints = name, robot, joints
-        super().__init__(f"{robot} has no joint {name!r}")
+    def __init__(self, name: str, robot: Any) -> None:
+        self.name, self.robot = name, robot
+        super().__init__(f"{robot.title} has no joint {name!r}")
+
+
+def unknown_joint(name: str, robot: Any) -> str:
+    """Make the sentence for a name that is no joint of a robot."""
+    return f"{robot.title} has no joint {show_value(name)}{suggest(name, robot.joints)}"
 
 
 def all_joints() -> tuple[str, ...]:
@@ -43,7 +50,7 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
     if info.context is not None:
         robot = load_member("robots", info.context)
         if name not in robot.joints:
-            raise UnknownJointError(name, robot.title, robot.joints)
+            raise UnknownJointError(name, robot)
     return name
 
 

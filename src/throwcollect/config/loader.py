@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
-from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,14 +15,23 @@ from pydantic import ValidationError
 
 from throwcollect.arguments import read_list, read_path
 from throwcollect.config.document import Document, Plain
-from throwcollect.config.problems import MOST_EXAMINED, KeyProblem, Location, findings, join_key
+from throwcollect.config.problems import (
+    MOST_EXAMINED,
+    PARAMETERS,
+    SWEPT_FIELDS,
+    KeyProblem,
+    Location,
+    findings,
+    join_key,
+)
 from throwcollect.config.schema import Config, Range
+from throwcollect.config.shape import shape_of
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
 from throwcollect.files import StrPath
 from throwcollect.members import names_of, usable_names
+from throwcollect.wording import find_near
 
-_PARAMETERS = ("sweep", "parameters")
 _SIMULATIONS = ("run", "simulations")
 _SHALLOWEST_MAPPING = 2
 """Least number of parts in the key of a mapping: keys of the first level are sections or single values."""
@@ -125,8 +133,11 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
     values = deepcopy(values)
     robot = _find_robot(values)
     misnamed = _find_misnamed(values)
-    found: list[KeyProblem] = []
-    replaced: set[Location] = set()
+    sweep = values.get(PARAMETERS[0])
+    found = list(_find_nested(sweep.get(PARAMETERS[1]) if isinstance(sweep, dict) else None))
+    replaced = {finding.location[:3] for finding in found}
+    for place in replaced:
+        _remove(values, place)
     config = None
     more = 0
     while config is None and len(found) < MOST_EXAMINED:
@@ -138,7 +149,7 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
             more += max(0, error.error_count() - MOST_EXAMINED)
         found += [finding for finding in fresh if not any(_is_about(finding, location) for location in replaced)]
         # Remove only the key of the section (two parts) or the swept key (three parts), so that the others stay.
-        places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
+        places = {finding.location[: 3 if finding.location[:2] == PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
         # A misspelt key now has its default under the right name, or is missing there.
         replaced |= places | {(*finding.location[:-1], finding.meant) for finding in fresh if finding.meant}
@@ -163,7 +174,7 @@ def _find_misnamed(values: dict[str, Any]) -> set[str]:
         if isinstance(name, str) and name not in known:
             misnamed.add(section)
             # The section `until` is the task's, too. If the name is only misspelt, both may be wrong.
-            if section == "task" and not get_close_matches(name, known):
+            if section == "task" and not find_near(name, known):
                 misnamed.add("until")
     return misnamed
 
@@ -193,6 +204,17 @@ def _remove(values: dict[str, Any], location: Location) -> bool:
     return values.pop(str(location[0]), None) is not None
 
 
+def _find_nested(swept: Any, location: Location = PARAMETERS) -> Iterator[KeyProblem]:
+    """Find swept keys that are written as sections in sections, in the section `swept` at a location."""
+    for name, value in swept.items() if isinstance(swept, dict) else ():
+        place = (*location, name)
+        key = join_key(place[len(PARAMETERS) :])
+        if isinstance(value, dict) and SWEPT_FIELDS.isdisjoint(value) and shape_of(key.split(".")).has_keys:
+            yield from _find_nested(value, place)
+        elif len(place) > len(PARAMETERS) + 1:
+            yield KeyProblem(place, f"write {key} as one key")
+
+
 def _find_sweep_problems(config: Config) -> Iterator[KeyProblem]:
     sampler = config.sweep.sampler
     if config.sweep.parameters and sampler != "grid" and config.trials is None and config.until is None:
@@ -200,7 +222,7 @@ def _find_sweep_problems(config: Config) -> Iterator[KeyProblem]:
         sentence = f"missing; the sampler {sampler} should know how many trials to draw, {wanted}"
         yield KeyProblem(("trials",), sentence)
     for key, parameter in config.sweep.parameters.items():
-        location: Location = (*_PARAMETERS, key)
+        location: Location = (*PARAMETERS, key)
         if reason := reason_not_sweepable(config, key):
             yield KeyProblem(location, reason, unknown=reason.startswith("unknown key"))
             continue

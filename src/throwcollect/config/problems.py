@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from throwcollect.config.kinds import ContradictionError, UnknownJointError
-from throwcollect.config.shape import ValueShape, shape_of
+from throwcollect.config.kinds import ContradictionError, UnknownJointError, unknown_joint
+from throwcollect.config.shape import ValueShape, shape_of, unit_of_key
+from throwcollect.units import DECIMALS, explain_number
+from throwcollect.wording import find_near, suggest
 
-_RANGE_ERRORS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 _LONGEST_QUOTE = 60
-_LONGEST_WORD = 200
-"""A longer text is not a misspelt word, so that no similar word is looked for."""
 
 MOST_EXAMINED = 200
 """Number of errors of pydantic that are put into words; the others are only counted."""
@@ -25,10 +22,14 @@ MOST_EXAMINED = 200
 Location = tuple[str | int, ...]
 """Keys and list indices from the root of a configuration to a value."""
 
+PARAMETERS = ("sweep", "parameters")
+"""Key below which the swept keys are."""
+SWEPT_FIELDS = frozenset(("min", "max", "scale", "count", "values"))
 _ENGINE: Location = ("sim", "engine")
 _MEMBERS: tuple[Location, ...] = (("robot", "name"), ("tool", "name"), _ENGINE, ("task", "name"))
 """Keys that name a member of a family, which another package may bring."""
-_NOT_INSTALLED = "; no package that is installed brings it"
+_NOT_INSTALLED = "; no package that is installed brings it; CONTRIBUTING.md describes how to add one"
+_PAGE = "docs/configuration.md"
 
 
 @dataclass(frozen=True)
@@ -59,16 +60,21 @@ def join_key(location: Location) -> str:
     return ".".join(map(str, location))
 
 
-def unknown_key(name: str, known: list[str]) -> str:
+def split_key(key: str) -> tuple[str, ...]:
+    """Split a dotted key, but not the key of a swept parameter in it, which has dots itself."""
+    parts = tuple(key.split("."))
+    if parts[:2] != PARAMETERS or len(parts) < 3:
+        return parts
+    rest = parts[2:]
+    # The first part always belongs to the swept key, even if it has the name of a field, such as `min`.
+    within = 1 if rest[-1] in SWEPT_FIELDS and rest[1:] else 2 if rest[1:-1][-1:] == ("values",) else 0
+    swept, field = rest[: len(rest) - within], rest[len(rest) - within :]
+    return (*PARAMETERS, ".".join(swept), *field)
+
+
+def unknown_key(name: str, known: Sequence[str], *, page: str = _PAGE) -> str:
     """Make the sentence for a key that does not exist, by the keys that would be right in its place."""
-    if meant := _find_nearest(name, known):
-        return f"unknown key{_did_you_mean(meant)}"
-    return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")
-
-
-def unknown_joint(name: str, robot: str, joints: Sequence[str]) -> str:
-    """Make the sentence for a name that is no joint of a robot, by the robot's joints."""
-    return _refuse_joint(name, robot, _find_nearest(name, joints))
+    return f"unknown key{suggest(name, known, page) if known else '; no keys are expected here'}"
 
 
 def quote(value: Any) -> str:
@@ -85,7 +91,12 @@ def quote(value: Any) -> str:
 
 
 def findings(
-    error: ValidationError, values: Any, *, above: Location = (), shape: ValueShape | None = None
+    error: ValidationError,
+    values: Any,
+    *,
+    above: Location = (),
+    shape: ValueShape | None = None,
+    page: str = _PAGE,
 ) -> list[KeyProblem]:
     """Put the first 200 errors of pydantic into words: one finding for each key, unknown keys first.
 
@@ -94,11 +105,12 @@ def findings(
         values: The values that it validated.
         above: Location of these values in a configuration.
         shape: Shape that these values should have; None for the one that a configuration has there.
+        page: Page that lists the keys.
     """
     expected = shape or shape_of(above)
     found: dict[Location, KeyProblem] = {}
     for details in error.errors(include_url=False)[:MOST_EXAMINED]:
-        for finding in _describe_error(details, values, above, expected):
+        for finding in _describe_error(details, values, above, expected, page):
             # A union reports an error for each alternative, and the first sentence names all of them.
             found.setdefault(finding.location, finding)
     for location in [place[:length] for place in found for length in range(len(place))]:
@@ -111,7 +123,9 @@ def findings(
     return [*unknown, *rest]
 
 
-def _describe_error(details: ErrorDetails, values: Any, above: Location, expected: ValueShape) -> Iterator[KeyProblem]:
+def _describe_error(
+    details: ErrorDetails, values: Any, above: Location, expected: ValueShape, page: str
+) -> Iterator[KeyProblem]:
     location, shape, section = _locate(details, values, above, expected)
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
@@ -123,19 +137,22 @@ def _describe_error(details: ErrorDetails, values: Any, above: Location, expecte
         only = known[0] if len(known) == 1 else ""
         if name.isdecimal() and value is None:
             # YAML takes what follows a comma for the next key.
-            refused = "unknown key; if it is the end of a number, decimals are written with a point, as in 1.5"
+            refused = f"unknown key; if it is the end of a number, {DECIMALS}"
         if location[:-1] == ("sweep",) and "." in name:
             # The level between is the one that is forgotten most often.
             refused = "unknown key; keys that vary belong below sweep.parameters"
-        meant = "" if refused else _find_nearest(name, known) or only
-        yield KeyProblem(location, refused or unknown_key(name, known), unknown=True, meant=meant)
+        meant = "" if refused else next(iter(find_near(name, known)), only)
+        sentence = refused or unknown_key(name, known, page=page)
+        if not meant and not refused and (*location[:-1], "name") in _MEMBERS:
+            # What a robot or a tool is cannot be written in a configuration, as many expect of a URDF.
+            sentence += f"; CONTRIBUTING.md describes how to add a {location[0]}"
+        yield KeyProblem(location, sentence, unknown=True, meant=meant)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
-            yield KeyProblem((*location, *_split(key)), sentence)
+            # The keys are relative to the section, but only whole ones can be split.
+            yield KeyProblem((*location, *split_key(join_key((*location, key)))[len(location) :]), sentence)
     elif isinstance(cause, UnknownJointError):
-        meant = _find_nearest(cause.name, cause.joints)
-        sentence = _refuse_joint(cause.name, cause.robot, meant)
-        yield KeyProblem(location, sentence, unknown=is_key, meant=meant)
+        yield KeyProblem(location, unknown_joint(cause.name, cause.robot), unknown=is_key)
     elif cause is not None:
         yield KeyProblem(location, str(cause), unknown=is_key)
     elif kind == "missing":
@@ -147,36 +164,24 @@ def _describe_error(details: ErrorDetails, values: Any, above: Location, expecte
         no_match = _NOT_INSTALLED if (*location, tag) in _MEMBERS else ""
         yield KeyProblem((*location, tag), _write_expectation(words, value[tag], choices, no_match=no_match))
     else:
-        no_match = _NOT_INSTALLED if location in _MEMBERS else ""
+        no_match = f"; {page} explains them" if len(shape.choices) > 2 else ""
+        if location in _MEMBERS:
+            no_match = _NOT_INSTALLED
         if location == _ENGINE and value == "auto":
             no_match = "; none is chosen automatically, as the same file would give other throws on another machine"
+        if value is None and location and shape.has_keys:
+            no_match = "; write keys into it, or leave it out"
+        # Bounds and values of a swept key have its unit.
+        is_swept = location[:2] == PARAMETERS and location[3:4] in (("min",), ("max",), ("values",))
+        unit = unit_of_key(str(location[2])) if is_swept else shape.unit
         sentence = _write_expectation(str(shape), value, shape.choices, no_match=no_match)
-        yield KeyProblem(location, sentence + _explain_radians(kind, shape, value))
+        yield KeyProblem(location, sentence + explain_number(value, unit))
 
 
-def _refuse_joint(name: str, robot: str, meant: str) -> str:
-    return f"{robot} has no joint {quote(name)}{_did_you_mean(meant)}"
-
-
-def _write_expectation(words: str, value: Any, choices: list[str], *, no_match: str = "") -> str:
+def _write_expectation(words: str, value: Any, choices: Sequence[str], *, no_match: str = "") -> str:
     """Say what would be right, and which choice the user meant; if none is like the value, append `no_match`."""
-    return f"should be {words}, got {quote(value)}{_did_you_mean(_find_nearest(value, choices)) or no_match}"
-
-
-def _find_nearest(value: Any, choices: Sequence[str]) -> str:
-    """Find the choice that is most like a value; an empty text if none is."""
-    looks_like_a_word = isinstance(value, str) and len(value) <= _LONGEST_WORD
-    return next(iter(get_close_matches(value, choices, 1)), "") if looks_like_a_word else ""
-
-
-def _did_you_mean(choice: str) -> str:
-    return f"; did you mean '{choice}'?" if choice else ""
-
-
-def _explain_radians(kind: str, shape: ValueShape, value: Any) -> str:
-    if kind not in _RANGE_ERRORS or shape.unit != "rad":
-        return ""
-    return f"; angles are in radians: {value:g} degrees are {math.radians(value):.4f}"
+    meant = suggest(value, choices) if find_near(value, choices) else no_match
+    return f"should be {words}, got {quote(value)}{meant}"
 
 
 def _locate(
@@ -201,12 +206,3 @@ def _locate(
             title = str(part).rpartition(".")[2]
             shape = next((each for each in shape.alternatives if each.node.get("title") == title), shape)
     return tuple(location), shape, section
-
-
-def _split(key: str) -> Location:
-    """Split a dotted key of a contradiction, but not the key of a swept parameter in it, which has dots itself."""
-    head, found, rest = key.partition("parameters.")
-    if found and not head:
-        name, _, field = rest.rpartition(".")
-        return ("parameters", name, field)
-    return tuple(key.split("."))

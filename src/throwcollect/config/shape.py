@@ -58,6 +58,11 @@ class ValueShape:
         return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
     @property
+    def has_keys(self) -> bool:
+        """Whether it is a section or a mapping."""
+        return any(shape.node.get("type") == "object" for shape in self.alternatives)
+
+    @property
     def maps_joints(self) -> bool:
         """Whether it is a mapping from names of joints."""
         return "propertyNames" in self.node

@@ -13,7 +13,7 @@ from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Tr
 from throwcollect.config.section import Section
 from throwcollect.config.target_columns import TargetColumn
 from throwcollect.config.until import UntilConfig
-from throwcollect.wording import join_names
+from throwcollect.wording import join_names, suggest
 
 
 def _refuse_base(until: type[UntilConfig]) -> type[UntilConfig]:
@@ -90,8 +90,8 @@ class TaskConfig(Section):
             Sentence that says what is wrong, by column; empty if they are targets of this task, or none at all.
         """
         known = {each.name: each for each in self.target_columns}
-        has = f"it has {', '.join(known)}" if known else "it has none"
-        wrong = {name: f"the task {self.name} has no such target; {has}" for name in columns if name not in known}
+        unknown = f"the task {self.name} has no such target"
+        wrong = {name: unknown + suggest(name, known) for name in columns if name not in known}
         if there := [name for name in known if name in columns]:
             missing = (name for name, each in known.items() if each.required and name not in columns)
             wrong |= {name: f"is missing beside {join_names(there)}" for name in missing}

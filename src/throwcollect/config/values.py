@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from throwcollect.config.key import Effect, Key, key_of_field, overlay
-from throwcollect.config.problems import Location, findings, join_key, unknown_joint, unknown_key
+from throwcollect.config.kinds import unknown_joint
+from throwcollect.config.problems import Location, findings, join_key, unknown_key
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section, list_sections
 from throwcollect.config.shape import index_or_key, shape_of
@@ -134,7 +135,7 @@ def _explain_absent_joint(config: Config, key: str) -> str | None:
         return "cannot vary from trial to trial"
     robot, joint = load_member("robots", config.robot.name), parts[depth]
     if joint not in robot.joints:
-        return unknown_joint(joint, robot.title, robot.joints)
+        return unknown_joint(joint, robot)
     if joint not in config.task.end:
         return _explain_unnamed(joint, "task.end")
     # Only a value that is a single number can be added without knowing more of the motion.

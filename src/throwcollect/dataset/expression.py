@@ -10,7 +10,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import reduce
 from typing import Any, Literal
 
@@ -19,6 +18,7 @@ import pyarrow.compute as pc
 
 from throwcollect.arguments import show_value
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.wording import suggest
 
 _SHOWN = 100
 """Most characters of an expression that a message shows."""
@@ -212,9 +212,8 @@ class _Evaluation:
         name = self._name(node)
         known = self._table.column_names
         if name not in known:
-            near = get_close_matches(name, known, 1)
-            other = f"did you mean {near[0]!r}?" if near else "a text needs quotes"
-            raise self._make_error(node, f"no column {name!r}; {other}")
+            meant = suggest(name, known, "a text needs quotes, and docs/dataset.md")
+            raise self._make_error(node, f"no column {name!r}{meant}")
         column = self._table[name]
         if pa.types.is_string(column.type):
             return _Value("text", column)

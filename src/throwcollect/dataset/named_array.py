@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
+from throwcollect.wording import suggest
 
 Bounds = tuple[float, float]
 """Smallest and largest value."""
@@ -24,14 +24,19 @@ class UnknownNameError(ConfigError, KeyError):
     __str__ = ConfigError.__str__
 
 
-def refuse_name(what: str, name: object, known: Iterable[str]) -> UnknownNameError:
-    """Make the error for an unknown name, which tells the known names that are like it, or all of them.
+def refuse_name(what: str, name: object, known: Iterable[str], *, page: str = "docs/dataset.md") -> UnknownNameError:
+    """Make the error for an unknown name, by the known names and the page that lists them.
 
     Its sentence begins with `what`, such as ``no column``.
     """
-    names = list(known)
-    near = get_close_matches(str(name), names, 3, 0.5) or [each for each in names if str(name) in each]
-    return UnknownNameError(f"{what} {name!r}", expected=", ".join(near or names))
+    return UnknownNameError(f"{what} {name!r}{suggest(name, known, page)}")
+
+
+def refuse_attribute(owner: object, name: str, parts: Iterable[str] = ()) -> AttributeError:
+    """Make the error for an attribute that `owner` lacks; `parts` are attributes of its attributes, with a dot."""
+    public = [each for each in dir(type(owner)) if not each.startswith("_")]
+    meant = "" if name.startswith("_") else suggest(name, (*public, *parts), "docs/reading.md")
+    return AttributeError(f"a {type(owner).__name__} has no {name!r}{meant}")
 
 
 def read_column(column: pa.ChunkedArray) -> NDArray[Any]:

@@ -13,15 +13,15 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.arguments import check_whole_number, read_list, read_path
+from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.directory import METADATA, PLAN, THROWS
-from throwcollect.dataset.guesses import DATASET, refuse_attribute
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_name
+from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_attribute, refuse_name
 from throwcollect.dataset.selected_throws import select_throws
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import name_alias, read_throws
@@ -143,7 +143,7 @@ class Dataset(Sequence[Throw]):
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            raise refuse_attribute(self, name, DATASET)
+            raise refuse_attribute(self, name)
 
     @property
     def parameters(self) -> NamedArray:
@@ -324,7 +324,7 @@ class Dataset(Sequence[Throw]):
         chosen = known if joints is None else read_list("joints", joints, "names")
         for joint in chosen:
             if joint not in known:
-                raise ConfigError(f"{robot_of(self.config).title} has no joint {joint!r}", expected=", ".join(known))
+                raise ConfigError(unknown_joint(joint, robot_of(self.config)))
         wanted = read_list("columns", columns, "names")
         return read_trajectories(trials, self._stored, wanted, chosen, threads=threads)
 

@@ -12,16 +12,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.target_columns import is_target
-from throwcollect.dataset.guesses import THROW, refuse_attribute
-from throwcollect.dataset.named_array import refuse_name
+from throwcollect.dataset.named_array import refuse_attribute, refuse_name
 from throwcollect.dataset.recorded_motion import Ball, Joints, LazyRows
 from throwcollect.dataset.throws_table import Row, ball_state
-from throwcollect.dataset.trajectory_columns import (
-    COLUMNS,
-    TIMES,
-    Recorded,
-    name_components,
-)
+from throwcollect.dataset.trajectory_columns import COLUMNS, TIMES, Recorded, name_components
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
@@ -30,6 +24,13 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 pd = lazily("pandas")
+
+_PARTS = (
+    *(f"events.{name}" for name in ("release", "apex", "landing", "contacts")),
+    *("joints.names", "ball.time_s", "joints.time_s"),
+    *(column for column in COLUMNS if "." in column),
+)
+"""Attributes of the attributes of a throw, which are easily looked for in the throw itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,7 @@ class Throw:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            raise refuse_attribute(self, name, THROW)
+            raise refuse_attribute(self, name, _PARTS)
 
     def __getitem__(self, column: str) -> Any:
         """Return its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.

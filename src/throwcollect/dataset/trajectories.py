@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from throwcollect.dataset.named_array import refuse_name
 from throwcollect.dataset.trajectory_columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
 from throwcollect.errors import ConfigError
-from throwcollect.wording import format_count
+from throwcollect.wording import format_count, suggest
 
 _BLOCK = 16
 """Throws that are read at once: enough to be worth an array, few enough for the caches."""
@@ -126,7 +126,7 @@ def read_trajectories(
     """
     for column in columns:
         if column not in COLUMNS:
-            raise ConfigError(f"a trajectory has no column {column!r}", expected=", ".join(COLUMNS))
+            raise ConfigError(f"a trajectory has no column {column!r}{suggest(column, COLUMNS, 'docs/reading.md')}")
     stored = [place for place in places if place is not None]
     offsets = np.zeros(len(places) + 1, np.int64)
     np.cumsum([place.samples if place else 0 for place in places], out=offsets[1:])

@@ -15,6 +15,7 @@ from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, write_file
 from throwcollect.members import explain_failure, load_member, names_of
 from throwcollect.sweep.point_file import encode_points
+from throwcollect.wording import suggest
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
     """
     formats = names_of("exporters")
     if to not in formats:
-        raise refuse_argument("to", f"unknown format {to!r}", expected=f"one of {', '.join(formats)}")
+        raise refuse_argument("to", f"unknown format {to!r}{suggest(to, formats)}")
     chosen: Exporter = load_member("exporters", to)
     require(*chosen.packages, extra="export")
     directory, output = read_path("directory", directory), read_path("output", output)

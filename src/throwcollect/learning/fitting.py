@@ -18,7 +18,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap, no_correction, scale_values
 from throwcollect.learning.polynomial import Validation, cross_validate, fit_polynomial
-from throwcollect.wording import format_count, join_names
+from throwcollect.wording import format_count, join_names, suggest
 
 MOST_PARAMETERS = 20
 EFFORT = "effort_peak_share"
@@ -151,7 +151,7 @@ def _find_axes(
     swept = dataset.plan.keys
     for key in (*parameters, *context):
         if key not in swept:
-            raise ConfigError(f"{key} was not swept", expected=f"one of {', '.join(swept)}")
+            raise ConfigError(f"{key} was not swept{suggest(key, swept)}")
     nominal = {leaf.name: leaf.value for leaf in leaves(dataset.config)}
     axes = []
     for key in swept:
@@ -211,7 +211,7 @@ def _read_numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
     """
     if column not in throws.column_names or not pa.types.is_floating(throws.schema.field(column).type):
         numbers = [field.name for field in throws.schema if pa.types.is_floating(field.type)]
-        raise ConfigError(f"no column of numbers {column!r}", expected=f"one of {', '.join(numbers)}")
+        raise ConfigError(f"no column of numbers {column!r}{suggest(column, numbers, 'docs/dataset.md')}")
     values: Array = throws[column].to_numpy()
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):

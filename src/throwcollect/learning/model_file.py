@@ -10,7 +10,7 @@ from pydantic import Field, FiniteFloat, ValidationError, model_validator
 from throwcollect.dataset.directory import has_files
 from throwcollect.dataset.miss_quantiles import find_median
 from throwcollect.errors import DatasetError
-from throwcollect.files import read_text
+from throwcollect.files import read_text, suggest_path
 from throwcollect.learning.adapting import ROLES, Method
 from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.learning.distilling import DistilledMap
@@ -146,7 +146,8 @@ def read_model_file(directory: Path) -> ModelFile:
         # Users easily give a dataset in place of its model, so the hint makes a model of it.
         dataset = directory if has_files(directory) else "DATASET"
         hint = command("fit", dataset, "-o", "MODEL")
-        raise DatasetError(f"holds no model: there is no {MODEL}", path=directory, hint=hint) from error
+        problem = f"holds no model: there is no {MODEL}{suggest_path(directory)}"
+        raise DatasetError(problem, path=directory, hint=hint) from error
     try:
         return ModelFile.model_validate_json(text)
     except ValidationError as error:

@@ -16,6 +16,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.members import names_of
 from throwcollect.replay.audit import simulate_side_by_side
 from throwcollect.replay.replayer import Replayer
+from throwcollect.wording import join_names, suggest
 
 LANDING = ("landing_x_m", "landing_y_m")
 """Columns with the place where a throw landed."""
@@ -64,9 +65,11 @@ def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterat
     """
     own = Dataset.open(directory).config.sim.engine
     others = [name for name in names_of("engines") if name != own]
+    if engine == own:
+        problem = f"--engine {engine}: the throws of {directory} are by {own} themselves"
+        raise ConfigError(problem, expected=join_names(others, "or"))
     if engine not in others:
-        problem = f"the throws of {directory} are by {own} themselves" if engine == own else "there is no such engine"
-        raise ConfigError(f"--engine {engine}: {problem}", expected=", ".join(others))
+        raise ConfigError(f"--engine {engine}: there is no such engine{suggest(engine, others)}")
     return simulate_side_by_side(engine, trials, _begin, (directory, engine))
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
 from throwcollect.ros import get_message
+from throwcollect.wording import suggest
 
 Numbers = Callable[[NDArray[Any], str], Any]
 """Makes a plain value of an array of numbers and the IDL type of its elements."""
@@ -55,7 +56,7 @@ def fill(message: Any, values: object, where: str = "") -> None:
         name = str(_ROS_1_NAMES.get(given, given) if "nanosec" in types else given)
         path = f"{where}{given}"
         if name not in types:
-            raise ConfigError(f"{path}: no such field", expected=f"one of {', '.join(types)}" if types else "no field")
+            raise ConfigError(f"{path}: no such field{suggest(name, types)}")
         current = getattr(message, name)
         if _is_message(types[name]):
             fill(current, value, f"{path}.")

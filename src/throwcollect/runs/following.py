@@ -14,6 +14,7 @@ from throwcollect.runs.records import Run
 from throwcollect.runs.run_record import Summary
 from throwcollect.runs.run_selection import check_run, describe_death
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
+from throwcollect.wording import suggest
 
 _POLL_S = 0.05
 _READ_S = 0.2
@@ -100,8 +101,7 @@ def read_logs(
     files = NodeLogs(Path(run.record.logs)).files()
     known = {*files, *(state.name for state in run.record.nodes)}
     if unknown := [node for node in nodes if node not in known]:
-        message = f"run {run.id}: no node {unknown[0]!r} has printed anything"
-        raise ConfigError(message, expected=", ".join(files) or None)
+        raise ConfigError(f"run {run.id}: no node {unknown[0]!r} has printed anything{suggest(unknown[0], files)}")
     tails: dict[str, Tail] = {}
     for now, last in _look_repeatedly(run, follow=follow, keep_on=keep_on):
         files = NodeLogs(Path(now.record.logs)).files()

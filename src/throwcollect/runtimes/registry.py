@@ -6,7 +6,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.extras import MissingExtraError, explain_missing
 from throwcollect.members import load_member, names_of
 from throwcollect.runtimes.runtime import Runtime
-from throwcollect.wording import join_names
+from throwcollect.wording import suggest
 
 AUTOMATIC = ("docker", "local")
 """The runtimes that ``auto`` tries, in this order."""
@@ -20,8 +20,8 @@ def get_runtime(name: str) -> Runtime:
         MissingExtraError: If the runtime needs a package that is not installed.
     """
     if name not in names_of("runtimes"):
-        problem = Problem(f"there is no runtime {name}", key="run.runtime")
-        raise ConfigError([problem], expected=join_names(names_of("runtimes"), "or"))
+        meant = suggest(name, names_of("runtimes"))
+        raise ConfigError([Problem(f"there is no runtime {name}{meant}", key="run.runtime")])
     with explain_missing():
         runtime: Runtime = load_member("runtimes", name)()
     return runtime

@@ -30,6 +30,7 @@ from throwcollect.config.shape import ValueShape
 from throwcollect.errors import ConfigError, NotFoundError, Problem
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.runs.run_record import Kind
+from throwcollect.wording import suggest
 
 LONGEST_NAME = 63
 NAME = rf"[a-z0-9][a-z0-9_-]{{0,{LONGEST_NAME - 1}}}"
@@ -139,9 +140,8 @@ class Catalogue:
         try:
             return self.components[name]
         except KeyError:
-            known = f"one of {', '.join(self.components)}" if self.components else None
-            hint = None if known else "throwcollect serve CATALOG.yaml offers what is in a catalogue"
-            raise NotFoundError(f"no component {name!r}", expected=known, hint=hint) from None
+            hint = None if self.components else "throwcollect serve CATALOG.yaml offers what is in a catalogue"
+            raise NotFoundError(f"no component {name!r}{suggest(name, self.components)}", hint=hint) from None
 
     @classmethod
     def find(cls, path: Path) -> Catalogue:
@@ -209,4 +209,5 @@ def _find_problems(error: ValidationError, document: Document) -> list[Problem]:
     """Errors of a catalogue, with their lines."""
     components = {"type": "object", "additionalProperties": ComponentSection.model_json_schema()}
     shape = ValueShape({"type": "object", "properties": {"components": components}})
-    return [document.problem(each.location, each.sentence) for each in findings(error, document.values, shape=shape)]
+    found = findings(error, document.values, shape=shape, page="docs/serve.md")
+    return [document.problem(each.location, each.sentence) for each in found]

@@ -23,6 +23,7 @@ from throwcollect.serve.instances import Instances
 from throwcollect.serve.problem_responses import describe_bytes, problem
 from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
 from throwcollect.serve.watching import StateWatch
+from throwcollect.wording import suggest
 
 
 class InstanceRequest(BaseModel):
@@ -147,8 +148,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
             with open(open_log(files[node], os.O_RDONLY), encoding="utf-8", errors="replace") as file:
                 return PlainTextResponse("".join(deque(file, tail)))
         except (KeyError, OSError):
-            known = f"one of {', '.join(files)}" if files else None
-            return problem(404, f"run {instance} has no log of {node!r}", expected=known)
+            return problem(404, f"run {instance} has no log of {node!r}{suggest(node, files)}")
 
     @router.get("/{instance}/events", response_class=Response, responses=describe_bytes("application/x-ndjson"))
     def events(instance: str) -> Response:

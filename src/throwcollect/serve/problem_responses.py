@@ -147,7 +147,7 @@ def _find_problems(model: type[BaseModel], values: object, what: str) -> list[Pr
         shape = ValueShape(_resolve(schema, schema.get("$defs", {})))
         return [
             Problem(each.sentence if each.key else f"{what}{each.sentence}", key=each.key)
-            for each in findings(found, values, shape=shape)
+            for each in findings(found, values, shape=shape, page="docs/serve.md")
         ]
     return []
 

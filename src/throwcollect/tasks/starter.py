@@ -12,6 +12,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import has_wheel
 from throwcollect.members import load_member, names_of
 from throwcollect.tasks.first_motion import Motion, find_first_motion
+from throwcollect.wording import find_near, suggest
 
 POINTS = "throws.csv"
 """The list of points that the sampler `list` reads, beside the configuration."""
@@ -40,7 +41,10 @@ def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
         ("--sampler", sampler, samplers()),
     ):
         if name not in known:
-            raise ConfigError(f"{option} {name}: no such {option[2:]} is installed", expected=" or ".join(known))
+            how = (
+                "" if option == "--sampler" or find_near(name, known) else "; CONTRIBUTING.md describes how to add one"
+            )
+            raise ConfigError(f"{option} {name}: no such {option[2:]} is installed{suggest(name, known)}{how}")
     # A task of another package that cannot be loaded is reported here, before a configuration names it.
     load_member("tasks", task)
     motion = find_first_motion(robot, task)

@@ -8,11 +8,6 @@ from throwcollect.config.kinds import NAME_WORDS
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.errors import ConfigError, PlanError, Problem
 
-KNOWN_IN_RUN = (
-    "simulations, runtime, router_port, listen, open, ros, root_namespace, domain_id, trial_timeout_s, "
-    "start_timeout_s, grace_s, retries, replay, restarts"
-)
-
 MEANT_TRIALS = ": unknown key; did you mean 'trials'?"
 JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
 
@@ -23,14 +18,14 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
         ("trails: 3", [f"run.yaml:1: trails{MEANT_TRIALS}"]),
         # A key under a misspelt name is not reported as missing too.
         ("trails: 3\nsweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}", [f"run.yaml:1: trails{MEANT_TRIALS}"]),
-        ("until: {swung: 5}", ["run.yaml:1: until.swung: unknown key; known keys here: landed"]),
+        ("until: {swung: 5}", ["run.yaml:1: until.swung: unknown key; known: landed"]),
         ("until: {landd: 5}", ["run.yaml:1: until.landd: unknown key; did you mean 'landed'?"]),
-        ("run: {x: 3}", [f"run.yaml:1: run.x: unknown key; known keys here: {KNOWN_IN_RUN}"]),
+        ("run: {x: 3}", ["run.yaml:1: run.x: unknown key; docs/configuration.md lists all"]),
         (
             "task:\n  trajectory:\n    family: dmp\n    gamma: 1",
             [
-                "run.yaml:4: task.trajectory.gamma: unknown key; known keys here: "
-                "family, basis_functions, weights, alpha_z, alpha_x"
+                "run.yaml:4: task.trajectory.gamma: unknown key; known: "
+                "family, basis_functions, weights, alpha_z and alpha_x"
             ],
         ),
         (
@@ -50,7 +45,11 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
         ("ball:\n  mass_kg: .nan", ["run.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got nan"]),
         ("ball:\n  mass_kg: 0", ["run.yaml:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got 0"]),
         ("ball:\n  radius_m: [1]", ["run.yaml:2: ball.radius_m: should be a number from 0.005 to 0.1 m, got a list"]),
-        ("ball:", ["run.yaml:1: ball: should be keys and values, got nothing"]),
+        *(
+            (f"{key}:", [f"run.yaml:1: {key}: should be {words}, got nothing; write keys into it, or leave it out"])
+            for key, words in (("ball", "keys and values"), ("sweep", "keys and values"))
+        ),
+        ("seed:", ["run.yaml:1: seed: should be a whole number from 0 to 4294967295, got nothing"]),
         (
             "sim: {physics_hz: 240.0}",
             ["run.yaml:1: sim.physics_hz: should be a whole number from 100 to 10000 Hz, got 240.0"],
@@ -74,7 +73,10 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
         ),
         (
             "robot: {locked: [torso_2_joint, torso_3_joint]}",
-            ["run.yaml:1: robot.locked.1: Talos has no joint 'torso_3_joint'; did you mean 'torso_2_joint'?"],
+            [
+                "run.yaml:1: robot.locked.1: Talos has no joint 'torso_3_joint'; "
+                "did you mean 'torso_2_joint' or 'torso_1_joint'?"
+            ],
         ),
         ("task:\n  end: [1]", [f"run.yaml:2: task.end: should be {JOINT_LIST}, got a list"]),
         (
@@ -84,7 +86,34 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
                 "did you mean 'arm_right_4_joint'?"
             ],
         ),
-        ("robot: {posture: {knee: 1}}", ["run.yaml:1: robot.posture.knee: Talos has no joint 'knee'"]),
+        (
+            "robot: {posture: {knee: 1}}",
+            [
+                "run.yaml:1: robot.posture.knee: Talos has no joint 'knee'; known: arm_left_1_joint, arm_left_2_joint, "
+                "arm_left_3_joint, arm_left_4_joint, arm_left_5_joint and 27 more"
+            ],
+        ),
+        (
+            "robot: {urdf: my.urdf}",
+            [
+                "run.yaml:1: robot.urdf: unknown key; docs/configuration.md lists all; "
+                "CONTRIBUTING.md describes how to add a robot"
+            ],
+        ),
+        (
+            "tool: {name: gripper}",
+            [
+                "run.yaml:1: tool.name: should be 'spoon', got 'gripper'; no package that is installed brings it; "
+                "CONTRIBUTING.md describes how to add one"
+            ],
+        ),
+        (
+            "sweep: {sampler: random}",
+            [
+                "run.yaml:1: sweep.sampler: should be one of 'grid', 'uniform', 'latin_hypercube', 'sobol', 'list', "
+                "got 'random'; docs/configuration.md explains them"
+            ],
+        ),
         (
             "task:\n  end:\n    arm_right_4_joint: -60",
             [
@@ -262,7 +291,7 @@ def test_an_error_about_another_file_or_without_a_key_keeps_its_place(write, pro
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("unknown_{}: 1\n", "unknown_0: unknown key; known keys here: name"),
+        ("unknown_{}: 1\n", "unknown_0: unknown key; docs/configuration.md lists all"),
         ("name: a\n", "name: the key is here twice, first in line 1"),
     ],
 )
@@ -284,12 +313,68 @@ def test_suggestions_are_searched_only_for_the_first_of_many_problems(tmp_path, 
         asked.append(word)
         return []
 
-    monkeypatch.setattr("throwcollect.config.problems.get_close_matches", near)
+    monkeypatch.setattr("throwcollect.wording.get_close_matches", near)
     path = tmp_path / "many.yaml"
     path.write_text("task: {end: {" + ", ".join(f"joint_{number}: 1" for number in range(500)) + "}}\n")
-    with pytest.raises(ConfigError, match=r"task\.end\.joint_0: Talos has no joint 'joint_0'\n"):
+    with pytest.raises(ConfigError, match=r"task\.end\.joint_0: Talos has no joint 'joint_0'; known: "):
         load(path)
-    assert len(asked) <= 200
+    assert len(set(asked)) == 200
+
+
+@pytest.mark.parametrize(
+    ("parameters", "keys"),
+    [
+        ("{task: {end: {arm_right_4_joint: {min: -0.9, max: -0.3}}}}", ["task.end.arm_right_4_joint"]),
+        ("{task.end: {arm_right_4_joint: {values: [-0.9]}}}", ["task.end.arm_right_4_joint"]),
+        ("{task: {duration_s: [1.0, 1.2], end: {torso_1_joint: 0.1}}}", ["task.duration_s", "task.end.torso_1_joint"]),
+        ("{ball: {mass_kg: {min: 0.1, mx: 0.2}}, task.duration_s: {values: [1]}}", ["ball.mass_kg"]),
+    ],
+)
+def test_swept_keys_in_sections_are_reported_as_keys_with_dots(problems_of, parameters, keys):
+    found = problems_of(f"trials: 1\nsweep: {{parameters: {parameters}}}")
+    assert found == [f"run.yaml:2: sweep.parameters.{key}: write {key} as one key" for key in keys]
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "advice"),
+    [
+        ("task: {end: {arm_right_4_joint: -28deg}}", "task.end.arm_right_4_joint", "-28 degrees are -0.4887"),
+        ("task: {end: {arm_right_4_joint: 45°}}", "task.end.arm_right_4_joint", "45 degrees are 0.7854"),
+        ("task: {end: {arm_right_4_joint: -0.5 rad}}", "task.end.arm_right_4_joint", "write the number alone, in rad"),
+        ("ball: {mass_kg: 40 g}", "ball.mass_kg", "write the number alone, in kg"),
+        ("task: {duration_s: '1,2'}", "task.duration_s", "decimals are written with a point, as in 1.5"),
+        *(
+            (
+                f"trials: 1\nsweep: {{parameters: {{{key}: {{min: {text}, max: 9}}}}}}",
+                f"sweep.parameters.{key}.min",
+                advice,
+            )
+            for key, text, advice in (
+                ("task.end.arm_right_4_joint", "-28 deg", "angles are in radians: -28 degrees are -0.4887"),
+                ("task.duration_s", "1.0 s", "write the number alone, in s"),
+            )
+        ),
+    ],
+)
+def test_a_number_with_a_unit_or_a_decimal_comma_is_reported_with_how_it_is_written(problems_of, text, key, advice):
+    (found,) = problems_of(text)
+    assert f": {key}: should be a number" in found
+    assert found.endswith(advice)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            f"task: {{end: {{arm_right_4_joint: {text}}}}}"
+            for text in ("x", "'1'", "1.2.3", "2024-01-01", "true", ".nan")
+        ),
+        "sweep: {parameters: {task.end.arm_right_4_joint: {min: 0, max: 1, count: 2.5}}}",
+    ],
+)
+def test_a_value_that_is_no_number_with_a_unit_gets_no_advice(problems_of, text):
+    (found,) = problems_of(f"trials: 1\n{text}")
+    assert ";" not in found
 
 
 def test_a_value_that_cannot_be_read_is_reported_once(problems_of):

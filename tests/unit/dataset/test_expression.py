@@ -68,7 +68,10 @@ def test_a_null_value_fulfils_only_comparisons_with_none() -> None:
         ("trial > 1\0", "cannot be understood"),
         ("not " * 5000 + "trial > 1", "cannot be understood|nested too deeply"),
         ("+".join(["1"] * 5000) + " > 1", "cannot be understood|nested too deeply"),
-        ("outcome == landed", r"no column 'landed'; a text needs quotes \(character 12\)"),
+        (
+            "outcome == landed",
+            r"no column 'landed'; a text needs quotes, and docs/dataset.md lists all \(character 12\)",
+        ),
         ("trial > 0 and landing_x > 1", r"no column 'landing_x'; did you mean 'landing_x_m'\? \(character 15\)"),
         ("'größe' == outcome and task.duration_m > 1", r"did you mean 'task.duration_s'\? \(character 24\)"),
         ("landing_x_m", "should be a condition, is a number"),

@@ -147,7 +147,7 @@ def test_a_score_is_stored_in_the_model_and_shown_in_its_card(model: Model, tmp_
     ("options", "message"),
     [
         ({"kind": "network"}, "^kind: 'network'"),
-        ({"targets": ["place"]}, "no column of numbers 'place'"),
+        ({"targets": ["place"]}, "no column of numbers 'place'; docs/dataset.md lists all"),
         ({"parameters": ["task.points_hz"]}, "task.points_hz was not swept"),
         ({"targets": [*TARGETS, TARGETS[0]]}, "targets: landing_x_m is named twice"),
         ({"parameters": KEYS[:1] * 2}, f"parameters: {KEYS[0]} is named twice"),

@@ -17,7 +17,7 @@ from throwcollect.serve.instance_routes import make_id
 pytestmark = pytest.mark.usefixtures("begun")
 URL = "/api/v1/instances"
 SIMULATIONS = "should be a whole number from 1 to 256 or null"
-UNKNOWN = "unknown key; known keys here: component, simulations, set, joins"
+UNKNOWN = "unknown key; known: component, simulations, set and joins"
 HALF = "should be text that UTF-8 can hold, got half a character ('\\ud800')"
 
 
@@ -99,7 +99,7 @@ def test_a_malformed_id_begins_no_instance(client: TestClient, begun: list[dict[
 
 def test_an_unknown_component_is_not_found(client: TestClient) -> None:
     answer = client.put(f"{URL}/a", json={"component": "nothing"})
-    assert (answer.status_code, answer.json()["expected"]) == (404, "one of throws, talos")
+    assert (answer.status_code, answer.json()["title"]) == (404, "no component 'nothing'; known: throws and talos")
     assert client.get("/api/v1/components/nothing").status_code == 404
     assert client.get("/api/v1/components/talos").json()["kind"] == "session"
 

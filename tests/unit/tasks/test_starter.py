@@ -17,6 +17,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.tasks.starter import make_starter, samplers
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
+ADD = "; CONTRIBUTING.md describes how to add one"
 
 
 @pytest.mark.parametrize("sampler", samplers())
@@ -89,9 +90,10 @@ def test_a_missing_configuration_is_an_error_that_names_init(tmp_path: Path, mon
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (("atlas", "throw", "sobol"), "--robot atlas: no such robot is installed\n  expected: talos"),
-        (("talos", "catch", "sobol"), "--task catch: no such task is installed\n  expected: throw"),
-        (("talos", "throw", "halton"), "--sampler halton: no such sampler is installed\n  expected: grid or "),
+        (("my.urdf", "throw", "sobol"), f"--robot my.urdf: no such robot is installed; known: talos{ADD}"),
+        (("tallos", "throw", "sobol"), "--robot tallos: no such robot is installed; did you mean 'talos'?"),
+        (("talos", "catch", "sobol"), f"--task catch: no such task is installed; known: throw{ADD}"),
+        (("talos", "throw", "halton"), "--sampler halton: no such sampler is installed; known: grid, uniform, "),
     ],
 )
 def test_an_unknown_robot_task_or_sampler_is_an_error_with_the_known_ones(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -11,6 +10,7 @@ from typing import Any
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.ros.graph_names import is_hidden, make_own_name
+from throwcollect.wording import suggest
 
 _WAIT_S = 0.2
 """Longest single wait: rclpy handles signals only between two waits."""
@@ -18,7 +18,6 @@ _QUIET_S = 0.5
 """Time without anything new after which discovery counts as complete."""
 _LOOKING_S = 3.0
 """Longest time for discovery: nodes on DDS find each other within a second, and the machine may be busy."""
-_MOST_NAMES = 8
 
 
 class GraphSession:
@@ -124,10 +123,8 @@ def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") ->
     existing = sorted(set(names))
     if name in existing:
         return
-    near = difflib.get_close_matches(name, existing, n=3) or [each for each in existing if not is_hidden(each)]
-    listed = ", ".join(near[:_MOST_NAMES]) + (", ..." if len(near) > _MOST_NAMES else "")
     owner = f" of {of}" if of else ""
-    raise ConfigError(f"no {what} {name}{owner}" + ("" if existing else "; there is none"), expected=listed or None)
+    raise ConfigError(f"no {what} {name}{owner}{suggest(name, existing)}")
 
 
 def print_names(names_and_types: Iterable[tuple[str, list[str]]], *, types: bool, hidden: bool) -> None:

@@ -17,6 +17,7 @@ from throwcollect.cli.streams import end_with_reader, has_reader
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, full_name, is_hidden
 from throwcollect.ros.offered_qos import find_offered_qos
+from throwcollect.wording import suggest
 
 topic_app = typer.Typer(help="Topics: list, echo, hz, info.", no_args_is_help=True)
 
@@ -161,8 +162,5 @@ def _check_field(message_type: Any, path: list[str]) -> None:
     for part in path:
         fields = value.get_fields_and_field_types() if hasattr(value, "get_fields_and_field_types") else {}
         if part not in fields:
-            raise ConfigError(
-                f"--field {'.'.join(path)}: no field {part!r}",
-                expected=f"one of {', '.join(fields)}" if fields else f"nothing below {type(value).__name__}",
-            )
+            raise ConfigError(f"--field {'.'.join(path)}: no field {part!r}{suggest(part, fields)}")
         value = getattr(value, part)

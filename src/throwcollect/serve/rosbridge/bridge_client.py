@@ -21,6 +21,7 @@ from throwcollect.serve.rosbridge.request import BridgeRequest, Form, RequestId,
 from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, Answer, Rosapi
 from throwcollect.serve.rosbridge.service_calls import Call, call_node
 from throwcollect.serve.rosbridge.subscriptions import Subscriptions
+from throwcollect.wording import suggest
 
 Operation = Callable[[BridgeRequest], None]
 
@@ -132,7 +133,7 @@ class BridgeClient(Peer):
             operation = self._reading_operations.get(request.op) or self._changing_operations.get(request.op)
             if operation is None:
                 known = [*self._reading_operations, *self._changing_operations]
-                raise ConfigError(f"no operation {request.op}", expected=", ".join(known))
+                raise ConfigError(f"no operation {request.op}{suggest(request.op, known, 'docs/rosbridge.md')}")
             # A client that sends a goal waits for a result, so `_send_goal` refuses with a result instead of a status.
             if request.op in self._changing_operations and request.op != "send_action_goal":
                 self._require_writing(request.op)

@@ -88,7 +88,7 @@ def test_octets_and_numbers_are_written_as_in_rosbridge() -> None:
         ("[1]", "a frame should be an object with an op, got [1]"),
         ("{}", "frame: op should be a text, got nothing"),
         ('{"op": 1}', "frame: op should be a text, got 1"),
-        ('{"op": "png"}', "no operation png; expected: subscribe"),
+        ('{"op": "png"}', "no operation png; docs/rosbridge.md lists all"),
         ('{"op": "auth", "mac": "x"}', "auth: clients do not authenticate here"),
         ('{"op": "set_level", "level": "loud"}', "set_level: no level loud; expected: info"),
         ('{"op": "fragment", "id": "a"}', "fragment: should have an id, the text data, and num below total"),

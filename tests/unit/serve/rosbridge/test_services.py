@@ -54,7 +54,7 @@ def test_an_answer_comes_in_cbor_or_in_fragments_on_request(party: Party, lamp: 
     [
         ({"service": "/nobody"}, "nobody offers a service /nobody"),
         ({"service": "no name"}, "'no name' is no name in ROS"),
-        ({"service": "/lamp", "args": {"date": True}}, "date: no such field; expected: one of data"),
+        ({"service": "/lamp", "args": {"date": True}}, "date: no such field; did you mean 'data'?"),
         ({"service": "/lamp", "args": {"data": 1}}, "data: should be boolean, got 1"),
         ({"service": "/lamp", "args": [True, True]}, "2 arguments are too many; expected: at most 1"),
         ({"service": "/lamp", "compression": "png"}, "call_service: no compression png"),

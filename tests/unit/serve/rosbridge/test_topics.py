@@ -295,7 +295,7 @@ def test_a_latched_message_reaches_late_subscribers_until_it_is_withdrawn(party:
         ({"op": "advertise", "topic": "/t"}, "advertise: type should be a text, got nothing"),
         ({"op": "advertise", "topic": "/t", "type": "std_msgs/Header"}, "/t is no std_msgs/msg/Header; expected: std_"),
         ({"op": "publish", "topic": "/nowhere", "msg": {}}, "/nowhere is published by nobody, and no type is named"),
-        ({"op": "publish", "topic": "/t", "msg": {"dat": 1}}, "dat: no such field; expected: one of data"),
+        ({"op": "publish", "topic": "/t", "msg": {"dat": 1}}, "dat: no such field; did you mean 'data'?"),
         ({"op": "publish", "topic": "/t", "msg": {"data": []}}, "data: should be string, got []"),
         ({"op": "publish", "topic": "/t", "msg": 7}, "values: should be fields with values, got 7"),
         ({"op": "advertise", "topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "but the coordinator"),
