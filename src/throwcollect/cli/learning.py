@@ -159,7 +159,7 @@ def throw(
     with Simulator(path, overrides=overrides(settings)) as simulator:
         rows: Sequence[tuple[dict[str, float], dict[str, float]]] = [({}, {})]
         if points is not None:
-            read = read_points(points, simulator.config)
+            read = read_points(points, simulator.config, key="--list")
             drawn = (dict(zip(read.keys, values, strict=True)) for values in read.values.tolist())
             rows = [(row, read.targets.row(number) if read.targets else {}) for number, row in enumerate(drawn)]
         measures = simulator.config.task.targets
@@ -233,14 +233,11 @@ def adapt(
     json: JsonOption = False,
 ) -> None:
     """Correct a model by a few throws of another robot or simulation."""
-    from throwcollect.learning.adapting import FarThrowError, Method
+    from throwcollect.learning.adapting import FarThrowError
     from throwcollect.learning.lists import read_table, refuse_large_targets
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
 
-    methods = ("auto", *(each.value for each in Method))
-    if method not in methods:
-        raise ConfigError(f"--method: {method!r}", expected=f"one of {', '.join(methods)}")
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
     rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
 from throwcollect.learning.aiming import Aim
-from throwcollect.sweep.point_file import explain_wrong_count, explain_wrong_separator, read_number
+from throwcollect.sweep.csv_file import read_csv
 from throwcollect.wording import join_names
 
 
@@ -43,51 +42,32 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
         ConfigError: If it cannot be read, a column is missing or appears twice, a row has more or fewer values than the
             header has names, or a cell is no finite number.
     """
-    try:
-        # Spreadsheets begin a CSV file with a byte order mark, which `utf-8-sig` removes from the first column's name.
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            # Lines without any cell are ignored.
-            header = [name.strip() for name in next(filter(None, reader), [])]
-            columns = _find_columns(header, names, aliases or {}, place=f"{path}:{reader.line_num or 1}")
-            rows = [_read_row(cells, header, columns, f"{path}:{reader.line_num}") for cells in reader if cells]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
-    if not rows:
+
+    def choose(header: tuple[str, ...], line: int) -> list[str]:
+        return _find_columns(header, names, aliases or {}, place=f"{path}:{line or 1}")
+
+    _, values, lines, problems = read_csv(path, choose)
+    if problems:
+        raise ConfigError(problems)
+    if not len(lines):
         raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
-    return rows
+    rows = zip(lines.tolist(), values.tolist(), strict=True)
+    return [Row(f"{path}:{line}", dict(zip(names, row, strict=True))) for line, row in rows]
 
 
-def _find_columns(header: list[str], names: Sequence[str], aliases: dict[str, str], place: str) -> dict[str, str]:
+def _find_columns(header: Sequence[str], names: Sequence[str], aliases: dict[str, str], place: str) -> list[str]:
     """Find the column that is read for each name.
 
     Raises:
         ConfigError: If there is none, or there are two.
     """
-    columns = {name: aliases.get(name, name) if name not in header else name for name in names}
-    if missing := [name for name in names if columns[name] not in header]:
-        if problem := explain_wrong_separator(header, {*names, *aliases.values()}.__contains__):
-            raise ConfigError(f"{place}: {problem}", expected=f"columns {', '.join(names)}")
+    columns = [name if name in header else aliases.get(name, name) for name in names]
+    if missing := [name for name, column in zip(names, columns, strict=True) if column not in header]:
         other = "".join(f", or {aliases[name]} for {name}" for name in missing if name in aliases)
         raise ConfigError(f"{place}: no column {join_names(missing)}", expected=f"columns {', '.join(names)}{other}")
-    if twice := [column for column in columns.values() if header.count(column) > 1]:
+    if twice := [column for column in columns if header.count(column) > 1]:
         raise ConfigError(f"{place}: {twice[0]}: the column is here twice", expected="each column once")
     return columns
-
-
-def _read_row(cells: list[str], header: list[str], columns: dict[str, str], place: str) -> Row:
-    """Read the numbers of a row by name.
-
-    Raises:
-        ConfigError: If it has more or fewer values than the header has names, or a cell is no finite number.
-    """
-    if problem := explain_wrong_count(cells, len(header)):
-        raise ConfigError(f"{place}: {problem}", expected=f"a value for each of {', '.join(header)}")
-    row = dict(zip(header, cells, strict=True))
-    numbers = {name: read_number(row[column]) for name, column in columns.items()}
-    if wrong := [columns[name] for name, number in numbers.items() if not math.isfinite(number)]:
-        raise ConfigError(f"{place}: {wrong[0]}: {row[wrong[0]]!r}", expected="a finite number")
-    return Row(place, numbers)
 
 
 def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[list[float]]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,11 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.files import recognise, suggest_path
+from throwcollect.sweep.csv_file import MOST_PROBLEMS, read_csv
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.points import Points, Targets
-from throwcollect.wording import format_count
 
-_MOST_PROBLEMS = 20
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
 """Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
 
@@ -35,12 +34,13 @@ class _Rows:
     problems: list[Problem]
 
 
-def read_points(path: Path, config: Config) -> Points:
+def read_points(path: Path, config: Config, *, key: str = "sweep.file") -> Points:
     """Read the points of the sampler `list`.
 
     Args:
         path: File that ends in ``.csv`` (UTF-8, comma, a header line) or ``.parquet``.
         config: Configuration with the keys that the columns name; its task declares the columns of targets.
+        key: Key or option that names the file.
 
     Raises:
         ConfigError: If the file cannot be read, or its columns or values cannot be used; the error holds all problems,
@@ -48,19 +48,20 @@ def read_points(path: Path, config: Config) -> Points:
     """
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
     if path.suffix not in readers:
-        raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", "sweep.file")])
+        raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", key)])
     try:
+        if path.is_dir():
+            raise ConfigError([Problem(f"should be a file, got the directory {path}", key)])
         if not path.is_file():
-            problem = f"should be a file, got the directory {path}" if path.is_dir() else f"there is no file {path}"
-            raise ConfigError([Problem(problem, "sweep.file")])
+            raise ConfigError([Problem(f"there is no file {path}{suggest_path(path)}", key)])
     except OSError as error:
-        raise ConfigError([Problem(f"cannot be read: {error.strerror}", "sweep.file", path)]) from error
+        raise ConfigError([Problem(f"cannot be read: {error.strerror}", key, path)]) from error
     rows = readers[path.suffix](path, config)
     problems = [*rows.problems, *_find_value_problems(rows, path, config), *_find_target_problems(rows, path, config)]
     if problems:
-        raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:_MOST_PROBLEMS])
+        raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:MOST_PROBLEMS])
     if not len(rows.numbers):
-        raise ConfigError([Problem("the file has no rows", "sweep.file", path)])
+        raise ConfigError([Problem("the file has no rows", path=path)])
     return rows.points
 
 
@@ -86,88 +87,9 @@ def _make_points(names: tuple[str, ...], values: NDArray[np.float64], config: Co
 
 
 def _read_csv(path: Path, config: Config) -> _Rows:
-    problems: list[Problem] = []
-    rows: list[list[float]] = []
-    lines: list[int] = []
-    try:
-        # Spreadsheets write a byte order mark, hence the encoding; `csv` wants line ends as they are, hence `newline`.
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            # Empty lines are skipped, before the header as well as below it.
-            names = tuple(name.strip() for name in next(filter(None, reader), []))
-            if problem := explain_wrong_separator(names, lambda name: _is_column(name, config)):
-                raise ConfigError([Problem(problem, "", path, reader.line_num)])
-            _check_columns(names, path, config, line=reader.line_num)
-            for cells in reader:
-                if not cells:
-                    continue
-                row, wrong = _read_row(names, cells, path, reader.line_num)
-                problems += wrong
-                if not wrong:
-                    rows.append(row)
-                    lines.append(reader.line_num)
-                if len(problems) >= _MOST_PROBLEMS:
-                    break
-    except UnicodeDecodeError as error:
-        raise ConfigError([Problem("should be UTF-8 text", "sweep.file", path)]) from error
-    except csv.Error as error:
-        raise ConfigError([Problem(f"not valid CSV: {error}", "sweep.file", path)]) from error
-    except OSError as error:
-        raise ConfigError([Problem(f"cannot be read: {error.strerror}", "sweep.file", path)]) from error
-    values = np.array(rows).reshape(len(rows), len(names))
-    return _Rows(_make_points(names, values, config), np.array(lines), problems)
-
-
-def _read_row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
-    """Read the numbers of a row, NaN for targets that it leaves out."""
-    if problem := explain_wrong_count(cells, len(names)):
-        return [], [Problem(problem, "", path, line)]
-    row, problems = [], []
-    for name, cell in zip(names, cells, strict=True):
-        number = read_number(cell)
-        row.append(number)
-        if is_target(name) and not cell.strip():
-            continue
-        if not math.isfinite(number):
-            expected = "a number, or empty for no target" if is_target(name) else "a number"
-            problems.append(Problem(f"should be {expected}, got {cell.strip()!r}", name, path, line))
-    return row, problems
-
-
-def explain_wrong_separator(header: Sequence[str], is_column: Callable[[str], bool]) -> str:
-    """Explain that the columns of a CSV file are separated by something else than commas.
-
-    Args:
-        header: Names of the columns, as they are read with commas.
-        is_column: Says whether the file may have a column of a name.
-
-    Returns:
-        The sentence; empty if no other separator gives the name of a column, as in a file that is no list at all.
-    """
-    for separator, word in ((";", "semicolons"), ("\t", "tabs")):
-        parts = [part.strip(' "') for name in header if separator in name for part in name.split(separator)]
-        if any(map(is_column, parts)):
-            return f"columns should be separated by commas, got {word}"
-    return ""
-
-
-def explain_wrong_count(cells: Sequence[str], columns: int) -> str:
-    """Explain that a row of a CSV file has more or fewer values than there are columns; empty if it has as many."""
-    if len(cells) == columns:
-        return ""
-    sentence = f"should have {format_count(columns, 'value')}, got {len(cells)}"
-    # A decimal comma divides a number into two cells, neither of which has a point.
-    if len(cells) > columns and not any("." in cell for cell in cells):
-        sentence += "; if a comma belongs to a number, decimals are written with a point, as in 1.5"
-    return sentence
-
-
-def read_number(cell: str) -> float:
-    """Read the number in a cell of a CSV file; NaN if the cell holds none."""
-    try:
-        return float(cell)
-    except ValueError:
-        return math.nan
+    check = partial(_check_columns, path=path, config=config)
+    names, values, lines, problems = read_csv(path, check, may_be_empty=is_target)
+    return _Rows(_make_points(names, values, config), lines, problems)
 
 
 def _read_parquet(path: Path, config: Config) -> _Rows:
@@ -177,9 +99,9 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
     try:
         table: Any = pq.ParquetFile(path).read()
     except (pa.ArrowException, OSError) as error:
-        raise ConfigError([Problem(f"cannot be read as Parquet: {error}", "sweep.file", path)]) from error
+        raise ConfigError([Problem(f"cannot be read as Parquet: {recognise(path) or error}", path=path)]) from error
     table = table.drop_columns([name for name in table.column_names if _UNNAMED_INDEX.fullmatch(name)])
-    _check_columns(tuple(table.column_names), path, config, line=None)
+    _check_columns(tuple(table.column_names), None, path=path, config=config)
     problems: list[Problem] = []
     columns: dict[str, Any] = {}
     good = np.ones(len(table), dtype=bool)
@@ -194,7 +116,7 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
         columns[field.name] = column.to_numpy()
         if is_target(field.name):
             wrong = np.flatnonzero(valid & ~np.isfinite(columns[field.name])).tolist()
-            numbers = [(row + 1, columns[field.name][row]) for row in wrong[:_MOST_PROBLEMS]]
+            numbers = [(row + 1, columns[field.name][row]) for row in wrong[:MOST_PROBLEMS]]
             problems += [
                 _of_row("should be a number, or null for no target, got " + str(value), field.name, path, row)
                 for row, value in numbers
@@ -209,11 +131,7 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
     return _Rows(points, np.flatnonzero(good) + 1, problems)
 
 
-def _is_column(name: str, config: Config) -> bool:
-    return is_target(name) or reason_not_sweepable(config, name) is None
-
-
-def _check_columns(names: tuple[str, ...], path: Path, config: Config, *, line: int | None) -> None:
+def _check_columns(names: tuple[str, ...], line: int | None, *, path: Path, config: Config) -> tuple[str, ...]:
     problems = []
     targets = [name for name in names if is_target(name)]
     for index, name in enumerate(names):
@@ -224,10 +142,11 @@ def _check_columns(names: tuple[str, ...], path: Path, config: Config, *, line: 
     problems += [Problem(reason, name, path, line) for name, reason in config.task.find_wrong_targets(targets).items()]
     if len(targets) == len(names):
         sentence = "has no column of a key, only targets" if names else "the file is empty"
-        problems.append(Problem(sentence, "sweep.file", path))
+        problems.append(Problem(sentence, path=path))
     if problems:
         also = ", and targets as the task names them" if targets else ""
         raise ConfigError(problems, expected=f"dotted configuration keys as columns{also}")
+    return names
 
 
 def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
@@ -235,7 +154,7 @@ def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[P
     if (targets := rows.points.targets) is None or not len(rows.numbers):
         return
     far = np.argwhere(np.abs(targets.values) > LARGEST_TARGET)
-    for row, column in far[:_MOST_PROBLEMS].tolist():
+    for row, column in far[:MOST_PROBLEMS].tolist():
         sentence = f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}"
         value = targets.values[row, column]
         yield _of_row(f"{sentence}, got {value}", targets.names[column], path, int(rows.numbers[row]))
@@ -244,7 +163,7 @@ def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[P
     for pattern in np.unique(there, axis=0):
         names = [name for name, has in zip(targets.names, pattern.tolist(), strict=True) if has]
         wrong = config.task.find_wrong_targets(names)
-        for row in np.flatnonzero((there == pattern).all(axis=1))[:_MOST_PROBLEMS] if wrong else ():
+        for row in np.flatnonzero((there == pattern).all(axis=1))[:MOST_PROBLEMS] if wrong else ():
             for name, sentence in wrong.items():
                 yield _of_row(sentence, name, path, int(rows.numbers[row]))
 
@@ -274,6 +193,6 @@ def _find_refusals(config: Config, key: str, column: NDArray[np.float64]) -> lis
             with_values(config, {key: value})
         except ConfigError as error:
             refusals.append((row, error.problems[0].message))
-        if len(refusals) == _MOST_PROBLEMS:
+        if len(refusals) == MOST_PROBLEMS:
             break
     return refusals

@@ -1,3 +1,5 @@
+import re
+
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -63,9 +65,9 @@ def test_the_row_numbers_of_pandas_are_not_taken_for_a_key(tmp_path):
 @pytest.mark.parametrize(
     ("content", "messages"),
     [
-        ("", ["list.csv: sweep.file: the file is empty"]),
-        (HEADER, ["list.csv: sweep.file: the file has no rows"]),
-        (b"ball.mass_kg\n\xff\n", ["list.csv: sweep.file: should be UTF-8 text"]),
+        ("", ["list.csv: the file is empty"]),
+        (HEADER, ["list.csv: the file has no rows"]),
+        (b"ball.mass_kg\n\xff\n", ["list.csv: should be UTF-8 text"]),
         ("ball.mas_kg\n1\n", ["list.csv:1: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
         ("\n\r\nball.mas_kg\n1\n", ["list.csv:3: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
         (
@@ -84,10 +86,20 @@ def test_the_row_numbers_of_pandas_are_not_taken_for_a_key(tmp_path):
             ],
         ),
         (
-            HEADER + "0.1\n0.1,1,1\n",
+            HEADER + "0.1\n0.1,1,1\n0.1 1\n0.1,1,\n",
             [
                 "list.csv:2: should have 2 values, got 1",
                 "list.csv:3: should have 2 values, got 3",
+                "list.csv:4: should have 2 values, got 1; values are separated by commas",
+                "list.csv:5: should have 2 values, got 3; the line should not end with a comma",
+            ],
+        ),
+        (
+            "task.end.arm_right_4_joint,task.duration_s\n-28°,1 s\n",
+            [
+                "list.csv:2: task.end.arm_right_4_joint: should be a number, got '-28°'; "
+                "angles are in radians: -28 degrees are -0.4887",
+                "list.csv:2: task.duration_s: should be a number, got '1 s'; write the number alone, in s",
             ],
         ),
         (
@@ -147,7 +159,7 @@ def test_problems_of_a_long_file_are_not_listed_in_full(csv):
             {"ball.mass_kg": pa.array([None], pa.float64())},
             ["list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls"],
         ),
-        ({"ball.mass_kg": pa.array([], pa.float64())}, ["list.parquet: sweep.file: the file has no rows"]),
+        ({"ball.mass_kg": pa.array([], pa.float64())}, ["list.parquet: the file has no rows"]),
         ({"ball.mas_kg": [0.1]}, ["list.parquet: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
         (
             {"ball.mass_kg": [0.1, float("nan"), 9.0]},
@@ -170,17 +182,62 @@ def test_a_file_that_is_no_table_is_a_problem(tmp_path):
     (long,) = problems(tmp_path / f"{300 * 'x'}.csv")
     assert long.endswith("xx.csv: sweep.file: cannot be read: File name too long")
     broken = tmp_path / "broken.parquet"
-    broken.write_bytes(b"PAR1 but not much more")
-    assert problems(broken)[0].startswith("broken.parquet: sweep.file: cannot be read as Parquet: ")
+    broken.write_bytes(b"no Parquet at all")
+    assert problems(broken)[0].startswith("broken.parquet: cannot be read as Parquet: ")
+    (tmp_path / "points.csv").touch()
+    near = "there is no file point.csv; did you mean 'points.csv'?"
+    assert problems(tmp_path / "point.csv") == [f"sweep.file: {near}"]
+    with pytest.raises(ConfigError, match=f"^--list: {re.escape(near).replace('point', '.*point')}$"):
+        read_points(tmp_path / "point.csv", Config(), key="--list")
 
 
 TARGETED = "task.duration_s,target_y_m,target_x_m\n"
 
 
-@pytest.mark.parametrize(("separator", "name"), [(";", "semicolons"), ("\t", "tabs")])
-def test_columns_that_are_separated_by_something_else_than_commas_are_one_problem(csv, separator, name):
-    path = csv(separator.join(["task.duration_s", "ball.mass_kg"]) + "\n" + separator.join(["1,1", "0,04"]) + "\n")
-    assert problems(path) == [f"list.csv:1: columns should be separated by commas, got {name}"]
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        ("task.duration_s;ball.mass_kg\n1,1;0,04\n", "semicolons"),
+        ("task.duration_s\tball.mass_kg\n1,1\t0,04\n", "tabs"),
+        ("task.duration_s ball.mass_kg\n1.1 0.04\n", "blanks"),
+        ("sep=;\ntask.duration_s;ball.mass_kg\n1,1;0,04\n", "a line that only Excel reads"),
+        ("# task.duration_s,ball.mass_kg\n1.1,0.04\n", "a comment sign"),
+        ("1.1,0.04\n1.2,0.04\n", "numbers"),
+        ('[{"task.duration_s": 1.1, "ball.mass_kg": 0.04}]\n', "JSON"),
+        (
+            ",task.duration_s,ball.mass_kg\n0,1.1,0.04\n",
+            "a column without a name, as the index of pandas has (to_csv(..., index=False) leaves it out)",
+        ),
+        ("task.duration_s,ball.mass_kg,\n1.1,0.04,\n", "a comma at the end"),
+    ],
+)
+def test_a_csv_file_of_another_kind_is_one_problem_of_its_first_line(csv, content, kind):
+    assert problems(csv(content)) == [
+        f"list.csv:1: the first line should hold the names of the columns, separated by commas, got {kind}"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (f"{HEADER}1,1\n".encode("utf-16"), "UTF-16"),
+        (b"PK\x03\x04\x14\x00", "a ZIP archive, as those of spreadsheets are"),
+        (b"PAR1\x15\x04", "Parquet"),
+        (
+            b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n",
+            "a Git LFS pointer, in whose place `git lfs pull` puts the file",
+        ),
+        (b"ball.mass_kg\n\x00", "bytes that are no text"),
+    ],
+)
+def test_a_file_that_is_no_csv_is_named_by_what_it_is(csv, content, kind):
+    assert problems(csv(content)) == [f"list.csv: should be CSV in UTF-8, got {kind}"]
+
+
+def test_blanks_behind_commas_and_lines_of_blanks_do_not_count(csv):
+    points = read_points(csv('  \n"ball.mass_kg", "task.duration_s"\n0.1, "1"\n \n'), Config())
+    assert points.keys == ("ball.mass_kg", "task.duration_s")
+    assert points.values.tolist() == [[0.1, 1.0]]
 
 
 def test_columns_of_targets_are_no_keys_and_may_be_empty_in_a_row(csv):
@@ -215,12 +272,9 @@ def test_targets_survive_the_way_through_a_parquet_file(csv, tmp_path):
         ),
         (
             "task.duration_s,target_x_cm,target_x_m,target_y_m\n1,1,1,1\n",
-            [
-                "list.csv:1: target_x_cm: the task throw has no such target; it has target_x_m, target_y_m, "
-                "target_z_m, target_hit_angle_rad"
-            ],
+            ["list.csv:1: target_x_cm: the task throw has no such target; did you mean 'target_x_m'?"],
         ),
-        ("target_x_m,target_y_m\n1,1\n", ["list.csv: sweep.file: has no column of a key, only targets"]),
+        ("target_x_m,target_y_m\n1,1\n", ["list.csv: has no column of a key, only targets"]),
         (
             "task.duration_s,target_x_m,target_x_m,target_y_m\n1,1,1,1\n",
             ["list.csv:1: target_x_m: the column is here twice"],
@@ -263,6 +317,6 @@ def test_problems_of_targets_in_a_parquet_file_name_their_rows(parquet):
 def test_columns_of_targets_are_refused_for_a_task_without_targets(csv, monkeypatch):
     monkeypatch.setattr(ThrowConfig, "target_columns", ())
     assert problems(csv(TARGETED + "1,1,1\n")) == [
-        "list.csv:1: target_y_m: the task throw has no such target; it has none",
-        "list.csv:1: target_x_m: the task throw has no such target; it has none",
+        "list.csv:1: target_y_m: the task throw has no such target; there is none",
+        "list.csv:1: target_x_m: the task throw has no such target; there is none",
     ]
