@@ -20,11 +20,11 @@ from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.yaml_nodes import line, reason
-from throwcollect.dataset.directory import METADATA, PLAN, has_files
+from throwcollect.dataset.directory import METADATA, PLAN, describe_other, has_files
 from throwcollect.dataset.lock import is_locked
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
-from throwcollect.files import read_text
+from throwcollect.files import read_text, refuse_pointers
 from throwcollect.wording import command
 
 VERSION = 9
@@ -159,6 +159,7 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     Raises:
         DatasetError: If the directory holds no dataset or an unfinished one, or ``metadata.yaml`` is damaged.
     """
+    refuse_other_directory(directory)
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
@@ -175,10 +176,11 @@ def refuse_other_directory(directory: Path) -> None:
     """Refuse a directory without any file of a dataset, as advice on damaged datasets would not help there.
 
     Raises:
-        DatasetError: If there is no such directory, or it has no such file.
+        DatasetError: If there is no such directory, or it has no such file, or pointers of Git LFS in place of files.
     """
     if not has_files(directory):
-        raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
+        raise DatasetError(describe_other(directory), path=directory, hint=_name_nearby(directory))
+    refuse_pointers(directory)
 
 
 def _name_nearby(directory: Path) -> str | None:

@@ -21,6 +21,7 @@ from mcap.opcode import Opcode
 
 from rclzenoh.interfaces import message_definition, type_hash
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
+from throwcollect.dataset.directory import LIBRARY
 from throwcollect.episode.channels import Channel, Channels
 from throwcollect.episode.chunk import Chunk, count_indexed, encode_message_index, encode_records
 from throwcollect.episode.episode_message import Episode
@@ -33,7 +34,6 @@ SENSORS_SHA256 = "sensors_sha256"
 BAG = "rosbag2"
 """Name of the Metadata record in which rosbag2 looks for a copy of the bag's metadata."""
 PROFILE = "ros2"
-LIBRARY = "throwcollect"
 
 _LATCHED_LEVEL = 9
 

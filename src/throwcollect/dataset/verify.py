@@ -12,7 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.bag import BAG_SECTION, FileSummary, bag_information, from_yaml, read_bag_metadata
+from throwcollect.dataset.bag import (
+    BAG_SECTION,
+    FileSummary,
+    bag_information,
+    from_yaml,
+    read_bag_metadata,
+    refuse_other_directory,
+)
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -81,6 +88,7 @@ def verify(
         WorkerError: If a process that checks recordings is killed.
     """
     bag, findings = None, []
+    refuse_other_directory(directory)
     try:
         bag = read_bag_metadata(directory)
         if unknown := sorted(map(str, set(from_yaml(directory / METADATA)) - {BAG_SECTION})):

@@ -16,9 +16,9 @@ from mcap.opcode import Opcode
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.directory import LIBRARY, THROWS
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.mcap_file import BAG, LIBRARY, MAGIC, PROFILE, McapFile
+from throwcollect.dataset.mcap_file import BAG, MAGIC, PROFILE, McapFile
 from throwcollect.dataset.mcap_reader import McapContents, McapRecord, StoredEpisode, map_file, read_latched_table
 from throwcollect.dataset.scan import scan
 from throwcollect.episode.channels import Channels

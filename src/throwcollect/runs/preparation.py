@@ -15,10 +15,11 @@ from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.configuration import read_config, refuse_damaged_config, refuse_lost_config
-from throwcollect.dataset.directory import config_path
+from throwcollect.dataset.directory import config_path, describe_other
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.files import refuse_pointers
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.records import OpenRun, Records
@@ -145,7 +146,10 @@ def resume(
     file = None if config is None else read_path("config", config)
     if not is_begun(directory):
         refuse_lost_config(directory)
-        raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
+        raise ConfigError(
+            f"{directory}: {describe_other(directory)}", expected="a directory that throwcollect up has made"
+        )
+    refuse_pointers(directory)
     with ExitStack() as places:
         read = _read_stored(places, file, directory, overrides)
         records = Records()

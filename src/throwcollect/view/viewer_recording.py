@@ -14,7 +14,8 @@ from mcap.writer import CompressionType, Writer
 from rclzenoh.interfaces import Message, get_message, serialize
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.mcap_file import LIBRARY, PROFILE, declarations
+from throwcollect.dataset.directory import LIBRARY
+from throwcollect.dataset.mcap_file import PROFILE, declarations
 from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.frames import FrameTree, read_frames
 from throwcollect.episode.message_layout import MessageLayout

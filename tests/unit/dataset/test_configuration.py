@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 import throwcollect
 from throwcollect.config.loader import load
@@ -16,6 +19,7 @@ from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.rebuild import rebuild
+from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError, Problem
@@ -86,6 +90,41 @@ def test_resuming_a_directory_of_recordings_alone_asks_for_the_configuration(dat
     (tmp_path / "other" / "notes.txt").touch()
     with pytest.raises(ConfigError, match="holds no dataset"):
         prepare_to_resume(tmp_path / "other")
+
+
+@pytest.mark.parametrize("storage", StoragePlugin)
+def test_a_bag_of_another_program_is_no_dataset(storage: StoragePlugin, tmp_path: Path) -> None:
+    path, store = tmp_path / "bag", get_typestore(Stores.ROS2_JAZZY)
+    text = store.types["std_msgs/msg/String"]
+    with Writer(path, version=9, storage_plugin=storage) as writer:
+        connection = writer.add_connection("/chatter", text.__msgtype__, typestore=store)
+        writer.write(connection, 0, store.serialize_cdr(text(data="hello"), text.__msgtype__))
+    for look in (
+        info,
+        verify,
+        throwcollect.load,
+        rebuild,
+        partial(repair, output=tmp_path / "new", remake=lambda _: []),
+    ):
+        with pytest.raises(DatasetError, match=f"^{path}: is a rosbag2 bag, but not of throwcollect$"):
+            look(path)
+    with pytest.raises(ConfigError, match=f"^{path}: is a rosbag2 bag, but not of throwcollect\n"):
+        prepare_to_resume(path)
+    (path / "metadata.yaml").unlink()
+    with pytest.raises(DatasetError, match=f"^{path}: holds no dataset$"):
+        info(path)
+
+
+def test_a_dataset_with_pointers_of_git_lfs_is_refused_as_it_is(dataset: Path) -> None:
+    for path in (dataset / "plan.parquet", *dataset.glob("*.mcap")):
+        path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0123\nsize 12345\n")
+    before = {path: path.read_bytes() for path in dataset.iterdir() if path.is_file()}
+    for look in (info, verify, throwcollect.load, rebuild, prepare_to_resume):
+        with pytest.raises(
+            DatasetError, match=r"/dataset/\S+: a Git LFS pointer is in its place\n  try: git lfs pull$"
+        ):
+            look(dataset)
+    assert before == {path: path.read_bytes() for path in dataset.iterdir() if path.is_file()}
 
 
 def test_a_configuration_that_needs_a_missing_package_is_not_damaged(
