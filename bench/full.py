@@ -26,8 +26,8 @@ import psutil
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.verify import verify
-from throwcollect.state_directory import STATE_VARIABLE
 from throwcollect.side_by_side import count_cores
+from throwcollect.state_directory import STATE_VARIABLE
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
 LANDED = 9_824

@@ -20,12 +20,12 @@ import uvicorn
 
 from throwcollect.errors import WorkerError
 from throwcollect.runs.records import Records
-from throwcollect.state_directory import STATE_VARIABLE
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.catalogue import Catalogue
 from throwcollect.serve.models import Models
+from throwcollect.state_directory import STATE_VARIABLE
 
 _PORT = 8099
 _EXAMPLES = 30
