@@ -43,7 +43,7 @@ _SAMPLERS = """\
 | sampler | points | with more `trials` |
 |---|---|---|
 | `grid` | all combinations, the last key fastest; `trials` takes the first ones | same first points |
-| `uniform` | independent, evenly distributed | same first points |
+| `uniform` | independent random points, evenly distributed | same first points |
 | `latin_hypercube` | one point in each of `trials` strips of every key | all points change, as the strips do |
 | `sobol` | scrambled Sobol' sequence, the most even one; any number of trials | same first points |
 | `list` | the rows of `sweep.file`; `trials` takes the first ones | same first points |
