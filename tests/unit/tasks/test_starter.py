@@ -90,15 +90,15 @@ def test_a_missing_configuration_is_an_error_that_names_init(tmp_path: Path, mon
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (("my.urdf", "throw", "sobol"), f"--robot my.urdf: no such robot is installed; known: talos{ADD}"),
-        (("tallos", "throw", "sobol"), "--robot tallos: no such robot is installed; did you mean 'talos'?"),
-        (("talos", "catch", "sobol"), f"--task catch: no such task is installed; known: throw{ADD}"),
+        (("my.urdf", "throw", "sobol"), f"--robot my.urdf: no such robot is installed; known: .*talos.*{ADD}"),
+        (("tallos", "throw", "sobol"), "--robot tallos: no such robot is installed; did you mean 'talos'\\?"),
+        (("talos", "juggle", "sobol"), f"--task juggle: no such task is installed; known: .*throw.*{ADD}"),
         (("talos", "throw", "halton"), "--sampler halton: no such sampler is installed; known: grid, uniform, "),
     ],
 )
 def test_an_unknown_robot_task_or_sampler_is_an_error_with_the_known_ones(
     names: tuple[str, str, str], said: str
 ) -> None:
-    with pytest.raises(ConfigError) as caught:
+    # Other tests of the same process may have made further packages known.
+    with pytest.raises(ConfigError, match=f"^{said}"):
         make_starter(*names)
-    assert str(caught.value).startswith(said)
