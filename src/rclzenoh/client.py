@@ -7,7 +7,6 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
 from typing import Any
 
 import zenoh
@@ -26,6 +25,9 @@ from rclzenoh.task import Future
 _PATIENT_SERVICE = "/_action/get_result"
 _ENDLESS_S = 1e9
 """Timeout of requests that may last as long as an action."""
+_LOST_S = 10.0
+"""A request that has no answer after this time keeps no other back. It may have been lost with a link to the router,
+which Zenoh reports only when the request times out, ten minutes later."""
 
 
 class Client(Receiver):
@@ -41,8 +43,9 @@ class Client(Receiver):
         # A service keeps as many requests as its quality of service says, and drops the oldest of more. So the client
         # lets no more be under way; but a request for the result of a goal is answered only when the goal ends.
         self._most_under_way = None if srv_name.endswith(_PATIENT_SERVICE) else qos_profile.queue_length
-        self._under_way = 0
-        self._unsent: deque[Callable[[], None]] = deque()
+        self._under_way: dict[int, float] = {}
+        """Monotonic time [s] at which each request that has no answer yet was sent, oldest first."""
+        self._unsent: deque[tuple[Any, int, bytes]] = deque()
         self._sequence = 0
         self._lock = threading.Lock()
         self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
@@ -94,14 +97,8 @@ class Client(Receiver):
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")
         # The future is noted before the request is sent, because the thread that spins may get the response at once.
         self._pending[sequence] = future, convert
-        with self._lock:
-            waits = self._under_way == self._most_under_way
-            if waits:
-                self._unsent.append(partial(self._send, querier, sequence, payload))
-            else:
-                self._under_way += 1
-        if not waits:
-            self._send(querier, sequence, payload)
+        self._unsent.append((querier, sequence, payload))
+        self._send_waiting()
         return future
 
     def _send(self, querier: Any, sequence: int, payload: bytes) -> None:
@@ -114,27 +111,40 @@ class Client(Receiver):
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
         attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
         try:
-            querier.get(handler, payload=payload, attachment=attachment)
+            querier.get(handler, payload=payload, encoding=self._endpoint.encoding, attachment=attachment)
         except zenoh.ZError as error:
             del self._pending[sequence]
             raise self._endpoint.invalid(error) from error
 
-    def _send_next(self) -> None:
-        """Send the request that has waited longest, because another one is no longer under way."""
-        with self._lock:
-            if not self._unsent:
-                self._under_way -= 1
-                return
-            send = self._unsent.popleft()
-        # Once the session is closed, nobody is left to answer.
-        with suppress(InvalidHandle):
-            send()
+    def _send_waiting(self) -> None:
+        """Send the requests that wait, in their order, as far as the service keeps them.
+
+        Raises:
+            InvalidHandle: If the session was closed.
+        """
+        while True:
+            with self._lock:
+                if not self._unsent:
+                    return
+                now = time.monotonic()
+                if len(self._under_way) == self._most_under_way:
+                    oldest = next(iter(self._under_way))
+                    if now < self._under_way[oldest] + _LOST_S:
+                        return
+                    del self._under_way[oldest]
+                querier, sequence, payload = self._unsent.popleft()
+                self._under_way[sequence] = now
+            self._send(querier, sequence, payload)
 
     def handle(self, item: zenoh.Reply | int) -> None:
         """Decode a response and complete its future; a number means that its request gets no further response."""
         if isinstance(item, int):
             self._pending.pop(item, None)
-            self._send_next()
+            with self._lock:
+                self._under_way.pop(item, None)
+            # Once the session is closed, nobody is left to answer.
+            with suppress(InvalidHandle):
+                self._send_waiting()
             return
         sample = item.ok
         if sample is None:
@@ -146,7 +156,8 @@ class Client(Receiver):
         except ValueError as error:
             self._endpoint.complain(error)
             return
-        if attachment.sequence not in self._pending:
+        # Numbers of requests are mixed up, too, while a lost link is replaced (`Endpoint.check_key`).
+        if attachment.gid != self._endpoint.gid or attachment.sequence not in self._pending:
             self._endpoint.complain("unexpected response; there may be more than one server of this name")
             return
         future, convert = self._pending.pop(attachment.sequence)

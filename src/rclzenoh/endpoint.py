@@ -5,12 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import zenoh
+from xxhash import xxh3_64_hexdigest
 
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces import type_hash
 from rclzenoh.keys import EntityKind, Token, data_key, dds_type
 from rclzenoh.node_base import NodeBase
 from rclzenoh.qos import QoSProfile, encode
+
+_ENCODING = "application/cdr;key="
+"""Beginning of the encodings that name the key which something is sent to."""
 
 
 class Endpoint:
@@ -21,6 +25,7 @@ class Endpoint:
         key: Key on which samples or requests travel.
         token: Token that announces the endpoint.
         gid: Identifier that is part of every attachment.
+        encoding: Encoding of all that is sent; rmw_zenoh_cpp neither sets encodings nor reads them.
     """
 
     def __init__(self, node: NodeBase, kind: EntityKind, name: str, type_name: str, qos: QoSProfile) -> None:
@@ -44,6 +49,8 @@ class Endpoint:
             qos=encode(qos),
         )
         self.gid = self.token.gid
+        # It has a digest of the key, because Zenoh panics at encodings of more than 255 bytes, and keys can be longer.
+        self.encoding = zenoh.Encoding(f"{_ENCODING}{xxh3_64_hexdigest(self.key.encode())}")
         self._declared: list[Any] = []
         self._has_complained = False
 
@@ -61,6 +68,21 @@ class Endpoint:
     def invalid(self, error: zenoh.ZError) -> InvalidHandle:
         """The error to raise when Zenoh refuses to send."""
         return InvalidHandle(f"{self.name}: cannot send, the session is closed or lost: {error}")
+
+    def check_key(self, encoding: zenoh.Encoding | None) -> None:
+        """Refuse what was sent to another key.
+
+        On the wire, numbers stand for keys, and each link has its own. When a session replaces a lost link, a router
+        of Zenoh 1.10 may take the new link for one more of the old connection, until it has closed that. Meanwhile it
+        uses the numbers of the old link, which stand for other keys of the session now.
+
+        Raises:
+            ValueError: If the sender names another key; one of rmw_zenoh_cpp names none.
+        """
+        if encoding is not None and encoding != self.encoding and str(encoding).startswith(_ENCODING):
+            raise ValueError(
+                "it was sent to another topic or service; that happens while a lost connection is restored"
+            )
 
     def complain(self, problem: object) -> None:
         """Log a problem with something that was received; only the first one, as anybody may send garbage."""

@@ -81,10 +81,13 @@ def _declare(endpoint: Endpoint, qos: QoSProfile) -> Any:
     congestion = zenoh.CongestionControl.BLOCK if keeps_all else zenoh.CongestionControl.DROP
     reliability = zenoh.Reliability.RELIABLE if qos.is_reliable else zenoh.Reliability.BEST_EFFORT
     if not qos.is_transient_local:
-        return endpoint.session.declare_publisher(endpoint.key, congestion_control=congestion, reliability=reliability)
+        return endpoint.session.declare_publisher(
+            endpoint.key, encoding=endpoint.encoding, congestion_control=congestion, reliability=reliability
+        )
     return declare_advanced_publisher(
         endpoint.session,
         endpoint.key,
+        encoding=endpoint.encoding,
         congestion_control=congestion,
         reliability=reliability,
         cache=CacheConfig(max_samples=qos.queue_length or _ENDLESS),

@@ -51,6 +51,7 @@ class Service(Receiver):
     def handle(self, item: zenoh.Query) -> None:
         """Decode a request, call back, and answer when the response is there."""
         try:
+            self._endpoint.check_key(item.encoding)
             attachment = unpack(item.attachment.to_bytes() if item.attachment is not None else b"")
             payload = item.payload.to_bytes() if item.payload is not None else b""
             request = deserialize(payload, self.srv_type.Request)

@@ -68,6 +68,7 @@ class Subscription(Receiver):
     def handle(self, item: zenoh.Sample) -> None:
         """Decode a sample and call back."""
         try:
+            self._endpoint.check_key(item.encoding)
             attachment = unpack(item.attachment.to_bytes() if item.attachment is not None else b"")
             data = item.payload.to_bytes()
             message = data if self.raw else deserialize(data, self.msg_type)

@@ -18,6 +18,7 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 from docker.models.containers import Container
 
+from tests.cut_line import CutLine
 from tests.docker.collection import (
     TRIALS,
     Collection,
@@ -29,7 +30,6 @@ from tests.docker.collection import (
     pause,
     place_of,
 )
-from tests.docker.cut_line import CutLine
 from tests.e2e.collection import collect_here
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
@@ -380,7 +380,7 @@ def test_a_container_gets_the_configured_mounts_environment_and_networks(
 
 @pytest.fixture
 def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
-    line = CutLine(tmp_path / "line.sock", "/var/run/docker.sock")
+    line = CutLine(f"{tmp_path}/line.sock", "/var/run/docker.sock")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/line.sock")
     return line
 

@@ -11,6 +11,7 @@ from rclzenoh.attachment import Attachment, unpack
 from rclzenoh.interfaces import deserialize, get_service, serialize, type_hash
 from rclzenoh.keys import data_key
 from rclzenoh.qos import QoSProfile
+from rclzenoh.task import Future
 
 Trigger = get_service("std_srvs/srv/Trigger")
 SetBool = get_service("std_srvs/srv/SetBool")
@@ -80,6 +81,60 @@ def test_garbage_is_answered_with_an_error_and_does_not_stop_the_service(rig, pa
     assert rig.spin(lambda: len(ended) == 6)
     assert rig.result(client.call_async(SetBool.Request(data=True))).success
     assert capsys.readouterr().err.count("/server/set: ignored") == 1
+
+
+def test_a_request_to_another_key_is_answered_with_an_error(rig, pair):
+    server, node, client = pair
+    asked = []
+    server.create_service(SetBool, "~/set", lambda request, response: asked.append(request) or response)
+    other = node.create_client(SetBool, "/server/other")
+    client.wait_for_service(5)
+    replies = []
+    # A router that numbers keys as for an earlier link delivers requests to other services of the same session.
+    node.context.session.get(
+        data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE)),
+        zenoh.handlers.Callback(replies.append, drop=lambda: replies.append(None), indirect=False),
+        payload=serialize(SetBool.Request()),
+        encoding=other._endpoint.encoding,
+        attachment=Attachment(1, 0, bytes(16)).pack(),
+    )
+    assert rig.spin(lambda: replies and replies[-1] is None)
+    assert "sent to another topic or service" in replies[0].err.payload.to_string()
+    assert not asked
+
+
+def test_a_response_to_another_client_is_not_taken_for_its_own(rig, pair, monkeypatch, capsys):
+    server, _, client = pair
+    server.create_service(SetBool, "~/set", answer)
+    client.wait_for_service(5)
+    monkeypatch.setattr(
+        "rclzenoh.service.Attachment", lambda number, sent_at, _gid: Attachment(number, sent_at, bytes(16))
+    )
+    future = client.call_async(SetBool.Request())
+    assert rig.spin(lambda: not client._pending)
+    assert not future.done()
+    assert "unexpected response" in capsys.readouterr().err
+
+
+def test_requests_that_were_lost_keep_others_back_for_a_while_only(rig, pair, monkeypatch):
+    server, node, _ = pair
+    asked = []
+
+    async def never_answer(request, _response):
+        asked.append(request)
+        await Future()
+
+    server.create_service(SetBool, "~/set", never_answer)
+    client = node.create_client(SetBool, "/server/set", qos_profile=QoSProfile(depth=1))
+    client.wait_for_service(5)
+    client.call_async(SetBool.Request())
+    assert rig.spin(lambda: asked)
+    client.call_async(SetBool.Request())
+    rig.rest()
+    assert len(asked) == 1
+    monkeypatch.setattr("rclzenoh.client._LOST_S", 0.0)
+    client.call_async(SetBool.Request())
+    assert rig.spin(lambda: len(asked) == 3)
 
 
 def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):

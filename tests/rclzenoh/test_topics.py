@@ -18,6 +18,7 @@ from throwcollect.ros import DurabilityPolicy, HistoryPolicy, QoSProfile
 
 String = get_message("std_msgs/msg/String")
 JointState = get_message("sensor_msgs/msg/JointState")
+VALID = Attachment(1, 0, bytes(16)).pack()
 LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -39,6 +40,20 @@ def test_a_publisher_sends_samples_as_rmw_zenoh_does(rig):
     assert samples[0].payload.to_bytes() == serialize(String(data="x"))
     # Advanced subscribers drop samples without a time stamp of the session.
     assert samples[0].timestamp is not None
+
+
+@pytest.mark.parametrize("durability", list(DurabilityPolicy)[1:3])
+def test_a_sample_for_another_key_is_ignored(rig, durability):
+    qos = QoSProfile(depth=2, durability=durability)
+    talker, listener = rig.node("talker"), rig.node("listener")
+    heard = []
+    listener.create_subscription(String, "t", lambda message: heard.append(message.data), qos)
+    publisher, other = talker.create_publisher(String, "t", qos), talker.create_publisher(String, "other", qos)
+    assert rig.spin(lambda: publisher.get_subscription_count() == 1)
+    publisher._publisher.put(serialize(String(data="stray")), attachment=VALID, encoding=other._endpoint.encoding)
+    publisher.publish(String(data="own"))
+    assert rig.spin(lambda: "own" in heard)
+    assert heard == ["own"]
 
 
 @pytest.mark.parametrize("durability", list(DurabilityPolicy)[1:3])

@@ -1,29 +1,35 @@
-"""A connection to the engine that a test can cut, as if the engine went away."""
+"""A connection that a test can cut, as if the other side went away."""
 
 from __future__ import annotations
 
 import socket
 import threading
 from contextlib import suppress
-from pathlib import Path
+
+Address = str | tuple[str, int]
+"""Path of a socket, or host and port."""
 
 
 class CutLine:
-    """A socket that forwards to that of an engine until it is cut.
+    """A socket that forwards to another one until it is cut.
 
     Args:
-        path: Where the socket is made.
-        engine: Socket of the engine.
+        address: Where the socket is made.
+        target: Where it forwards to.
+
+    Attributes:
+        address: Where it was made; a port 0 has become a free one.
     """
 
-    def __init__(self, path: Path, engine: str) -> None:
-        self._engine = engine
+    def __init__(self, address: Address, target: Address) -> None:
+        self._target = target
         self._ends: list[socket.socket] = []
         self._flows = threading.Event()
         self._flows.set()
-        self._server = socket.socket(socket.AF_UNIX)
-        self._server.bind(str(path))
+        self._server = _make_socket(address)
+        self._server.bind(address)
         self._server.listen(64)
+        self.address: Address = self._server.getsockname()
         threading.Thread(target=self._accept, daemon=True).start()
 
     def interrupt(self) -> None:
@@ -48,8 +54,8 @@ class CutLine:
         with suppress(OSError):
             while True:
                 near, _ = self._server.accept()
-                far = socket.socket(socket.AF_UNIX)
-                far.connect(self._engine)
+                far = _make_socket(self._target)
+                far.connect(self._target)
                 self._ends += [near, far]
                 for source, sink in ((near, far), (far, near)):
                     threading.Thread(target=self._forward, args=(source, sink), daemon=True).start()
@@ -61,3 +67,7 @@ class CutLine:
                 sink.sendall(data)
         with suppress(OSError):
             sink.shutdown(socket.SHUT_WR)
+
+
+def _make_socket(address: Address) -> socket.socket:
+    return socket.socket(socket.AF_UNIX if isinstance(address, str) else socket.AF_INET)
