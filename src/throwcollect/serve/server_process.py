@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import logging.handlers
@@ -17,6 +18,7 @@ from types import FrameType
 from typing import Literal
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from throwcollect.errors import ConfigError
 from throwcollect.files import open_log
@@ -31,8 +33,8 @@ _PORT = 8080
 """Port to serve at if the user names none and it is free."""
 WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
 """This implementation of WebSockets waits for a client that reads slowly, and does not collect frames in memory."""
-_MOST_CLIENTS = 256
-"""With more connections, requests are refused. uvicorn does not limit sockets in this way, so `access` counts those."""
+_MOST_WAITING = 256
+"""Connections whose next headers are awaited; `access` counts requests and sockets."""
 _LOG_BYTES = 1_000_000
 _PEM = "a certificate and its key without a password, both in PEM"
 _END_S = 2.5
@@ -94,7 +96,7 @@ def serve(
             ws_max_size=LONGEST_FRAME,
             # Most clients are on this machine, where compression only costs time.
             ws_per_message_deflate=False,
-            limit_concurrency=_MOST_CLIENTS,
+            http=_Connection,
             timeout_graceful_shutdown=1,
             # These headers are ignored, because any client could send them.
             proxy_headers=False,
@@ -109,6 +111,29 @@ def serve(
             # uvicorn raises the signal that ended it a second time. For a server, that is the usual end and no error.
             with contextlib.suppress(KeyboardInterrupt):
                 _Server(config).run(sockets=[listener])
+
+
+class _Connection(H11Protocol):
+    """A connection that ends if its next headers are not whole when the time to keep alive is over.
+
+    Until they are whole, it may be anybody's: with too many such connections, the one that has waited longest ends.
+    """
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)  # type: ignore[arg-type]
+        self.timeout_keep_alive_task = self.loop.call_later(self.timeout_keep_alive, self.timeout_keep_alive_handler)
+        waiting = {
+            each.timeout_keep_alive_task.when(): each
+            for each in self.connections
+            if isinstance(each, _Connection) and each.timeout_keep_alive_task and not each.transport.is_closing()
+        }
+        if len(waiting) > _MOST_WAITING:
+            waiting[min(waiting)].timeout_keep_alive_handler()
+
+    def data_received(self, data: bytes) -> None:
+        # uvicorn would end the wait at the first byte; when the headers are whole, `handle_events` does.
+        self.conn.receive_data(data)
+        self.handle_events()
 
 
 class _Server(uvicorn.Server):
