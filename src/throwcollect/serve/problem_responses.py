@@ -18,6 +18,7 @@ from throwcollect.config.shape import ValueShape
 from throwcollect.errors import (
     ConfigError,
     ConflictError,
+    DatasetError,
     NotFoundError,
     Problem,
     ThrowcollectError,
@@ -29,6 +30,7 @@ _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (NotFoundError, 404),
     (ConflictError, 409),
     (ConfigError, 422),
+    (DatasetError, 409),
     (MissingExtraError, 503),
     (MissingLibraryError, 503),
     (WorkerError, 503),

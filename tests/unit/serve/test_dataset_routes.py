@@ -66,7 +66,7 @@ def test_files_that_do_not_belong_to_the_dataset_are_not_found(
         assert client.get(f"{URL}/a/files/{path}").status_code == 404, path
 
 
-@pytest.mark.parametrize("name", ["throws.parquet", "README.md", "datapackage.json"])
+@pytest.mark.parametrize("name", ["throws.parquet", "README.md", "provenance.json", "datapackage.json"])
 def test_a_symbolic_link_in_a_dataset_is_not_followed(
     client: TestClient, directory: Path, tmp_path: Path, name: str
 ) -> None:
@@ -75,7 +75,7 @@ def test_a_symbolic_link_in_a_dataset_is_not_followed(
     (directory / name).symlink_to(tmp_path / "secret")
     for path in (f"files/{name}", "dataset.tar"):
         answer = client.get(f"{URL}/a/{path}")
-        assert answer.status_code == 500
+        assert answer.status_code == 409
         assert "a symbolic link leads elsewhere" in answer.json()["title"]
         assert "secret\n" not in answer.text
 
@@ -230,7 +230,7 @@ def test_a_damaged_manifest_is_an_error(client: TestClient, directory: Path) -> 
     (directory / "datapackage.json").write_text(json.dumps(manifest))
     for what in ("files", "files/..%2fsecret", "dataset.tar"):
         answer = client.get(f"{URL}/a/{what}")
-        assert answer.status_code == 500
+        assert answer.status_code == 409
         assert "is not the manifest of a dataset" in answer.json()["title"]
 
 

@@ -100,7 +100,7 @@ def test_names_that_are_no_models_are_not_found(client: TestClient, models: Path
 def test_a_damaged_model_is_an_error(client: TestClient, models: Path) -> None:
     (models / "quick" / "model.json").write_text("{}")
     answer = client.get(f"{URL}/quick")
-    assert answer.status_code == 500
+    assert answer.status_code == 409
     assert "version" in answer.json()["title"]
 
 
@@ -108,4 +108,4 @@ def test_a_symbolic_link_in_a_model_is_not_followed(client: TestClient, models: 
     (tmp_path / "secret").write_text("secret")
     (models / "quick" / "model.json").unlink()
     (models / "quick" / "model.json").symlink_to(tmp_path / "secret")
-    assert client.get(f"{URL}/quick").status_code == 500
+    assert client.get(f"{URL}/quick").status_code == 409

@@ -26,7 +26,7 @@ from throwcollect.serve.problem_responses import answer
         (MissingExtraError("plotly", "report"), 503),
         (MissingLibraryError("pinocchio"), 503),
         (WorkerError("x"), 503),
-        (DatasetError("x"), 500),
+        (DatasetError("x"), 409),
         (ThrowcollectError("x"), 500),
     ],
 )
