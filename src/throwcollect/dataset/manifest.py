@@ -236,7 +236,9 @@ def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full
             yield Finding(entry.path, "", f"is missing, {MANIFEST} has it")
             continue
         try:
-            actual = entry_of_file(path) if in_full else replace(entry, bytes=size_of_file(path))
+            actual = replace(entry, bytes=size_of_file(path))
+            if in_full and actual == entry:
+                actual = entry_of_file(path)
         except DatasetError as error:
             yield Finding(entry.path, "", error.problem)
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import mmap
 import os
@@ -263,9 +264,25 @@ def read_latched_table(record: McapRecord) -> MessageTable:
     return MessageTable(Chunk.parse(record.data).decompress(), 1)
 
 
+def _measure(descriptor: int) -> int:
+    """Find how much of a file is to be read [bytes]: holes, which give zeros, only up to the size of the data."""
+    size, written, end = os.fstat(descriptor).st_size, 0, 0
+    try:
+        while end < size:
+            start = os.lseek(descriptor, end, os.SEEK_DATA)
+            end = os.lseek(descriptor, start, os.SEEK_HOLE)
+            written += end - start
+    except OSError as error:
+        # No data follow. With any other error, the file system does not tell holes and data apart.
+        if error.errno != errno.ENXIO:
+            return size
+    # One byte more shows that data and file do not end together.
+    return min(size, 2 * written + 1)
+
+
 @contextmanager
 def map_file(path: Path) -> Iterator[McapContents]:
-    """Map a file into memory while the block lasts, whatever it contains.
+    """Map a file into memory while the block lasts, whatever it contains; one of holes only up to twice its data.
 
     Raises:
         DatasetError: If the file is missing, cannot be read, or is no regular file.
@@ -273,9 +290,9 @@ def map_file(path: Path) -> Iterator[McapContents]:
     try:
         descriptor = open_regular(path)
         try:
-            size = os.fstat(descriptor).st_size
+            size = _measure(descriptor)
             # An empty file cannot be mapped.
-            data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if size else b""
+            data = mmap.mmap(descriptor, size, access=mmap.ACCESS_READ) if size else b""
         finally:
             # The mapping keeps the file open by itself.
             os.close(descriptor)
