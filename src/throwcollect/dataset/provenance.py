@@ -127,10 +127,23 @@ def write_provenance(directory: Path, provenance: Provenance) -> None:
 
 def read_provenance(directory: Path) -> Provenance | None:
     """Read how a dataset was collected; None if the file is damaged, or missing as in datasets of earlier versions."""
+    with suppress(DatasetError):
+        return load_provenance(directory / PROVENANCE)
+    return None
+
+
+def load_provenance(path: Path) -> Provenance:
+    """Read the file that says how a dataset was collected.
+
+    Raises:
+        DatasetError: If it is missing or damaged.
+    """
     try:
-        return _JSON.validate_json(read_text(directory / PROVENANCE, most_bytes=_MOST_BYTES))
-    except (DatasetError, ValidationError):
-        return None
+        return _JSON.validate_json(read_text(path, most_bytes=_MOST_BYTES))
+    except ValidationError as error:
+        wrong = error.errors()[0]
+        place = ".".join(map(str, wrong["loc"]))
+        raise DatasetError(f"is damaged: {wrong['msg']}", path=path, place=place) from error
 
 
 @cache

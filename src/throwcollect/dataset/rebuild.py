@@ -14,7 +14,7 @@ import pyarrow as pa
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, refuse_other_directory
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.data_card import data_card, outcome_lines
+from throwcollect.dataset.data_card import data_card, outcome_lines, read_card
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS, list_shards, shard_of
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
@@ -30,7 +30,7 @@ from throwcollect.dataset.verify_shard import check_shard
 from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError, ForeignPlanError
-from throwcollect.files import read_text, write_file
+from throwcollect.files import write_file
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
@@ -41,7 +41,6 @@ from throwcollect.wording import command
 
 NO_EPISODE = "no file holds an episode of it"
 """Reason of a lost trial if no earlier table gives another one."""
-_MOST_CARD_BYTES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -201,7 +200,7 @@ def _tabulate(
 
 def _correct_card(path: Path, before: pa.Table, after: pa.Table) -> None:
     """Put the numbers of outcomes into a data card; people may have written the rest, so it stays."""
-    card = read_text(path, most_bytes=_MOST_CARD_BYTES)
+    card = read_card(path)
     lines, instead = ("\n".join(outcome_lines(table)) for table in (before, after))
     write_file(path, card.replace(lines, instead, 1).encode())
 

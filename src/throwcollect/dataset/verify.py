@@ -20,6 +20,7 @@ from throwcollect.dataset.bag import (
     read_bag_metadata,
     refuse_other_directory,
 )
+from throwcollect.dataset.data_card import HEADER, read_card
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -27,6 +28,7 @@ from throwcollect.dataset.directory import (
     MANIFEST,
     METADATA,
     PLAN,
+    PROVENANCE,
     SHARD_SUFFIX,
     THROWS,
     TRIALS,
@@ -36,6 +38,7 @@ from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.manifest import find_changed_files, find_manifest_problems, read_manifest
 from throwcollect.dataset.mcap_file import MAGIC
 from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.provenance import load_provenance
 from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
@@ -49,6 +52,7 @@ from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import is_digest
 from throwcollect.sweep.plan import Plan
+from throwcollect.wording import command
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
@@ -276,8 +280,25 @@ def _find_stray_files(directory: Path, checks: Mapping[str, ShardReport]) -> Ite
             yield Finding(path.name, "", "a file that was not written to its end")
         elif SHARD_SUFFIX in path.name and path.name not in checks:
             yield Finding(path.name, "", "no row of throws.parquet has its episode in this file")
-    if not (directory / CARD).is_file():
+    yield from _find_problems_beside(directory)
+
+
+def _find_problems_beside(directory: Path) -> Iterator[Finding]:
+    """Find what is wrong with the files that the manifest leaves out; earlier versions did not write the provenance."""
+    if is_there(directory / PROVENANCE):
+        try:
+            load_provenance(directory / PROVENANCE)
+        except DatasetError as error:
+            yield Finding.of(PROVENANCE, error)
+    if not is_there(directory / CARD):
         yield Finding(CARD, "", "is missing")
+        return
+    try:
+        if not read_card(directory / CARD).startswith(HEADER):
+            rebuild = command("dataset", "rebuild", directory)
+            yield Finding(CARD, "", f"has no YAML header, which dataset hubs read; {rebuild} writes a missing file")
+    except DatasetError as error:
+        yield Finding.of(CARD, error)
 
 
 def _find_damage_without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:

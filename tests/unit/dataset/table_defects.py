@@ -72,6 +72,27 @@ def delete_card(directory: Path) -> None:
     (directory / "README.md").unlink()
 
 
+def spoil_card(directory: Path) -> None:
+    (directory / "README.md").write_text("garbage")
+
+
+def spoil_bytes_of_card(directory: Path) -> None:
+    (directory / "README.md").write_bytes(b"---\n\xff\xfe")
+
+
+def spoil_provenance(directory: Path) -> None:
+    (directory / "provenance.json").write_text("garbage")
+
+
+def spoil_value_of_provenance(directory: Path) -> None:
+    replace_text(directory / "provenance.json", '"was_open": ', '"was_open": 7')
+
+
+def link_provenance(directory: Path) -> None:
+    (directory / "provenance.json").rename(directory.with_name("elsewhere.json"))
+    (directory / "provenance.json").symlink_to(directory.with_name("elsewhere.json"))
+
+
 def leave_new_file(directory: Path) -> None:
     (directory / "throws.parquet.new").write_bytes(b"PAR1")
 
@@ -198,6 +219,11 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_bag_digest: ("metadata.yaml", "throwcollect.digest", "the episodes give"),
     change_bag_qos: ("metadata.yaml", "topics_with_message_count", "the files give"),
     delete_card: ("README.md", "", "is missing"),
+    spoil_card: ("README.md", "", "has no YAML header"),
+    spoil_bytes_of_card: ("README.md", "", "no UTF-8 text"),
+    spoil_provenance: ("provenance.json", "", "is damaged: Invalid JSON"),
+    spoil_value_of_provenance: ("provenance.json", "", "is damaged"),
+    link_provenance: ("provenance.json", "", "a symbolic link leads elsewhere"),
     leave_new_file: ("throws.parquet.new", "", "not written to its end"),
     repeat_row: ("throws.parquet", "trial 5", "more than one row"),
     reorder_rows: ("throws.parquet", "", "not in order of trials"),

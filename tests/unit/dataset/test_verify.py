@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 import zlib
@@ -38,6 +39,7 @@ from tests.unit.dataset.table_defects import (
 
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest
+from throwcollect.dataset.mcap_reader import map_file
 from throwcollect.dataset.verify import verify
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.topics import joint_states
@@ -50,6 +52,16 @@ CONSEQUENCES = {**SHARD_CONSEQUENCES, **TABLE_CONSEQUENCES}
 
 def test_a_sound_dataset_has_no_findings(dataset: Path) -> None:
     assert verify(dataset) == []
+
+
+def test_a_hole_of_a_terabyte_is_not_read(dataset: Path) -> None:
+    size = (dataset / SHARD).stat().st_size
+    os.truncate(dataset / SHARD, 1 << 40)
+    findings = verify(dataset)
+    assert {finding.file for finding in findings} == {SHARD}
+    assert f"has {1 << 40} bytes, in datapackage.json {size}" in [finding.problem for finding in findings]
+    with map_file(dataset / SHARD) as contents:
+        assert size < len(contents) <= 2 * (size + 4096) + 1
 
 
 def test_verify_with_several_processes_gives_the_same_findings(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
