@@ -22,6 +22,7 @@ from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, Wor
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
+from throwcollect.tasks.result import REFUSED
 from throwcollect.wording import command, format_count, join_names
 
 _POLL_S = 2.0
@@ -51,8 +52,9 @@ class ClusterRun:
 
     @cached_property
     def trials(self) -> int:
-        """Number of trials of the plan."""
-        return len(Plan.read(self.directory / PLAN, self.config).trials)
+        """Number of trials of the plan that are run."""
+        trials = Plan.read(self.directory / PLAN, self.config).trials
+        return len(trials) - len(trials.refused)
 
     @property
     def simulations_per_task(self) -> int:
@@ -230,8 +232,8 @@ class ProgressOfSlices:
 
 
 def _count_outcomes(directory: Path) -> Counter[str]:
-    """Count the trials of each outcome in a finished dataset or slice."""
-    return Counter(read_parquet(directory / THROWS)["outcome"].to_pylist())
+    """Count the trials of each outcome in a finished dataset or slice, without those that the plan refuses."""
+    return Counter(each for each in read_parquet(directory / THROWS)["outcome"].to_pylist() if each != REFUSED)
 
 
 def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[SlicesLook]:

@@ -43,6 +43,13 @@ def test_the_first_look_at_a_finished_dataset_counts_all_outcomes(run: Any) -> N
     assert (progress.ended, progress.outcomes) == (30, {"landed": 27, "not_released": 3})
 
 
+def test_refused_trials_are_not_counted(run: Any) -> None:
+    outcomes = ["landed"] * 27 + ["refused"] * 2 + ["not_released"]
+    pq.write_table(pa.table({"outcome": outcomes}), run.directory / "throws.parquet")
+    progress = ProgressOfSlices(run).at(SlicesLook(frozenset(), (), None, complete=True))
+    assert (progress.ended, progress.failed) == (28, 1)
+
+
 def test_an_empty_name_is_not_that_of_a_submitted_dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "cluster").mkdir()
     write_submission(tmp_path, Submission("small", 2, ("throwcollect",), None))

@@ -71,6 +71,22 @@ def test_an_array_with_more_tasks_than_slurm_allows_is_refused(
         submit(config, tmp_path / "data", tasks, onlooker=SILENT)
 
 
+@pytest.mark.parametrize(("scratch", "is_taken"), [("/nope", False), ("/tmp", True), ("$SCRATCH/mine", True)])
+def test_a_scratch_directory_has_to_exist_unless_a_variable_names_it(
+    scratch: str, is_taken: bool, tmp_path: Path
+) -> None:
+    config = write_config(tmp_path, trials=4, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
+
+    def plan_tasks() -> None:
+        submit(config, tmp_path / "data", 2, overrides=[f"cluster.scratch={scratch}"], dry=True, onlooker=SILENT)
+
+    if is_taken:
+        plan_tasks()
+        return
+    with pytest.raises(ConfigError, match=r"cluster\.scratch: there is no directory /nope on this machine"):
+        plan_tasks()
+
+
 def test_a_submission_refused_for_a_used_directory_keeps_its_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
