@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -24,6 +25,10 @@ from throwcollect.wording import is_text, printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
 """System errors that a path from the user may cause, and that are no errors of this program."""
+_CLOCK_END_S = 2**31
+"""Time since 1970 [s], in January 2038, that messages of ROS 2 cannot hold any more; Zenoh holds none before 1970."""
+_NO_ROOM = "failed to map segment from shared object"
+"""End of the message of an `ImportError` if a library does not fit into the memory."""
 _NO_TEMPORARY_DIRECTORY = "No usable temporary directory found"
 """Beginning of the message of Python's `tempfile`."""
 _PROCESSES_OF_RUNS = ("launch", "begin", "router", "sim", "coordinator", "simulate")
@@ -64,13 +69,20 @@ def execute(command: Callable[..., Any]) -> NoReturn:
 
 
 def _check_surroundings() -> None:
-    """Refuse a command line and a directory that cannot be written into records and names of files.
+    """Refuse a clock that records cannot hold, and a command line and a directory that names of files cannot hold.
 
     Processes of a run need no current directory, because they are given absolute paths. That of their user may be gone.
 
     Raises:
-        ConfigError: If the current directory is gone, or it or a word of the command line is not UTF-8.
+        ConfigError: If the clock is wrong, the current directory is gone, or it or a word of the command line is not
+            UTF-8.
     """
+    try:
+        is_dated = 0 <= time.time() < _CLOCK_END_S
+    except OverflowError:
+        is_dated = False
+    if not is_dated:
+        raise ConfigError("the clock of this machine shows a year before 1970 or after 2037", hint="set it")
     try:
         here = os.getcwd()
     except OSError as error:
@@ -136,7 +148,10 @@ def _describe(error: Exception) -> tuple[str, int]:
             return str(reason), reason.exit_code
     if isinstance(error, OSError) and (error.strerror or "").startswith(_NO_TEMPORARY_DIRECTORY):
         return "no directory for temporary files can be written\n  try: name one in TMPDIR", ConfigError.exit_code
-    if isinstance(error, MemoryError):
+    number = error.errno if isinstance(error, OSError) else None
+    if number == errno.EMFILE:
+        return "too many open files\n  try: a higher limit (ulimit -n)", WorkerError.exit_code
+    if isinstance(error, MemoryError) or number == errno.ENOMEM or str(error).endswith(_NO_ROOM):
         return "out of memory\n  try: a machine with more of it, or a higher limit (ulimit -v)", WorkerError.exit_code
     where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"
     return f"internal error: {type(error).__name__}: {error}\n{where}", 1

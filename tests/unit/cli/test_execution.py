@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -53,6 +55,34 @@ def test_a_machine_without_a_directory_for_temporary_files_is_told_what_to_name(
         tempfile.gettempdir()
     said = "throwcollect: no directory for temporary files can be written\n  try: name one in TMPDIR\n"
     assert describe(caught.value, capsys) == said
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (MemoryError(), "out of memory"),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "out of memory"),
+        (ImportError("libarrow.so: failed to map segment from shared object"), "out of memory"),
+        (OSError(errno.EMFILE, "Too many open files", "/dev/null"), "too many open files"),
+    ],
+)
+def test_a_limit_of_the_process_is_named(error: Exception, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    told = describe(error, capsys, code=3)
+    assert told.startswith(f"throwcollect: {said}\n  try: ")
+    assert "ulimit -" in told
+
+
+@pytest.mark.parametrize("now", [-1.0, 2.0**31, None])
+def test_a_clock_that_records_cannot_hold_is_refused(
+    now: float | None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read_clock() -> float:
+        if now is None:
+            raise OverflowError("timestamp too large to convert to C _PyTime_t")
+        return now
+
+    monkeypatch.setattr("throwcollect.cli.execution.time", SimpleNamespace(time=read_clock))
+    assert "the clock of this machine" in describe(RuntimeError("unused"), capsys)
 
 
 GONE = "throwcollect: the current directory cannot be used: No such file or directory\n  try: go to another one\n"

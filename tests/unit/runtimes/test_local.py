@@ -1,4 +1,5 @@
 import os
+import resource
 import signal
 import socket
 import sys
@@ -29,6 +30,18 @@ def nodes(directory: Path, **run: object) -> LocalNodes:
 
 def node(code: str, name: str = "node") -> NodeSpec:
     return NodeSpec(name, (code,), NodeRole.EXPENDABLE)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("RLIMIT_NOFILE", "-n"), ("RLIMIT_AS", "-v")])
+def test_a_limit_with_which_nodes_cannot_start_is_named(
+    kind: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = {getattr(resource, kind): 16}
+    monkeypatch.setattr(resource, "getrlimit", lambda limit: (limits.get(limit, resource.RLIM_INFINITY), 0))
+    with pytest.raises(WorkerError, match=rf"only 16 .*\(ulimit {name}\)"):
+        nodes(tmp_path)
+    limits.clear()
+    nodes(tmp_path).close()
 
 
 @pytest.fixture(scope="module", autouse=True)
