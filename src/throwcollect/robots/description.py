@@ -171,12 +171,6 @@ def _check_inertias(robot: Robot, model: pinocchio.Model) -> None:
     Raises:
         ConfigError: If one has no mass, or moments of inertia that no body has.
     """
-    bodies = {
-        link.name: model.frames[model.getFrameId(link.name, pinocchio.BODY)] for link in robot.description.model.links
-    }
-    for name, frame in bodies.items():
-        if frame.parentJoint and (inertia := frame.inertia).mass > 0:
-            _check_moments(f"{robot.urdf_path}: link {name}", inertia)
     # Pinocchio's first joint is the universe.
     for joint, body in zip(model.names[1:], model.inertias[1:], strict=True):
         where = f"{robot.urdf_path}: link {robot.description.joints[joint].child}, which {joint} moves,"
