@@ -48,7 +48,6 @@ def measure(directory: Path) -> tuple[float, float]:
             settings=settings.digest,
             values=settings.find_replaced(config),
             trajectory=task_of(config).trajectory().digest,
-            lease="",
         )
         messages.append(pack(Delivery(episode, result, conditions.to_json()), _SIGNER))
     random.Random(0).shuffle(messages)
@@ -67,7 +66,7 @@ def _take_in(messages: list[bytes], plan: Plan, acceptance: Acceptance, director
         delivery = unpack(message, _SIGNER)
         assert isinstance(delivery, Delivery)
         trial = plan.trial(delivery.episode.header.trial)
-        if acceptance.find_difference(delivery.conditions, plan, trial, token=""):
+        if acceptance.find_difference(delivery.conditions, plan, trial):
             raise ValueError(f"trial {trial.number} is refused")
         writer.append(delivery.episode, columns.from_json(task.outcomes, delivery.result))
     seconds = time.perf_counter() - began

@@ -68,7 +68,6 @@ def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> 
     assert [delivery.episode.header.trial for delivery in deliveries] == [4, 2, 3]
     conditions = [json.loads(delivery.conditions) for delivery in deliveries]
     assert [each["values"] for each in conditions] == [dict(each.values) for each in leases]
-    assert [each["lease"] for each in conditions] == [each.token for each in leases]
     assert [json.loads(delivery.result)["outcome"] for delivery in deliveries] == ["landed"] * 3
     start_ns = [delivery.episode.header.start_ns for delivery in deliveries]
     assert start_ns == [CONFIG.trial_start_ns(trial) for trial in (4, 2, 3)]
@@ -77,7 +76,7 @@ def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> 
 def test_an_impossible_trial_is_refused_and_the_next_one_is_simulated(robot: Robot) -> None:
     wrong, right = lease(robot, {"ball.mass_kg": -1.0}), lease(robot, {}, trial=5)
     refusal, delivery = wait_for_episodes(robot, wrong, right)
-    assert refusal.token == wrong.token
+    assert refusal.trial == wrong.trial
     assert "ball.mass_kg" in refusal.reason
     assert delivery.episode.header.trial == 5
 
@@ -199,10 +198,10 @@ def test_a_lease_can_be_ended_by_hand(leased: Robot) -> None:
     assert leased.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
 
 
-def test_an_episode_without_a_lease_has_an_empty_lease_in_its_conditions(robot: Robot) -> None:
+def test_an_episode_without_a_lease_has_no_trajectory_in_its_conditions(robot: Robot) -> None:
     assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO], "ball.mass_kg": 0.05}).successful
     robot.reset()
     delivery = by_hand(robot)
     conditions = json.loads(delivery.conditions)
-    assert (conditions["lease"], conditions["trajectory"], delivery.result) == ("", "", "")
+    assert (conditions["trajectory"], delivery.result) == ("", "")
     assert conditions["values"] == {"ball.mass_kg": 0.05}

@@ -56,15 +56,17 @@ class RunConfig(Section):
     domain_id: Annotated[int, Field(ge=0, le=232)] = 0
     """ROS domain."""
     trial_timeout_s: PositiveFloat = 60.0
-    """Real time after which a simulation that is still at the same trial counts as lost. It comes on top of the real
-    time that `sim.max_trial_s` takes at real-time speed, or in slow motion (`sim.real_time_factor`)."""
+    """Real time after which a simulation that is still at the same trial is started again; if it still answers, all
+    trials have twice the time from then on. It comes on top of the real time that `sim.max_trial_s` takes at real-time
+    speed, or in slow motion (`sim.real_time_factor`)."""
     start_timeout_s: PositiveFloat = 60.0
     """Real time within which the first simulation must be ready once it runs."""
     grace_s: Annotated[float, Field(ge=0, le=3600)] = 8.0
     """Real time that running trials have left after Ctrl-C or SIGTERM; `throwcollect resume` runs those that did not
     end."""
     retries: Annotated[int, Field(ge=0, le=100)] = 3
-    """How often a trial is tried again, by another simulation if there is one, before it is recorded as `lost`."""
+    """How often a trial is tried again, by another simulation if there is one, before it is recorded as `lost`. A try
+    of a simulation that is alive, and only slow or cut off for a while, does not count."""
     replay: Annotated[int, Field(ge=0)] = 3
     """How many trials, chosen by the seed, a fresh process simulates again at the end, to be compared bit for bit."""
     restarts: Annotated[int, Field(ge=0, le=1000)] = 10

@@ -20,8 +20,8 @@ class Acceptance:
         self._build = build_of(config)
         self._settings = Settings(config)
 
-    def find_difference(self, text: str, plan: Plan, trial: Trial, *, token: str) -> str | None:
-        """Say why an episode is not the one that the lease with this token asked for; None if it is.
+    def find_difference(self, text: str, plan: Plan, trial: Trial) -> str | None:
+        """Say why an episode is not the one that a trial of a plan asks for; None if it is.
 
         `text` has the conditions that the simulation reports, in JSON.
         """
@@ -35,7 +35,6 @@ class Acceptance:
             settings=self._settings.digest,
             values=self._settings.find_replaced(config),
             trajectory=trajectory_of(config).digest,
-            lease=token,
         )
         differences = list(conditions.differences(expected))
         more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""

@@ -160,11 +160,16 @@ class TrialCollection:
         self._took_part.add(name)
 
     def leave(self, simulation: str, reason: str) -> None:
-        """Forget a simulation that is gone, and take its trials back; the next one at its address counts as new."""
-        self.take_back(simulation, reason)
+        """Forget a simulation that is out of sight, and take its trials back; call `settle` when its fate is known."""
+        self.take_back(simulation, reason, alive=None)
         self._leases.forget(simulation)
         self._lookahead.forget(simulation)
         del self._names[simulation]
+
+    def settle(self, simulation: str, *, alive: bool) -> None:
+        """Note what became of a simulation that has left: only if it was not alive has it failed with its trial."""
+        if (given_up := self._leases.settle(simulation, alive=alive)) is not None:
+            self._lose(*given_up)
 
     def lease(self, simulation: str) -> tuple[int, ...]:
         """Give further trials to a simulation that has few, and return all trials that it has to do, in order."""
@@ -184,21 +189,22 @@ class TrialCollection:
             held = (*held, trial)
         return held
 
-    def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> bool:
-        """Take in an episode, which `write_one` writes later; refuse one that is not what was asked for.
+    def take_in(self, simulation: str, delivery: Delivery) -> bool:
+        """Take in an episode, which `write_one` writes later; refuse one that is not what the plan asks for.
 
-        The simulation that has handed it over must hold its trial. `token` is the token of the lease; empty if there
-        was none.
+        The first episode of a trial counts, whoever holds the trial by now, and further ones are dropped.
 
         Returns:
             Whether it was taken in.
         """
         episode = delivery.episode
         trial = episode.header.trial
+        if not self._leases.is_open(trial):
+            return False
         try:
             result = self._columns.from_json(self._outcome_names, delivery.result)
             plan = self.writer.plan
-            reason = self._acceptance.find_difference(delivery.conditions, plan, plan.trial(trial), token=token)
+            reason = self._acceptance.find_difference(delivery.conditions, plan, plan.trial(trial))
         except DatasetError as error:
             reason = error.message
         if reason is not None:
@@ -211,17 +217,21 @@ class TrialCollection:
         return True
 
     def refuse(self, simulation: str, trial: int, reason: str) -> None:
-        """Take back a trial that a simulation could not do, or did otherwise, and count that as its refusal."""
+        """Take back a trial that a simulation holds and could not do, or did otherwise; count that as its refusal."""
+        if trial not in self._leases.find_held(simulation):
+            return
         self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=True))
 
-    def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
+    def take_back(self, simulation: str, reason: str, *, refused: bool = False, alive: bool | None = False) -> None:
         """Take all trials back from a simulation, which failed with the first and had not begun the others.
 
         The reason is kept as evidence. With `refused`, the simulation refused the trials, and may refuse all others.
+        If it is `alive`, this does not count; None if only a later call of `settle` can say so.
         """
         self._leases.release(simulation)
         for trial in self._leases.find_held(simulation):
-            self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=refused))
+            given_up = self._leases.fail(simulation, trial, reason, refused=refused, alive=alive)
+            self._give_back(simulation, trial, reason, given_up)
 
     def write_one(self) -> None:
         """Write the oldest episode of the backlog.
@@ -371,5 +381,8 @@ class TrialCollection:
         self.warn(f"{simulation}: trial {trial} {fate}: {reason}")
         self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
         if given_up is not None:
-            self.writer.append_lost(trial, "; ".join(given_up))
-            self._note(trial, task_of(self._config).lose("; ".join(given_up)))
+            self._lose(trial, given_up)
+
+    def _lose(self, trial: int, reasons: list[str]) -> None:
+        self.writer.append_lost(trial, "; ".join(reasons))
+        self._note(trial, task_of(self._config).lose("; ".join(reasons)))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections import defaultdict
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.progress import Progress
@@ -17,7 +17,6 @@ from throwcollect.errors import DatasetError
 from throwcollect.ros import Node, graph_changes
 from throwcollect.ros.msg import String
 from throwcollect.run_key import Signer
-from throwcollect.trial.conditions import conditions_from_json
 from throwcollect.trial.lease import Lease
 
 _DISCOVERY_PERIOD_S = 0.05
@@ -45,6 +44,8 @@ class Coordinator(Node):
         self._discovered_changes = -1
         self._visible: set[str] = set()
         self._unreached: dict[str, float] = {}
+        self._left: dict[str, tuple[AbstractSet[bytes], float]] = {}
+        """Publishers of simulations that are out of sight, by namespace, and since when [s]."""
         self._signer = Signer.of_environment()
         # A real-time factor slows trials down on purpose, even one that onlookers set, which the coordinator does not
         # learn of. Add the time that this takes before a simulation counts as lost.
@@ -73,14 +74,14 @@ class Coordinator(Node):
             self._find_simulations()
         now = time.monotonic()
         for namespace, simulation in list(self._simulations.items()):
-            if now > simulation.deadline:
-                simulation.hung = True
-                besides = ", and no answer to the lease" if simulation.unanswered else ""
-                self._take_back(namespace, f"no episode within {self._patience_s:g} s{besides}")
+            if now > simulation.began_s + self._patience_s:
+                self._stop_waiting(namespace, simulation)
             elif (missing := simulation.remind()) is not None:
                 self.get_logger().warning(f"{namespace}: no answer to the lease of {missing}, which is sent again")
             # Each time, trials of others may have come back, or the simulation may have become reachable.
             self._lease(namespace)
+        for namespace in [name for name, (_, since) in self._left.items() if now > since + self._patience_s]:
+            self._settle(namespace, alive=False)
         self._notice_unreached(now)
 
     def _notice_unreached(self, now: float) -> None:
@@ -113,13 +114,22 @@ class Coordinator(Node):
                 *offered[namespace],
                 make_lease=self._make_lease,
                 on_episode=self._receive,
-                on_refusal=lambda address, reason: self._take_back(address, reason, refused=True),
+                on_refusal=self._take_refusal,
             )
+            if namespace in self._left:
+                self._settle(namespace, alive=offered[namespace][1] <= self._left[namespace][0])
             self._collection.join(namespace, offered[namespace][0])
 
     def _lose(self, namespace: str, reason: str) -> None:
         self._collection.leave(namespace, reason)
-        self._simulations.pop(namespace).destroy()
+        simulation = self._simulations.pop(namespace)
+        simulation.destroy()
+        self._left[namespace] = simulation.publishers, time.monotonic()
+
+    def _settle(self, namespace: str, *, alive: bool) -> None:
+        """Note what became of a simulation out of sight: only its connection was lost if its publishers are there."""
+        del self._left[namespace]
+        self._collection.settle(namespace, alive=alive)
 
     def _find_offers(self) -> Iterator[tuple[str, str, frozenset[bytes]]]:
         """Find the simulations in the graph, nodes that publish episodes: namespace, name and publishers of each."""
@@ -153,9 +163,7 @@ class Coordinator(Node):
         simulation = self._simulations.get(namespace)
         if simulation is None or simulation.hung or not simulation.ready():
             return
-        # A deadline that is set belongs to the trial that runs; a longer list must not postpone it.
-        if simulation.ask(self._collection.lease(namespace)) and simulation.deadline == math.inf:
-            simulation.deadline = time.monotonic() + self._patience_s
+        simulation.ask(self._collection.lease(namespace))
 
     def _make_lease(self, namespace: str, trial: int) -> Lease:
         return Lease.make(namespace, trial, self._collection.writer.plan.trial(trial).values, self._signer)
@@ -163,7 +171,6 @@ class Coordinator(Node):
     def _receive(self, namespace: str, message: bytes) -> None:
         try:
             handed = unpack(message, self._signer)
-            token = handed.token if isinstance(handed, TrialRefusal) else conditions_from_json(handed.conditions).lease
         except DatasetError as error:
             # Anybody may have sent it, so the simulation is not blamed.
             self.get_logger().warning(
@@ -171,19 +178,23 @@ class Coordinator(Node):
             )
             return
         simulation = self._simulations[namespace]
-        simulation.hung = False
-        trial = simulation.finish(token)
-        if trial is None:
-            self.get_logger().warning(f"{namespace}: an episode came too late and was dropped")
-            return
-        # The next trial of its list begins with the end of this one.
-        simulation.deadline = time.monotonic() + self._patience_s if simulation.trials else math.inf
+        simulation.finish(handed.trial if isinstance(handed, TrialRefusal) else handed.episode.header.trial)
         if isinstance(handed, TrialRefusal):
-            self._collection.refuse(namespace, trial, handed.reason)
-        elif self._collection.take_in(namespace, handed, token):
+            self._collection.refuse(namespace, handed.trial, handed.reason)
+        elif self._collection.take_in(namespace, handed):
             self._showing.offer(simulation.name, message)
         self._lease(namespace)
 
-    def _take_back(self, namespace: str, reason: str, *, refused: bool = False) -> None:
+    def _stop_waiting(self, namespace: str, simulation: SimulationClient) -> None:
+        """Take the trials of a simulation that is too slow; if it is alive, give everybody more time from now on."""
+        alive = simulation.alive
+        reason = f"no episode within {self._patience_s:g} s{'' if alive else ', and no answer to the lease'}"
+        simulation.hung = True
+        simulation.abandon()
+        self._collection.take_back(namespace, reason, alive=alive)
+        if alive:
+            self._patience_s *= 2
+
+    def _take_refusal(self, namespace: str, reason: str) -> None:
         self._simulations[namespace].abandon()
-        self._collection.take_back(namespace, reason, refused=refused)
+        self._collection.take_back(namespace, reason, refused=True)

@@ -3,9 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 
+_FRESH, _HANDED_OUT = 1, 2
 _MOST_IN_A_ROW = 3
 """A simulation that refuses this many trials, without doing one in between, is doubted."""
+
+
+@dataclass
+class _Failure:
+    """A simulation that did not do a trial; this does not count if it is alive, and only slow or cut off."""
+
+    simulation: str
+    reason: str
+    counts: bool = True
 
 
 class Leases:
@@ -14,7 +25,8 @@ class Leases:
     A trial is *waiting*, then *held* by a simulation, until it is completed or waits again. A simulation does the
     trials that it holds in their order. Trials are handed out by number. A trial that comes back is handed out before
     all new ones, so that few shards of the dataset are open at a time. It does not go to a simulation that has failed
-    with it, as long as there is another one.
+    with it, as long as there is another one. Any simulation may complete a trial, even if another one holds it by now,
+    because a trial yields the same wherever it is done.
 
     Some trials are refused by every simulation, and some simulations refuse every trial. So a simulation that refuses
     trials is doubted at first: others get the trials. It is set aside for good when other simulations could do several
@@ -22,7 +34,7 @@ class Leases:
 
     Args:
         trials: Numbers of the trials to do.
-        retries: How often a trial may come back before it is given up.
+        retries: How often a trial may come back before it is given up; failures of living simulations do not count.
 
     Attributes:
         total: Number of trials in all.
@@ -30,15 +42,18 @@ class Leases:
     """
 
     def __init__(self, trials: Iterable[int], *, retries: int) -> None:
-        self._fresh = bytearray()
-        """For each number, whether that trial has not been handed out yet; bytes, as there may be millions."""
+        self._open = bytearray()
+        """For each number, `_FRESH`, `_HANDED_OUT`, or 0 if there is no such trial or it has ended; bytes, as there may
+        be millions."""
         self._next = 0
         """No trial below this one is fresh."""
         self._waiting_fresh = 0
         self._returned: list[int] = []
         self._retries = retries
         self._held: dict[str, list[int]] = {}
-        self._failures: dict[int, list[tuple[str, str]]] = {}
+        self._failures: dict[int, list[_Failure]] = {}
+        self._missed: dict[str, int] = {}
+        """Trials that simulations held which are out of sight, and may come back alive."""
         self._refusals: dict[str, list[tuple[int, str]]] = {}
         """Trials that a simulation has refused since it could do one, with the reasons."""
         self._wrong_refusals: dict[str, int] = {}
@@ -79,10 +94,14 @@ class Leases:
         """Take in further trials, with numbers above those that were handed out."""
         for trial in trials:
             # Numbers have gaps, because trials that the plan refuses are left out.
-            self._fresh.extend(bytes(max(0, trial + 1 - len(self._fresh))))
-            self._waiting_fresh += not self._fresh[trial]
-            self.total += not self._fresh[trial]
-            self._fresh[trial] = True
+            self._open.extend(bytes(max(0, trial + 1 - len(self._open))))
+            self._waiting_fresh += not self._open[trial]
+            self.total += not self._open[trial]
+            self._open[trial] = self._open[trial] or _FRESH
+
+    def is_open(self, trial: int) -> bool:
+        """Whether a trial of this number is to be done, and has not ended yet."""
+        return 0 <= trial < len(self._open) and self._open[trial] > 0
 
     def find_held(self, simulation: str) -> tuple[int, ...]:
         """List the trials that a simulation holds, in their order."""
@@ -98,7 +117,7 @@ class Leases:
         if trial is not None:
             self._returned.remove(trial)
         elif self._waiting_fresh:
-            trial = self._next = self._fresh.index(True, self._next)
+            trial = self._next = self._open.index(_FRESH, self._next)
             self._take_fresh(trial)
         else:
             return None
@@ -111,30 +130,35 @@ class Leases:
         Raises:
             ValueError: If it does not wait to be handed out.
         """
-        if not self._fresh[trial]:
+        if self._open[trial] != _FRESH:
             raise ValueError(trial)
         self._take_fresh(trial)
-        self.ended += 1
+        self._end(trial)
 
     def complete(self, simulation: str, trial: int) -> None:
-        """Note that a simulation has done a trial that it held.
-
-        Raises:
-            ValueError: If it does not hold the trial.
-        """
-        self._drop(simulation, trial)
+        """Note that a simulation has done an open trial, which it may hold, or have held before."""
+        holder = next((name for name, held in self._held.items() if trial in held), None)
+        if holder is not None:
+            self._drop(holder, trial)
+        elif trial in self._returned:
+            self._returned.remove(trial)
+        else:
+            self._take_fresh(trial)
+        self._end(trial)
         self._refusals.pop(simulation, None)
         self._wrong_refusals.pop(simulation, None)
         for other, refused in self._refusals.items():
             wrong = sum(number == trial for number, _ in refused)
             self._wrong_refusals[other] = self._wrong_refusals.get(other, 0) + wrong
-        self.ended += 1
         self._completed += 1
 
-    def fail(self, simulation: str, trial: int, reason: str, *, refused: bool = False) -> list[str] | None:
+    def fail(
+        self, simulation: str, trial: int, reason: str, *, refused: bool = False, alive: bool | None = False
+    ) -> list[str] | None:
         """Take a trial back from a simulation that was lost or could not do it; let it wait again, or give it up.
 
-        The reason is kept as evidence. With `refused`, the simulation refused the trial, and may refuse all others.
+        The reason is kept as evidence. With `refused`, the simulation refused the trial, and may refuse all others. If
+        it is `alive`, this does not count; None if only a later call of `settle` can say so.
 
         Returns:
             All reasons when its retries are used up, else None.
@@ -145,18 +169,38 @@ class Leases:
         self._drop(simulation, trial)
         if refused:
             self._refusals.setdefault(simulation, []).append((trial, reason))
-        failures = self._failures.setdefault(trial, [])
-        failures.append((simulation, reason))
-        if len(failures) <= self._retries:
-            self._returned.append(trial)
+        if alive is None:
+            self._missed[simulation] = trial
+        self._failures.setdefault(trial, []).append(_Failure(simulation, reason, counts=not alive))
+        self._returned.append(trial)
+        return self._give_up(trial)
+
+    def settle(self, simulation: str, *, alive: bool) -> tuple[int, list[str]] | None:
+        """Note what became of a simulation that was out of sight: it was alive, or it had ended.
+
+        Returns:
+            The trial that is given up now, and all reasons; None if there is none.
+        """
+        trial = self._missed.pop(simulation, None)
+        if trial is None:
             return None
-        self.ended += 1
+        failures = reversed(self._failures[trial])
+        next(failure for failure in failures if failure.simulation == simulation).counts = not alive
+        reasons = self._give_up(trial)
+        return None if reasons is None else (trial, reasons)
+
+    def _give_up(self, trial: int) -> list[str] | None:
+        """Give up an open trial if its retries are used up, and no simulation that failed with it may be alive."""
+        if not self.is_open(trial) or not self._is_used_up(trial) or trial in self._missed.values():
+            return None
+        self._returned.remove(trial)
+        self._end(trial)
         # While no trial was ever done, refusals are kept whatever becomes of their trials: `_is_doubted` counts them.
         if self._completed:
             # No simulation could do the trial, so its refusals are not held against them.
             for name, refusals in self._refusals.items():
                 self._refusals[name] = [(number, why) for number, why in refusals if number != trial]
-        return [f"{name}: {why}" for name, why in failures]
+        return [f"{failure.simulation}: {failure.reason}" for failure in self._failures[trial] if failure.counts]
 
     def release(self, simulation: str) -> None:
         """Take from a simulation all trials but the first, which runs; the others have not begun, so none failed."""
@@ -173,12 +217,19 @@ class Leases:
         return len(self._refusals.get(simulation, ())) >= _MOST_IN_A_ROW
 
     def _may_try(self, simulation: str, trial: int, rivals: Collection[str]) -> bool:
-        failed = {name for name, _ in self._failures.get(trial, ())}
-        return simulation not in failed or failed.issuperset(rivals)
+        failed = {failure.simulation for failure in self._failures.get(trial, ())}
+        return not self._is_used_up(trial) and (simulation not in failed or failed.issuperset(rivals))
+
+    def _is_used_up(self, trial: int) -> bool:
+        return sum(failure.counts for failure in self._failures.get(trial, ())) > self._retries
 
     def _take_fresh(self, trial: int) -> None:
-        self._fresh[trial] = False
+        self._open[trial] = _HANDED_OUT
         self._waiting_fresh -= 1
+
+    def _end(self, trial: int) -> None:
+        self._open[trial] = 0
+        self.ended += 1
 
     def _drop(self, simulation: str, trial: int) -> None:
         held = self._held.get(simulation, [])

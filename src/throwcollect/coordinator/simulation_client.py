@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from collections.abc import Set as AbstractSet
 
 from throwcollect.ros import Future, HistoryPolicy, Node, Parameter, QoSProfile, ReliabilityPolicy
@@ -13,8 +13,11 @@ from throwcollect.trial.lease import LEASES, Lease, leases_to_json
 from throwcollect.wording import format_count
 
 _ANSWER_S = 5.0
-"""A request that is not answered in this real time was lost, as when the router is started again. Simulations answer
-within milliseconds, or between two pieces of a trial."""
+"""A simulation that is not heard of for this real time is asked again, because messages may have been lost, as when the
+router is started again. Where answers are slow, it is so many times the time of the slowest one lately."""
+_SLOWER = 4
+_KEPT = 0.9
+"""Share of the time of the slowest answer that each faster one leaves."""
 
 EPISODE_TOPIC = "episode"
 EPISODE_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
@@ -47,10 +50,10 @@ class SimulationClient:
         self.namespace = namespace
         self.name = name
         self.publishers = publishers
-        self.deadline = float("inf")
-        """Monotonic time [s] at which the trial that runs counts as lost; infinite while none does."""
+        self.began_s = float("inf")
+        """Monotonic time [s] since when the trial that runs is waited for; infinite while none runs."""
         self.hung = False
-        """Whether a trial was lost at its deadline, and nothing has come from the simulation since."""
+        """Whether a trial took too long, and no episode has come from the simulation since."""
         self.unanswered = False
         """Whether the simulation has not answered the last request yet."""
         self._node = node
@@ -58,7 +61,10 @@ class SimulationClient:
         self._on_refusal = on_refusal
         self._generation = 0
         self._leases: dict[int, Lease] = {}
-        self._sent_at = 0.0
+        self._asked_s = self._heard_s = 0.0
+        """Monotonic times [s] of the last request, and of the last message of the simulation."""
+        self._slowest_s = 0.0
+        """Time of the slowest answer lately [s]; it fades with each answer that is faster."""
         self._patience_s = _ANSWER_S
         prefix = namespace.removesuffix("/")
         self._parameters = node.create_client(SetParametersAtomically, f"{prefix}/{name}/set_parameters_atomically")
@@ -75,55 +81,56 @@ class SimulationClient:
         """The trials that the simulation was asked for and has not handed over, in their order."""
         return tuple(self._leases)
 
+    @property
+    def alive(self) -> bool:
+        """Whether the simulation was heard of lately, compared with how long it took for answers before."""
+        return time.monotonic() < self._heard_s + self._patience_s
+
     def ready(self) -> bool:
         """Whether everything that a trial needs is offered."""
         return self._parameters.service_is_ready()
 
-    def ask(self, trials: Sequence[int]) -> bool:
-        """Ask for these trials, in order, instead of the last ones; a trial that runs goes on if it is among them.
-
-        Returns:
-            Whether this differs from the last request.
-        """
+    def ask(self, trials: Sequence[int]) -> None:
+        """Ask for these trials, in order, instead of the last ones; a trial that runs goes on if it is among them."""
         if tuple(trials) == self.trials:
-            return False
-        # A trial that stays in the list keeps its lease, because the simulation may be running it under that token.
+            return
+        if tuple(trials[:1]) != self.trials[:1]:
+            self._wait_for_first(trials)
+        # A trial that stays in the list keeps its lease, so that it is not done again if its episode is under way.
         self._leases = {trial: self._leases.get(trial) or self._make_lease(self.namespace, trial) for trial in trials}
-        self._patience_s = _ANSWER_S
         self._send()
-        return True
 
     def remind(self) -> str | None:
-        """Ask once more if there was no answer, with new leases, because episodes of the old ones may be lost, too.
+        """Ask once more if nothing was heard for long.
 
         Returns:
-            The number of trials asked for, in words; None if there is no reason to ask again yet.
+            The number of trials asked for, in words, if there was no answer; else None.
         """
-        if not self.unanswered or time.monotonic() < self._sent_at + self._patience_s:
+        quiet_s = time.monotonic() - max(self._asked_s, self._heard_s)
+        missing = format_count(len(self._leases), "trial") if self.unanswered else None
+        if quiet_s < self._patience_s or not (missing or self._leases):
             return None
         # A simulation that was frozen for a while must not find a pile of requests.
         self._patience_s *= 2
-        self._leases = {trial: self._make_lease(self.namespace, trial) for trial in self._leases}
+        if not missing:
+            # The simulation has its leases. If it does nothing, it has done them, and the episodes were lost.
+            self._leases = {trial: self._make_lease(self.namespace, trial) for trial in self._leases}
         self._send()
-        return format_count(len(self._leases), "trial")
+        return missing
 
-    def finish(self, token: str) -> int | None:
-        """Forget the lease with a token, as its trial was handed over or refused.
-
-        Returns:
-            The trial; None if there is no such lease, or not any more.
-        """
-        trial = next((trial for trial, lease in self._leases.items() if lease.token == token), None)
-        if trial is not None:
-            del self._leases[trial]
-        return trial
+    def finish(self, trial: int) -> None:
+        """Note that a trial was handed over or refused; the next one of the list begins with its end."""
+        self._heard_s = time.monotonic()
+        self.hung = False
+        self._leases.pop(trial, None)
+        self._wait_for_first(self._leases)
 
     def abandon(self) -> None:
-        """Forget all trials: late answers and episodes are ignored."""
+        """Forget all trials, and ignore late answers."""
         self._generation += 1
         self._leases = {}
         self.unanswered = False
-        self.deadline = float("inf")
+        self._wait_for_first(())
 
     def destroy(self) -> None:
         """Take all clients off the graph."""
@@ -131,14 +138,21 @@ class SimulationClient:
         self._node.destroy_client(self._parameters)
         self._node.destroy_subscription(self._episodes)
 
+    def _wait_for_first(self, trials: Collection[int]) -> None:
+        self.began_s = time.monotonic() if trials else float("inf")
+
     def _send(self) -> None:
         self._generation += 1
-        generation, self._sent_at, self.unanswered = self._generation, time.monotonic(), True
+        generation, asked_s = self._generation, time.monotonic()
+        self._asked_s, self.unanswered = asked_s, True
 
         def check(answer: Future) -> None:
+            self._heard_s = time.monotonic()
+            self._slowest_s = max(self._heard_s - asked_s, _KEPT * self._slowest_s)
             if generation != self._generation:
                 return
             self.unanswered = False
+            self._patience_s = max(_ANSWER_S, _SLOWER * self._slowest_s)
             result = answer.result().result
             if not result.successful:
                 self._on_refusal(self.namespace, f"leases: {result.reason}")

@@ -7,7 +7,7 @@ which covers all parts before it. The coordinator trusts a sender who has the ke
 hash or judge the episode again.
 
 The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
-are the token of the lease that was refused.
+are the number of the trial that was refused.
 """
 
 from __future__ import annotations
@@ -176,16 +176,16 @@ class Delivery(NamedTuple):
 
 
 class TrialRefusal(NamedTuple):
-    """A refusal of a simulation to do a trial, with the token of its lease."""
+    """A refusal of a simulation to do a trial."""
 
-    token: str
+    trial: int
     reason: str
 
 
 def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
     """Encode the CDR message that carries an episode or a refusal."""
     if isinstance(handed, TrialRefusal):
-        parts = [b"", handed.reason.encode(), handed.token.encode(), b"", b""]
+        parts = [b"", handed.reason.encode(), str(handed.trial).encode(), b"", b""]
     else:
         episode = handed.episode
         parts = [
@@ -237,10 +237,10 @@ def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
     header, result, conditions, hashes, chunks = parts
     try:
         texts = bytes(result).decode(), bytes(conditions).decode()
-    except UnicodeDecodeError as error:
-        raise DatasetError("episode: its result or its conditions are no UTF-8 text") from error
-    if not header:
-        return TrialRefusal(token=texts[1], reason=texts[0])
+        if not header:
+            return TrialRefusal(trial=int(texts[1]), reason=texts[0])
+    except ValueError as error:
+        raise DatasetError("episode: its result or its conditions cannot be read") from error
     given = [hashes[start : start + _HASH_BYTES].hex() for start in range(0, len(hashes), _HASH_BYTES)]
     return Delivery(make_episode(bytes(header), given, *Chunk.parse_all(chunks)), *texts)
 

@@ -26,11 +26,13 @@ class LeaseQueue:
     def replace(self, leases: Iterable[Lease]) -> None:
         """Have these trials simulated in this order, and no others; the present trial goes on if it is among them."""
         pending = [lease for lease in leases if lease.token not in self._done]
-        if self._running is not None and self._running.token not in {lease.token for lease in pending}:
-            self._running = None
-            self._runner.drop()
-        running = self._running.token if self._running else ""
-        self._waiting = deque(lease for lease in pending if lease.token != running)
+        if (running := self._running) is not None:
+            # A new lease of the same trial asks for the episode that is being made.
+            again = (lease for lease in pending if (lease.trial, lease.values) == (running.trial, running.values))
+            self._running = next(again, None)
+            if self._running is None:
+                self._runner.drop()
+        self._waiting = deque(lease for lease in pending if lease is not self._running)
 
     def clear(self) -> None:
         """Forget all leases; the trial that runs goes on, but its episode belongs to no lease."""
@@ -44,7 +46,7 @@ class LeaseQueue:
             return None
         lease = self._waiting.popleft()
         try:
-            self._runner.begin(lease.trial, lease.values, token=lease.token)
+            self._runner.begin(lease.trial, lease.values)
         except ThrowcollectError as error:
             self._runner.drop()
             return self._refuse(lease, error)
@@ -67,4 +69,4 @@ class LeaseQueue:
 
     def _refuse(self, lease: Lease, error: ThrowcollectError) -> TrialRefusal:
         self._done.append(lease.token)
-        return TrialRefusal(lease.token, str(error))
+        return TrialRefusal(lease.trial, str(error))

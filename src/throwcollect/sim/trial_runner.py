@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
@@ -21,14 +20,6 @@ from throwcollect.trial.conditions import Conditions, Settings, build_of
 from throwcollect.trial.goals import trial_goals
 
 
-@dataclass(frozen=True)
-class _Begun:
-    """A trial that was begun for a coordinator."""
-
-    trajectory: JointTrajectory
-    token: str
-
-
 class TrialRunner:
     """Begins trials and hands over their episodes; the caller calls `advance` in between.
 
@@ -43,16 +34,16 @@ class TrialRunner:
         self.channels = Channels(config, full_description(config))
         self._encoder = ChunkEncoder(self.channels, level=config.record.zstd_level)
         self._columns = task_of(config).columns
-        self._begun: _Begun | None = None
+        self._begun: JointTrajectory | None = None
+        """Motion of the trial that was begun for a coordinator."""
         self._failure: MemberError | None = None
 
-    def begin(self, trial: int, values: Mapping[str, float], *, token: str = "") -> None:
+    def begin(self, trial: int, values: Mapping[str, float]) -> None:
         """Begin a trial, and give its controllers the goals that follow from its configuration.
 
         Args:
             trial: Number of the trial.
             values: Values by dotted key, which replace the values of the configuration.
-            token: Token of the trial's lease; empty if it has none.
 
         Raises:
             ConfigError: If no motion or no start state follows from the values.
@@ -63,10 +54,10 @@ class TrialRunner:
         config = with_values(self._simulation.config, values)
         trajectory = trajectory_of(config)
         self._simulation.lease(trial, config, trial_goals(robot_of(config), trajectory, start_posture(config)))
-        self._begun = _Begun(trajectory, token)
+        self._begun = trajectory
 
     def release_lease(self) -> None:
-        """Take the lease away from the trial that runs, so that its episode is not judged and names no lease."""
+        """Take the lease away from the trial that runs, so that its episode is not judged."""
         self._begun = None
 
     def drop(self) -> None:
@@ -117,12 +108,11 @@ class TrialRunner:
             build=build_of(config),
             settings=self._settings.digest,
             values=self._settings.find_replaced(config),
-            trajectory=begun.trajectory.digest if begun else "",
-            lease=begun.token if begun else "",
+            trajectory=begun.digest if begun else "",
         )
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
-        result = self._judge(config, begun.trajectory, table.samples, header) if begun else ""
+        result = self._judge(config, begun, table.samples, header) if begun else ""
         return Delivery(Episode(header, state), result, conditions.to_json())
 
     def _judge(self, config: Config, trajectory: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:

@@ -31,15 +31,13 @@ class Conditions:
         build: Digest of sources, engine and model (`build_of`).
         settings: Digest of the keys of the collection's configuration that concern the simulation.
         values: Values of the trial that replace those of the configuration, by dotted key.
-        trajectory: Digest of the joint trajectory that the controllers were given.
-        lease: Token of the lease that the trial was simulated for; empty if there was no lease.
+        trajectory: Digest of the joint trajectory that the controllers were given; empty if there was no lease.
     """
 
     build: str
     settings: str
     values: Mapping[str, float]
     trajectory: str
-    lease: str
 
     def to_json(self) -> str:
         """Write the conditions in JSON; equal conditions give equal text."""
@@ -47,8 +45,6 @@ class Conditions:
 
     def differences(self, expected: Conditions) -> Iterator[str]:
         """Describe each difference from the expected conditions in a phrase."""
-        if self.lease != expected.lease:
-            yield "it was not simulated for this lease"
         if self.build != expected.build:
             yield "its sources, its physics engine or its robot model are not those of the coordinator"
         if self.settings != expected.settings:

@@ -29,7 +29,8 @@ class Lease:
         simulation: Namespace of the simulation, such as ``/sim_0``.
         trial: Number of the trial.
         values: Values of the trial that replace those of the configuration, by dotted key.
-        nonce: Random text by which two leases of the same trial differ.
+        nonce: Random text by which two leases of the same trial differ: with a new one, a trial that is done is done
+            again.
         signature: Signature of the coordinator over all other attributes.
     """
 

@@ -29,17 +29,14 @@ def acceptance() -> Acceptance:
     return Acceptance(CONFIG)
 
 
-def test_an_episode_of_its_trial_and_lease_is_accepted(acceptance: Acceptance, delivery: Delivery) -> None:
-    assert acceptance.find_difference(delivery.conditions, PLAN, PLAN.trials[1], token="") is None
+def test_an_episode_of_its_trial_is_accepted(acceptance: Acceptance, delivery: Delivery) -> None:
+    assert acceptance.find_difference(delivery.conditions, PLAN, PLAN.trials[1]) is None
 
 
-def test_an_episode_of_another_lease_or_trial_is_refused(acceptance: Acceptance, delivery: Delivery) -> None:
-    said = delivery.conditions
-    other = "token of another lease"
-    assert acceptance.find_difference(said, PLAN, PLAN.trials[1], token=other) == "it was not simulated for this lease"
-    assert "ball.mass_kg was " in (acceptance.find_difference(said, PLAN, PLAN.trials[0], token="") or "")
+def test_an_episode_of_another_trial_is_refused(acceptance: Acceptance, delivery: Delivery) -> None:
+    assert "ball.mass_kg was " in (acceptance.find_difference(delivery.conditions, PLAN, PLAN.trials[0]) or "")
 
 
 def test_an_episode_with_unreadable_conditions_is_refused(acceptance: Acceptance) -> None:
-    reason = acceptance.find_difference("{}", PLAN, PLAN.trials[1], token="")
+    reason = acceptance.find_difference("{}", PLAN, PLAN.trials[1])
     assert (reason or "").startswith("conditions of the episode: ")

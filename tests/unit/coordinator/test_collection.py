@@ -60,6 +60,8 @@ def test_a_simulation_that_dies_loses_only_the_trial_that_it_ran(
     assert collection.take_in("/sim_0", deliveries[0])
     collection.leave("/sim_0", "left the ROS graph")
     assert [(event["trial"], event["reason"]) for event in events(tmp_path, "fail")] == [(1, "left the ROS graph")]
+    assert not events(tmp_path, "lost")
+    collection.settle("/sim_0", alive=False)
     assert [event["trial"] for event in events(tmp_path, "lost")] == [1]
     collection.join("/sim_1", "sim_1")
     assert collection.lease("/sim_1") == (2, 3, 4, 5)
@@ -74,6 +76,49 @@ def test_a_simulation_that_dies_loses_only_the_trial_that_it_ran(
     provenance = read_provenance(tmp_path / "data")
     assert provenance is not None
     assert provenance.simulations == 2
+
+
+def test_a_simulation_that_comes_back_has_lost_no_trial(
+    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+) -> None:
+    for _ in range(5):
+        assert collection.lease("/sim_0") == (0, 1, 2, 3)
+        collection.leave("/sim_0", "left the ROS graph")
+        collection.settle("/sim_0", alive=True)
+        collection.join("/sim_0", "sim_0")
+    assert not events(tmp_path, "lost")
+
+
+def test_the_first_episode_of_a_trial_counts_and_later_ones_are_dropped(
+    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+) -> None:
+    warnings: list[str] = []
+    collection.lease("/sim_0")
+    collection.take_back("/sim_0", "no episode within 66 s", alive=True)
+    collection.warn = warnings.append
+    collection.join("/sim_1", "sim_1")
+    assert collection.lease("/sim_1") == (0, 1, 2, 3)
+    assert collection.take_in("/sim_0", deliveries[0])
+    assert collection.lease("/sim_1") == (1, 2, 3)
+    for simulation in ("/sim_0", "/sim_1"):
+        assert not collection.take_in(simulation, deliveries[0])
+    while collection.backlog:
+        collection.write_one()
+    assert not collection.take_in("/sim_1", deliveries[0])
+    assert [event["trial"] for event in events(tmp_path, "commit")] == [0]
+    assert not warnings
+
+
+def test_a_wrong_episode_of_a_trial_that_its_simulation_does_not_hold_changes_nothing(
+    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+) -> None:
+    collection.join("/sim_1", "sim_1")
+    collection.lease("/sim_0")
+    wrong = deliveries[0]._replace(conditions=deliveries[1].conditions)
+    assert not collection.take_in("/sim_1", wrong)
+    collection.refuse("/sim_1", 0, "cannot be done")
+    assert collection.lease("/sim_0") == (0, 1, 2, 3)
+    assert not events(tmp_path, "fail")
 
 
 def test_a_simulation_gets_more_trials_once_half_of_its_lease_is_done(

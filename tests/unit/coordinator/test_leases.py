@@ -1,4 +1,3 @@
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -42,19 +41,83 @@ def test_a_trial_that_is_given_up_lists_all_its_failures() -> None:
     assert leases.finished
 
 
-def test_only_the_simulation_that_holds_a_trial_can_complete_it() -> None:
+def test_a_trial_may_be_completed_by_the_simulation_that_held_it_before() -> None:
     leases = Leases([0], retries=3)
     leases.lease("a")
     leases.fail("a", 0, "timeout")
     leases.lease("b")
-    with pytest.raises(ValueError, match="not in list"):
-        leases.complete("a", 0)
-    assert (leases.ended, leases.leased) == (0, 1)
-    leases.complete("b", 0)
-    assert (leases.ended, leases.leased) == (1, 0)
+    leases.complete("a", 0)
+    assert (leases.ended, leases.leased, leases.find_held("b")) == (1, 0, ())
+    assert not leases.is_open(0)
 
 
-ACTIONS = st.tuples(st.sampled_from("abcd"), st.sampled_from(["lease", "complete", "release", "fail", "refuse"]))
+def test_a_trial_may_be_completed_while_it_waits_again_or_before_it_was_leased() -> None:
+    leases = Leases([0, 1], retries=3)
+    leases.lease("a")
+    leases.fail("a", 0, "timeout")
+    for trial in (0, 1):
+        leases.complete("a", trial)
+    assert leases.finished
+    assert (leases.waiting, leases.lease("b")) == (0, None)
+
+
+def test_only_trials_of_the_plan_that_have_not_ended_are_open() -> None:
+    leases = Leases([1, 3], retries=0)
+    leases.recall(3)
+    assert [trial for trial in range(-2, 6) if leases.is_open(trial)] == [1]
+    leases.fail("a", leases.lease("a") or 0, "killed")
+    assert not leases.is_open(1)
+
+
+def test_failures_of_simulations_that_are_alive_never_give_a_trial_up() -> None:
+    leases = Leases([0], retries=1)
+    for _ in range(20):
+        leases.lease("a")
+        assert leases.fail("a", 0, "slow", alive=True) is None
+        leases.lease("a")
+        assert leases.fail("a", 0, "out of sight", alive=None) is None
+        assert leases.settle("a", alive=True) is None
+    for given_up in (None, ["a: killed", "a: killed"]):
+        leases.lease("a")
+        assert leases.fail("a", 0, "killed") == given_up
+
+
+def test_a_trial_without_retries_left_waits_until_it_is_known_whether_its_simulation_lives() -> None:
+    leases = Leases([0], retries=0)
+    for fate in (True, False):
+        assert leases.lease("a") == 0
+        assert leases.fail("a", 0, "out of sight", alive=None) is None
+        assert leases.lease("b") is None
+        assert not leases.finished
+        assert leases.settle("a", alive=fate) == (None if fate else (0, ["a: out of sight"]))
+    assert leases.finished
+    assert leases.settle("a", alive=False) is None
+
+
+def test_a_trial_that_was_completed_after_all_is_not_given_up() -> None:
+    leases = Leases([0], retries=0)
+    leases.lease("a")
+    leases.fail("a", 0, "out of sight", alive=None)
+    leases.complete("a", 0)
+    assert leases.settle("a", alive=False) is None
+    assert leases.ended == 1
+
+
+def test_a_simulation_that_comes_back_is_excused_only_for_its_last_failure() -> None:
+    leases = Leases([0], retries=1)
+    leases.lease("a")
+    leases.fail("a", 0, "killed")
+    leases.lease("a")
+    leases.fail("a", 0, "out of sight", alive=None)
+    leases.settle("a", alive=True)
+    leases.lease("a")
+    assert leases.fail("a", 0, "killed") == ["a: killed", "a: killed"]
+
+
+ACTIONS = st.tuples(
+    st.sampled_from("abcd"),
+    st.sampled_from(["lease", "complete", "come late", "release", "fail", "refuse", "leave", "return", "restart"]),
+)
 
 
 @given(st.lists(ACTIONS), st.integers(0, 3), st.booleans())
@@ -66,6 +129,16 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
         held = leases.find_held(simulation)
         if action == "lease":
             leases.lease(simulation, others="abcdz" if present else "")
+        elif action == "come late" and leases.is_open(0):
+            leases.complete(simulation, 0)
+            ended.append(0)
+        elif action == "leave":
+            leases.release(simulation)
+            for trial in held[:1]:
+                assert leases.fail(simulation, trial, "x", alive=None) is None
+        elif action in ("return", "restart"):
+            if (given_up := leases.settle(simulation, alive=action == "return")) is not None:
+                ended.append(given_up[0])
         elif action == "release":
             leases.release(simulation)
         elif action == "complete" and held:
@@ -86,6 +159,7 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
         act("z", "complete")
         for simulation in "abcd":
             act(simulation, "complete")
+            act(simulation, "restart")
     assert sorted(ended) == list(range(6))
 
 

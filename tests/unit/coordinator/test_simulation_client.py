@@ -1,5 +1,6 @@
 """How the coordinator sends leases to a simulation and handles its answers, over a real router."""
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -8,6 +9,7 @@ import pytest
 
 from rclzenoh.interfaces import get_service
 from throwcollect import ros
+from throwcollect.coordinator import simulation_client
 from throwcollect.coordinator.simulation_client import SimulationClient
 from throwcollect.ros import SetParametersResult
 from throwcollect.ros.router import router
@@ -80,8 +82,23 @@ def bench(joined: None) -> Bench:
     return Bench()
 
 
+class Clock:
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(simulation_client, "time", clock)
+    return clock
+
+
 def test_leases_are_sent_signed_and_in_the_given_order(bench: Bench) -> None:
-    assert bench.client.ask([5, 2])
+    bench.client.ask([5, 2])
     assert bench.spin(lambda: not bench.client.unanswered)
     (leases,) = bench.asked
     assert [(lease.trial, lease.simulation, dict(lease.values)) for lease in leases] == [
@@ -101,12 +118,12 @@ def test_a_simulation_may_live_in_the_root_namespace() -> None:
 
 
 def test_a_simulation_is_not_sent_the_leases_that_it_has(bench: Bench) -> None:
-    assert bench.client.ask([5, 2])
-    assert not bench.client.ask([5, 2])
-    first, second = bench.client._leases.values()
-    assert bench.client.finish(first.token) == 5
-    assert not bench.client.ask([2])
-    assert bench.client.ask([2, 3])
+    bench.client.ask([5, 2])
+    bench.client.ask([5, 2])
+    _, second = bench.client._leases.values()
+    bench.client.finish(5)
+    bench.client.ask([2])
+    bench.client.ask([2, 3])
     bench.settle()
     assert bench.trials == [[5, 2], [2, 3]]
     assert bench.asked[1][0] == second
@@ -114,16 +131,24 @@ def test_a_simulation_is_not_sent_the_leases_that_it_has(bench: Bench) -> None:
 
 def test_asking_for_fewer_trials_takes_the_others_back(bench: Bench) -> None:
     bench.client.ask([5, 2])
-    assert bench.client.ask([5])
+    bench.client.ask([5])
     bench.settle()
     assert bench.trials == [[5, 2], [5]]
     assert bench.client.trials == (5,)
 
 
-def test_a_token_finishes_its_trial_only_once(bench: Bench) -> None:
+def test_a_trial_is_waited_for_from_the_end_of_the_one_before_it(bench: Bench, clock: Clock) -> None:
     bench.client.ask([5, 2])
-    tokens = [lease.token for lease in bench.client._leases.values()]
-    assert [bench.client.finish(token) for token in (tokens[1], tokens[1], "x", tokens[0])] == [2, None, None, 5]
+    clock.now += 3
+    bench.client.ask([5, 2, 3])
+    assert bench.client.began_s == clock.now - 3
+    bench.client.finish(5)
+    assert (bench.client.trials, bench.client.began_s) == ((2, 3), clock.now)
+    clock.now += 3
+    bench.client.ask([3])
+    assert bench.client.began_s == clock.now
+    bench.client.finish(3)
+    assert (bench.client.trials, bench.client.began_s) == ((), math.inf)
 
 
 def test_a_refusal_by_the_simulation_is_reported_with_its_reason(bench: Bench) -> None:
@@ -146,29 +171,72 @@ def test_a_late_refusal_does_not_affect_leases_sent_since(bench: Bench) -> None:
 def test_answers_about_abandoned_trials_are_ignored(bench: Bench) -> None:
     bench.accepts = False
     bench.client.ask([0])
-    (lease,) = bench.client._leases.values()
     bench.client.abandon()
     bench.settle()
     assert bench.trials == [[0]]
     assert bench.refusals == []
-    assert bench.client.finish(lease.token) is None
 
 
-def test_trials_without_an_answer_are_sent_again_with_new_leases(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trials_without_an_answer_are_sent_again_with_the_same_leases(bench: Bench, clock: Clock) -> None:
     bench.client.ask([5, 6])
-    before = {lease.token for lease in bench.client._leases.values()}
     assert bench.client.remind() is None
-    monkeypatch.setattr(bench.client, "_patience_s", 0.0)
+    clock.now += 5
     # The simulation has not answered yet, as nothing was spun.
     assert bench.client.remind() == "2 trials"
-    assert bench.spin(lambda: not bench.client.unanswered)
+    bench.settle()
     assert bench.trials == [[5, 6], [5, 6]]
-    assert before.isdisjoint(lease.token for lease in bench.client._leases.values())
+    assert bench.asked[0] == bench.asked[1]
     assert bench.client.remind() is None
 
 
-def test_abandoned_trials_are_not_sent_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_simulation_that_answered_and_hands_nothing_over_is_asked_again_with_new_leases(
+    bench: Bench, clock: Clock
+) -> None:
+    bench.client.ask([5, 6])
+    assert bench.spin(lambda: not bench.client.unanswered)
+    clock.now += 4
+    bench.client.finish(5)
+    clock.now += 4
+    assert bench.client.remind() is None
+    # The simulation was heard of 4 s ago, so nothing was sent.
+    assert not bench.client.unanswered
+    clock.now += 1
+    # There was an answer, so nothing is missing.
+    assert bench.client.remind() is None
+    assert bench.spin(lambda: not bench.client.unanswered)
+    assert bench.trials == [[5, 6], [6]]
+    assert bench.asked[1][0].token not in {lease.token for lease in bench.asked[0]}
+
+
+def test_a_simulation_that_answers_slowly_is_asked_again_later_each_time(bench: Bench, clock: Clock) -> None:
     bench.client.ask([0])
-    monkeypatch.setattr(bench.client, "_patience_s", 0.0)
+    for wait_s in (5, 10):
+        clock.now += wait_s - 1
+        assert bench.client.remind() is None
+        clock.now += 1
+        assert bench.client.remind() == "1 trial"
+    clock.now += 3
+    assert bench.spin(lambda: not bench.client.unanswered)
+    # The first of the three answers took 18 s, of which 90 % count after each of the others, four times.
+    bench.client.ask([0, 1])
+    clock.now += 58
+    assert bench.client.remind() is None
+    assert bench.client.alive
+    clock.now += 1
+    assert bench.client.remind() == "2 trials"
+
+
+def test_a_simulation_that_has_never_answered_is_not_alive(bench: Bench, clock: Clock) -> None:
+    bench.client.ask([0])
+    assert not bench.client.alive
+    assert bench.spin(lambda: not bench.client.unanswered)
+    assert bench.client.alive
+    clock.now += 5
+    assert not bench.client.alive
+
+
+def test_abandoned_trials_are_not_sent_again(bench: Bench, clock: Clock) -> None:
+    bench.client.ask([0])
+    clock.now += 5
     bench.client.abandon()
     assert bench.client.remind() is None

@@ -205,10 +205,12 @@ def test_a_randomly_changed_message_is_refused_with_a_dataset_error(whole: bytes
 
 
 def test_a_refusal_arrives_as_it_was_sent() -> None:
-    refusal = TrialRefusal("ab.cd", "zu schnell für den Ellbogen")
+    refusal = TrialRefusal(7, "zu schnell für den Ellbogen")
     assert unpack(pack(refusal, SIGNER), SIGNER) == refusal
     with pytest.raises(DatasetError, match="signed"):
         unpack(pack(refusal, Signer(b"another")), SIGNER)
+    with pytest.raises(DatasetError, match="cannot be read"):
+        unpack(pack(TrialRefusal("seven", "no"), SIGNER), SIGNER)  # type: ignore[arg-type]
 
 
 def test_a_message_with_a_chunk_without_hash_is_refused(sent: Episode) -> None:

@@ -1,6 +1,7 @@
 """The order in which a simulation does leased trials, while a coordinator changes the leases."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from throwcollect.episode.episode_message import TrialRefusal
@@ -22,7 +23,7 @@ class Runner:
         self.is_released = False
         self.yields: Any = None
 
-    def begin(self, trial: int, _values: Mapping[str, float], *, token: str) -> None:
+    def begin(self, trial: int, _values: Mapping[str, float]) -> None:
         if trial == BAD.trial:
             raise ThrowcollectError("out of reach")
         self.begun.append(trial)
@@ -75,6 +76,31 @@ def test_the_running_trial_goes_on_if_it_is_leased_again() -> None:
     assert runner.begun == [0, 2]
 
 
+def test_the_running_trial_goes_on_under_a_new_lease_and_is_done_once() -> None:
+    queue, runner = queue_of(A, B)
+    again = [replace(lease, nonce="new") for lease in (A, B)]
+    queue.replace(again)
+    end_trial(queue, runner)
+    queue.replace(again)
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0, 1], 0)
+
+
+def test_a_trial_that_is_done_is_done_again_only_under_a_new_lease() -> None:
+    queue, runner = queue_of(A)
+    end_trial(queue, runner)
+    queue.replace([replace(A, nonce="new")])
+    assert queue.begin_next() is None
+    assert runner.begun == [0, 0]
+
+
+def test_the_running_trial_is_dropped_if_it_is_leased_with_other_values() -> None:
+    queue, runner = queue_of(A)
+    queue.replace([replace(A, values={"ball.mass_kg": 0.05})])
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0, 0], 1)
+
+
 def test_the_running_trial_is_dropped_if_its_lease_is_gone() -> None:
     queue, runner = queue_of(A, B)
     queue.replace([C])
@@ -97,7 +123,7 @@ def test_a_trial_that_cannot_begin_is_refused_and_the_next_one_begins() -> None:
     runner = Runner()
     queue = LeaseQueue(runner)  # type: ignore[arg-type]
     queue.replace([BAD, A])
-    assert queue.begin_next() == TrialRefusal(BAD.token, "out of reach")
+    assert queue.begin_next() == TrialRefusal(BAD.trial, "out of reach")
     assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0], 1)
 
@@ -105,7 +131,7 @@ def test_a_trial_that_cannot_begin_is_refused_and_the_next_one_begins() -> None:
 def test_a_trial_whose_episode_is_unusable_is_refused() -> None:
     queue, runner = queue_of(A, B)
     runner.yields = ThrowcollectError("not finite")
-    assert queue.hand_over() == TrialRefusal(A.token, "not finite")
+    assert queue.hand_over() == TrialRefusal(A.trial, "not finite")
     assert queue.begin_next() is None
     assert runner.begun == [0, 1]
 

@@ -11,7 +11,7 @@ from throwcollect.trial import conditions
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 
 CONFIG = Config()
-WANTED = Conditions("build", "settings", {"ball.mass_kg": 0.05}, "trajectory", "token")
+WANTED = Conditions("build", "settings", {"ball.mass_kg": 0.05}, "trajectory")
 WITHOUT_EFFECT = {
     "sim.real_time_factor": 2.0,
     "record.trials_per_shard": 7,
@@ -37,7 +37,6 @@ def test_malformed_conditions_are_refused(text: str) -> None:
     ("changes", "said"),
     [
         ({}, []),
-        ({"lease": ""}, ["it was not simulated for this lease"]),
         ({"build": "x"}, ["its sources, its physics engine or its robot model are not those of the coordinator"]),
         ({"settings": "x"}, ["its configuration is another one"]),
         ({"values": {"ball.mass_kg": 0.06}}, ["ball.mass_kg was 0.06, not 0.05"]),
