@@ -42,6 +42,9 @@ _SETTINGS = {
     # All subscribers of rmw_zenoh_cpp are advanced ones, which order samples by the time stamps of the session.
     "timestamping/enabled": True,
     "queries_default_timeout": 600_000,
+    # Of a connection that is silent for this long [ms], both ends take leave; it is 10 s by default, which a router with
+    # 64 sessions on a busy machine exceeds. A machine that vanishes without a word is noticed as late.
+    "transport/link/tx/lease": 60_000,
 }
 
 
