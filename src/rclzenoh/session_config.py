@@ -42,8 +42,8 @@ _SETTINGS = {
     # All subscribers of rmw_zenoh_cpp are advanced ones, which order samples by the time stamps of the session.
     "timestamping/enabled": True,
     "queries_default_timeout": 600_000,
-    # Of a connection that is silent for this long [ms], both ends take leave; it is 10 s by default, which a router with
-    # 64 sessions on a busy machine exceeds. A machine that vanishes without a word is noticed as late.
+    # A silent connection is closed after this time [ms]. On a busy machine, a router with 64 sessions takes longer than
+    # the default of 10 s. A machine that vanishes without closing its connections is noticed this late.
     "transport/link/tx/lease": 60_000,
 }
 
