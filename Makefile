@@ -95,12 +95,6 @@ test: $(READY_DEV)
 test-ros-client: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/rclzenoh tests/contract tests/unit/ros tests/unit/cli/ros
 
-# Most tests below have several processes that wait for one another, so a busy machine can come between. What fails is run once
-# more, after all others; the first failure stays in the log. Each group remembers its own failures.
-define twice
-$(1) -o cache_dir=.pytest_cache/$@ || $(1) -o cache_dir=.pytest_cache/$@ --last-failed --last-failed-no-failures none
-endef
-
 # Each group is one process: several of pytest-xdist would each find and import the tests of all groups. There are three groups, so
 # that two cores have something to do while a test waits, for a client that never reads or for a pause.
 DATA := $(addprefix tests/unit/,coordinator dataset)
@@ -108,14 +102,14 @@ FACES := $(addprefix tests/unit/,cli derive export learning report runs serve vi
 test-units: test-units-of-data test-units-of-faces test-units-of-nodes
 
 test-units-of-data:
-	$(call twice,$(BIN)/python -m pytest $(DATA))
+	$(BIN)/python -m pytest $(DATA)
 
 test-units-of-faces:
-	$(call twice,$(BIN)/python -m pytest $(FACES))
+	$(BIN)/python -m pytest $(FACES)
 
 test-units-of-nodes:
-	$(call twice,$(BIN)/python -m pytest tests/unit tests/install tests/rclzenoh tests/contract tests/physics \
-	    $(addprefix --ignore=,$(DATA) $(FACES)))
+	$(BIN)/python -m pytest tests/unit tests/install tests/rclzenoh tests/contract tests/physics \
+	    $(addprefix --ignore=,$(DATA) $(FACES))
 
 wait-for-image:
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
@@ -125,26 +119,26 @@ WITH_ENGINE := tests/ros/test_containers.py
 
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
 test-ros: ros
-	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE))
+	$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE)
 
 # Tests of runs in containers look at all runs that are on the engine, so one by one; also those on genuine rclpy.
 test-containers: ros wait-for-image
-	$(call twice,$(BIN)/python -m pytest tests/docker $(addprefix --ignore=,$(WITHOUT_RUNS)))
-	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))
+	$(BIN)/python -m pytest tests/docker $(addprefix --ignore=,$(WITHOUT_RUNS))
+	$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE)
 
 # What starts no run on the engine need not wait for those tests: the image itself, and Compose, which knows no runs.
 WITHOUT_RUNS := $(addprefix tests/docker/,test_compose.py test_image.py)
 test-image: wait-for-image
-	$(call twice,$(BIN)/python -m pytest $(WITHOUT_RUNS))
+	$(BIN)/python -m pytest $(WITHOUT_RUNS)
 
 # Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both processes have
 # something to do until then.
 test-processes: wait-for-image
-	$(call twice,$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
 test-cluster: wait-for-image
-	$(call twice,$(BIN)/python -m pytest tests/cluster)
+	$(BIN)/python -m pytest tests/cluster
 
 # Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.
 check: check-format check-types check-imports check-house

@@ -29,11 +29,7 @@ class Attachment(NamedTuple):
 
 
 def unpack(data: bytes) -> Attachment:
-    """Attachment from its bytes.
-
-    Raises:
-        ValueError: If the data does not have the layout of an attachment.
-    """
+    """Attachment from its bytes."""
     if len(data) != _LAYOUT.size or data[16] != GID_LENGTH:
         raise ValueError(f"attachment of {len(data)} bytes is not that of a ROS 2 Jazzy node")
     sequence, timestamp, _, gid = _LAYOUT.unpack(data)

@@ -75,9 +75,6 @@ class Endpoint:
         On the wire, numbers stand for keys, and each link has its own. When a session replaces a lost link, a router
         of Zenoh 1.10 may take the new link for one more of the old connection, until it has closed that. Meanwhile it
         uses the numbers of the old link, which stand for other keys of the session now.
-
-        Raises:
-            ValueError: If the sender names another key; one of rmw_zenoh_cpp names none.
         """
         if encoding is not None and encoding != self.encoding and str(encoding).startswith(_ENCODING):
             raise ValueError(

@@ -117,11 +117,7 @@ def parse_token(key: str) -> Token | None:
 
 
 def read_natural(text: str) -> int:
-    """Read a number from 0 on, as it stands in tokens.
-
-    Raises:
-        ValueError: If the text is no such number, or has more digits than a 64-bit number.
-    """
+    """Read a number from 0 on, as it stands in tokens."""
     # `int` alone would accept signs, blanks and underscores, too.
     if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
         raise ValueError(f"{text!r:.40} is no number")

@@ -12,12 +12,7 @@ _ABSOLUTE = re.compile(rf"(/{_PART})+")
 
 
 def check_node_name(name: str) -> None:
-    """Refuse a name without namespace that no node can have.
-
-    Raises:
-        NameValidationException: If it has other characters than letters, digits and underscores, or begins with
-            a digit.
-    """
+    """Refuse a name without namespace that no node can have."""
     if not _NODE.fullmatch(name):
         raise NameValidationException(
             f"invalid node name {name!r}", expected="letters, digits and underscores, not beginning with a digit"
@@ -25,11 +20,7 @@ def check_node_name(name: str) -> None:
 
 
 def absolute_namespace(namespace: str) -> str:
-    """Namespace with its leading slash, whether it was given absolute, relative or empty.
-
-    Raises:
-        NameValidationException: If it is not made of valid names.
-    """
+    """Namespace with its leading slash, whether it was given absolute, relative or empty."""
     absolute = "/" + namespace.removeprefix("/")
     if absolute != "/" and not _ABSOLUTE.fullmatch(absolute):
         raise NameValidationException(f"invalid namespace {namespace!r}", expected="names separated by single slashes")
@@ -42,11 +33,7 @@ def join(namespace: str, name: str) -> str:
 
 
 def resolve(name: str, namespace: str, node: str) -> str:
-    """Absolute name of a topic or service that a node in a namespace calls ``/x``, ``x`` or ``~/x``.
-
-    Raises:
-        NameValidationException: If the result is no valid name.
-    """
+    """Absolute name of a topic or service that a node in a namespace calls ``/x``, ``x`` or ``~/x``."""
     if name.startswith("/"):
         absolute = name
     elif name == "~" or name.startswith("~/"):

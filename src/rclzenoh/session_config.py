@@ -62,11 +62,7 @@ class Key:
 
 
 def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
-    """Configuration of a client of a router, regardless of the environment; a router at ``tls/...`` needs the key.
-
-    Raises:
-        ConfigurationError: If the endpoint is malformed, or the key cannot be read.
-    """
+    """Configuration of a client of a router, regardless of the environment; a router at ``tls/...`` needs the key."""
     config = zenoh.Config()
     _apply(config, {**_make_client_settings(endpoint, key), **_SETTINGS}, "endpoint")
     _check_key(config)
@@ -74,11 +70,7 @@ def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
 
 
 def environment_config() -> zenoh.Config:
-    """Configuration that the environment asks for; by default, that of a client of the router on this host.
-
-    Raises:
-        ConfigurationError: If an environment variable has a wrong value, or the key cannot be read.
-    """
+    """Configuration that the environment asks for; by default, that of a client of the router on this host."""
     path = os.environ.get(CONFIG_FILE_VARIABLE)
     if path:
         try:
@@ -102,11 +94,7 @@ def environment_config() -> zenoh.Config:
 
 
 def connect_endpoint() -> str | None:
-    """Endpoint of the router that the environment names; None if it names none.
-
-    Raises:
-        ConfigurationError: As `environment_config`.
-    """
+    """Endpoint of the router that the environment names; None if it names none."""
     if not (os.environ.get(OVERRIDE_VARIABLE) or os.environ.get(CONFIG_FILE_VARIABLE)):
         return None
     endpoints = _read_endpoints(environment_config(), "connect")
@@ -118,9 +106,6 @@ def is_protected(listens: Sequence[str] = ()) -> bool:
 
     Args:
         listens: Endpoints at which a client listens if the environment sets none; our own clients listen nowhere.
-
-    Raises:
-        ConfigurationError: As `environment_config`.
     """
     config = environment_config()
     routers = _read_endpoints(config, "connect")
@@ -136,11 +121,7 @@ def client_override(endpoint: str, key: Key | None = None) -> str:
 
 
 def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
-    """Configuration of a router that listens on one endpoint; at ``tls/...`` it lets nobody in without the key.
-
-    Raises:
-        ConfigurationError: If the endpoint is malformed, or the key cannot be read.
-    """
+    """Configuration of a router that listens on one endpoint; at ``tls/...`` it lets nobody in without the key."""
     config = zenoh.Config()
     _apply(config, {"mode": "router", "listen/endpoints": [endpoint], **_SETTINGS}, "listen endpoint")
     if endpoint.startswith(PROTECTED) and key is not None:
@@ -176,11 +157,7 @@ def _make_tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[
 
 
 def _check_key(config: zenoh.Config) -> None:
-    """Refuse a key that cannot be read, because Zenoh's own error would only say that it cannot connect.
-
-    Raises:
-        UnreadableKeyError: If one of its files cannot be read.
-    """
+    """Refuse a key that cannot be read, because Zenoh's own error would only say that it cannot connect."""
     sided = [f"{side}_{name}" for name in ("private_key", "certificate") for side in ("connect", "listen")]
     for name in (*sided, "root_ca_certificate"):
         if path := json.loads(config.get_json(f"{_TLS}/{name}")):

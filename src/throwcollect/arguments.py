@@ -43,9 +43,6 @@ def check_list(argument: str, given: object, of: str, *, texts: bool = False) ->
         given: Its value; an iterator is not used up.
         of: What the list should hold, such as ``names``.
         texts: Whether the list should hold texts; if a single text is given, the message then shows it in a list.
-
-    Raises:
-        ConfigError: If the value is a text or a mapping, or cannot be iterated over.
     """
     kind = "a text" if isinstance(given, str | bytes) else "a mapping" if isinstance(given, Mapping) else None
     if kind is None:
@@ -59,11 +56,7 @@ def check_list(argument: str, given: object, of: str, *, texts: bool = False) ->
 
 
 def read_list(argument: str, given: Any, of: str, kinds: tuple[type, ...] = (str,)) -> tuple[Any, ...]:
-    """Read a list whose elements are of these kinds; see `check_list` for the other arguments.
-
-    Raises:
-        ConfigError: If the value is no list, or an element is of another kind.
-    """
+    """Read a list whose elements are of these kinds; see `check_list` for the other arguments."""
     check_list(argument, given, of, texts=str in kinds)
     elements = tuple(given)
     for each in elements:
@@ -73,11 +66,7 @@ def read_list(argument: str, given: Any, of: str, kinds: tuple[type, ...] = (str
 
 
 def check_mapping(argument: str, given: object, example: str) -> None:
-    """Refuse a value that does not map keys to values; `example` shows what is right.
-
-    Raises:
-        ConfigError: If the value is no mapping, or a key in it is no text.
-    """
+    """Refuse a value that does not map keys to values; `example` shows what is right."""
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
         raise refuse_argument(argument, f"got {show_value(given)}", expected=f"a mapping, such as {example}")
 
@@ -88,11 +77,7 @@ def is_whole(given: object) -> bool:
 
 
 def check_whole_number(argument: str, given: Any, *, least: int, most: int | None = None) -> None:
-    """Refuse a value that is not a whole number from `least` to `most`; None for no upper bound.
-
-    Raises:
-        ConfigError: If the value is not such a number.
-    """
+    """Refuse a value that is not a whole number from `least` to `most`; None for no upper bound."""
     whole = is_whole(given)
     if not whole or given < least or (most is not None and given > most):
         bounds = f"{least} or more" if most is None else f"{least} to {most}"
@@ -115,11 +100,7 @@ def as_float(given: Any) -> float:
 
 
 def read_path(argument: str, given: Any) -> Path:
-    """Read the path of a file or a directory.
-
-    Raises:
-        ConfigError: If the value is no path, or no file can have this name.
-    """
+    """Read the path of a file or a directory."""
     path = os.fspath(given) if isinstance(given, str | os.PathLike) else None
     if not isinstance(path, str):
         raise refuse_argument(argument, f"got {show_value(given)}", expected="a path, as text or a Path")
@@ -133,11 +114,7 @@ def read_path(argument: str, given: Any) -> Path:
 
 
 def read_word(argument: str, given: str, words: type[_Word]) -> _Word:
-    """Find the member of an enumeration that a word stands for.
-
-    Raises:
-        ConfigError: If there is no such member.
-    """
+    """Find the member of an enumeration that a word stands for."""
     try:
         return words(given)
     except ValueError:

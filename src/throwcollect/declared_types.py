@@ -19,9 +19,6 @@ def check_type(name: str, value: object, declared: Any) -> None:
         name: Name of the value in messages; empty if the names of its fields are enough.
         value: The value.
         declared: The type.
-
-    Raises:
-        TypeError: If anything is of another type; the message says where, and what would be right.
     """
     # Most processes use no other package, and need not spend the time of this import.
     from pydantic import ValidationError
@@ -36,11 +33,7 @@ def check_type(name: str, value: object, declared: Any) -> None:
 
 
 def check_properties(value: object, kind: type) -> None:
-    """Make sure that the properties that a kind of parts declares are of their types in a value of that kind.
-
-    Raises:
-        TypeError: If one is of another type.
-    """
+    """Make sure that the properties that a kind of parts declares are of their types in a value of that kind."""
     for name, described in vars(kind).items():
         if isinstance(described, property):
             check_type(name, getattr(value, name), get_type_hints(described.fget, include_extras=True)["return"])

@@ -33,10 +33,6 @@ PACKAGES = MappingProxyType(
 
 
 def require_engine(name: str) -> None:
-    """Check that the package of an engine is installed, before anything begins.
-
-    Raises:
-        MissingExtraError: If the package is not installed.
-    """
+    """Check that the package of an engine is installed, before anything begins."""
     if name in PACKAGES:
         require(PACKAGES[name].module)

@@ -118,9 +118,6 @@ def require(*packages: str, extra: str | None = None) -> None:
     """Check that packages, by their names in imports, are installed, before anything begins.
 
     The error names `extra`, or else the extra in `EXTRA_OF`.
-
-    Raises:
-        MissingExtraError: If a package is not installed; it names the first one.
     """
     for package in packages:
         if not is_installed(package):
@@ -129,11 +126,7 @@ def require(*packages: str, extra: str | None = None) -> None:
 
 @contextmanager
 def explain_missing(extra: str | None = None) -> Iterator[None]:
-    """Turn a failed import in the block into an error that names `extra`, or else the extra in `EXTRA_OF`.
-
-    Raises:
-        MissingExtraError: If a package that an extra brings is not installed.
-    """
+    """Turn a failed import in the block into an error that names `extra`, or else the extra in `EXTRA_OF`."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -81,11 +81,7 @@ def suggest_path(path: Path) -> str:
 
 
 def recognise(path: Path) -> str:
-    """Say what a file is that should be text, by the bytes that it begins with; empty if it may be text.
-
-    Raises:
-        OSError: If the file cannot be read.
-    """
+    """Say what a file is that should be text, by the bytes that it begins with; empty if it may be text."""
     with path.open("rb") as file:
         head = file.read(_POINTER_BYTES)
     for beginning, kind in _BEGINNINGS.items():
@@ -95,11 +91,7 @@ def recognise(path: Path) -> str:
 
 
 def refuse_pointers(directory: Path) -> None:
-    """Refuse a directory in which Git LFS has put pointers in the place of files.
-
-    Raises:
-        DatasetError: If it has one, or cannot be read.
-    """
+    """Refuse a directory in which Git LFS has put pointers in the place of files."""
     try:
         for path in directory.iterdir():
             status = path.lstat()
@@ -117,9 +109,6 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = N
         path: The file; only its name if `folder` is given.
         flags: As for `os.open`. A file that is opened for writing must have no other name.
         folder: Descriptor of the file's directory; None if the directory is in `path`.
-
-    Raises:
-        OSError: If the file cannot be opened; see `unwritable` and `unreadable`.
     """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666, dir_fd=folder)
     # The open file is examined, because its name may stand for another file by now.
@@ -137,9 +126,6 @@ def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) ->
     """Open a file in a folder of its own, such as ``logs``, which must not be a link.
 
     The flags are as for `open_regular`. With ``os.O_CREAT`` among them, file and folder are made if they are missing.
-
-    Raises:
-        OSError: If the file cannot be opened, or the folder cannot be made.
     """
     if path.parent.is_symlink():
         raise OSError(errno.ELOOP, _REASONS[errno.ELOOP], str(path.parent))
@@ -158,11 +144,7 @@ def is_there(path: Path) -> bool:
 
 
 def check_regular(path: Path) -> None:
-    """Refuse a link, a pipe or a directory before another library opens a file; the library reports all other errors.
-
-    Raises:
-        DatasetError: If something other than a regular file has the name.
-    """
+    """Reject links, pipes and directories before another library opens a file; it reports all other errors."""
     try:
         os.close(open_regular(path))
     except OSError as error:
@@ -179,9 +161,6 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
 
     Yields:
         File descriptor to write to.
-
-    Raises:
-        OSError: If the file cannot be written, or another process writes it at the same time.
     """
     new = path.with_name(f"{path.name}.new")
     new.unlink(missing_ok=True)
@@ -218,9 +197,6 @@ def replacing(path: Path) -> Iterator[int]:
 
     Yields:
         File descriptor to write to.
-
-    Raises:
-        DatasetError: If the file cannot be written.
     """
     try:
         with beside(path) as descriptor:
@@ -241,10 +217,6 @@ def new_directory(path: Path) -> Iterator[Path]:
 
     Yields:
         A directory in a hidden one beside `path`, to write into meanwhile.
-
-    Raises:
-        ConfigError: If something is in its place already.
-        DatasetError: If the directory cannot be written.
     """
     try:
         if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
@@ -281,11 +253,7 @@ def new_directory(path: Path) -> Iterator[Path]:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, if it exists.
-
-    Raises:
-        DatasetError: If it cannot be removed.
-    """
+    """Remove a file, if it exists."""
     try:
         path.unlink(missing_ok=True)
     except OSError as error:
@@ -293,11 +261,7 @@ def remove(path: Path) -> None:
 
 
 def sync_directory(directory: Path) -> None:
-    """Make the names in a directory survive a power cut.
-
-    Raises:
-        OSError: If the directory cannot be opened or synchronised.
-    """
+    """Make the names in a directory survive a power cut."""
     descriptor = os.open(directory, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -306,22 +270,14 @@ def sync_directory(directory: Path) -> None:
 
 
 def write_all(descriptor: int, data: bytes | bytearray) -> None:
-    """Write all bytes; `os.write` may write only some of them at a time.
-
-    Raises:
-        OSError: If the system cannot write all bytes.
-    """
+    """Write all bytes; `os.write` may write only some of them at a time."""
     view = memoryview(data)
     while view:
         view = view[os.write(descriptor, view) :]
 
 
 def read_text(path: Path, *, most_bytes: int) -> str:
-    """Read a regular file as UTF-8 text.
-
-    Raises:
-        DatasetError: If the file is missing, no regular file, no UTF-8 text, or larger than `most_bytes`.
-    """
+    """Read a regular file as UTF-8 text."""
     try:
         with open(open_regular(path), "rb") as file:
             # One byte more than allowed shows that the file is too large, however large it is.
@@ -336,21 +292,13 @@ def read_text(path: Path, *, most_bytes: int) -> str:
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write a whole file at once, in place of any file of that name.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write a whole file at once, in place of any file of that name."""
     with replacing(path) as descriptor:
         write_all(descriptor, data)
 
 
 def write_secret(path: Path, data: bytes) -> None:
-    """Write a file that only its owner can read, whole or not at all.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write a file that only its owner can read, whole or not at all."""
     try:
         # The permissions are set when the file is made, so others can read it at no moment.
         with beside(path, mode=0o600) as descriptor:

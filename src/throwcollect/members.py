@@ -94,11 +94,6 @@ def load_member(family: str, name: str) -> Any:
 
     Returns:
         A `Robot` or an `Exporter`; the class of an engine or a runtime; for a tool or a task, the class of its section.
-
-    Raises:
-        KeyError: If the family has no such member.
-        ConfigError: If the member comes from another package, and cannot be imported or does not fit the family.
-        ImportError: If the member is our own, and a package that it needs cannot be imported.
     """
     entry = _find_members()[family][name]
     if is_own(family, name):
@@ -154,11 +149,7 @@ def list_origins(family: str, name: str) -> list[str]:
 
 
 def load_part(family: str, name: str, path: str, kind: type | None = None) -> Any:
-    """Import the object ``module:name`` that a member names; of a given kind, it has to be a complete class.
-
-    Raises:
-        ConfigError: If the member comes from another package, and the object cannot be imported or is not of this kind.
-    """
+    """Import the object ``module:name`` that a member names; of a given kind, it has to be a complete class."""
     if is_own(family, name):
         return _load_own(path)
     where = f"{_describe(family, name)}: {path}"
@@ -180,9 +171,6 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
         name: Name of the member.
         doing: What the member was asked to do, such as ``judge trial 3``.
         passing: Types of errors to let through.
-
-    Raises:
-        MemberError: If the block raises another error, which was not raised on purpose.
     """
     if is_own(family, name):
         yield
@@ -216,11 +204,7 @@ def _load_own(path: str) -> Any:
 
 
 def _import(path: str, what: str) -> Any:
-    """Import ``module:name`` of another package; the message of an error begins with `what`.
-
-    Raises:
-        ConfigError: If the object cannot be imported.
-    """
+    """Import ``module:name`` of another package; the message of an error begins with `what`."""
     try:
         with explain_missing():
             return _load(path)
@@ -232,11 +216,7 @@ def _import(path: str, what: str) -> Any:
 
 
 def _check(where: str, value: object, declared: Any) -> None:
-    """Make sure that a value of another package is of the type that is declared for it, and all that it contains.
-
-    Raises:
-        ConfigError: If it is not.
-    """
+    """Make sure that a value of another package is of the type that is declared for it, and all that it contains."""
     try:
         check_type(where, value, declared)
     except TypeError as error:
@@ -244,11 +224,7 @@ def _check(where: str, value: object, declared: Any) -> None:
 
 
 def _check_class(where: str, found: Any, kind: type) -> None:
-    """Make sure that an object of another package is a class derived from a kind, and lacks nothing.
-
-    Raises:
-        ConfigError: If the object is anything else.
-    """
+    """Make sure that an object of another package is a class derived from a kind, and lacks nothing."""
     if not (isinstance(found, type) and issubclass(found, kind)):
         raise ConfigError(f"{where} should be a class derived from {kind.__module__}.{kind.__name__}, is {found!r}")
     # A class variable that is declared without a value has to be set by each derived class.

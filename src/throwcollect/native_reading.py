@@ -42,9 +42,6 @@ def reading_natively(what: str) -> Iterator[None]:
 
     Args:
         what: What the library reads, such as the path of a file.
-
-    Raises:
-        ConfigError: If it complains.
     """
     flush = _LIBC.fflush
     with _lock, tempfile.TemporaryFile() as printed:

@@ -30,9 +30,6 @@ def make_own_directory(prefix: str, parent: Path | None = None) -> Iterator[Path
 
     Yields:
         The directory; it is removed after the block.
-
-    Raises:
-        OSError: If it cannot be made.
     """
     path = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
     try:
@@ -58,11 +55,7 @@ def _remove_abandoned(directory: Path) -> None:
 
 @contextmanager
 def _hold(directory: Path) -> Iterator[None]:
-    """Hold the lock of a directory.
-
-    Raises:
-        OSError: If the path is no directory, another process holds the lock, or the file system has no locks.
-    """
+    """Hold the lock of a directory."""
     # Everybody may write to /tmp, so somebody may have put a link at this path, to a directory of this user.
     descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:

@@ -27,30 +27,17 @@ def _map_each(function: Callable[..., float], values: Array, *others: Iterable[f
 
 
 def exp(values: Array) -> Array:
-    """Compute the exponential of each value.
-
-    Raises:
-        OverflowError: If a result is too large.
-    """
+    """Compute the exponential of each value."""
     return _map_each(math.exp, values)
 
 
 def log(values: Array) -> Array:
-    """Compute the natural logarithm of each value.
-
-    Raises:
-        ValueError: If a value is not above 0.
-    """
+    """Compute the natural logarithm of each value."""
     return _map_each(math.log, values)
 
 
 def power(bases: Array, exponent: float) -> Array:
-    """Raise each base to the power of one exponent.
-
-    Raises:
-        ValueError: If a base is 0 and the exponent negative, or a base negative and the exponent not whole.
-        OverflowError: If a result is too large.
-    """
+    """Raise each base to the power of one exponent."""
     return _map_each(math.pow, bases, repeat(exponent))
 
 

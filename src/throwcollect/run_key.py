@@ -57,21 +57,13 @@ class RunKey:
         return cls(Path(named).absolute()) if named else None
 
     def check(self) -> None:
-        """Check that this process can read the key.
-
-        Raises:
-            ConfigError: If a file of the key is missing, or cannot be read.
-        """
+        """Check that this process can read the key."""
         for path in (self.private_key, self.certificate):
             _read(path)
 
     @property
     def secret(self) -> bytes:
-        """The 32 bytes from which another machine can make the key again.
-
-        Raises:
-            ConfigError: If the private key cannot be read.
-        """
+        """The 32 bytes from which another machine can make the key again."""
         from cryptography.hazmat.primitives.asymmetric import ec
         from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
@@ -84,9 +76,6 @@ class RunKey:
         """Make a new key in a directory that need not exist; given a secret, make the key of another machine again.
 
         A key that is made again has another certificate, but nodes trust it, because they check only who signed it.
-
-        Raises:
-            ConfigError: If the files cannot be written, or no key has this secret.
         """
         private_key, certificate = _make_pair(secret)
         try:
@@ -112,21 +101,13 @@ class Signer:
 
     @classmethod
     def of_environment(cls) -> Signer:
-        """Make the signer of the run that this process belongs to.
-
-        Raises:
-            ConfigError: If the environment names a key that cannot be read.
-        """
+        """Make the signer of the run that this process belongs to."""
         key = RunKey.of_environment()
         return cls(b"") if key is None else cls.of_key(key)
 
     @classmethod
     def of_key(cls, key: RunKey) -> Signer:
-        """Make the signer of the run with a key.
-
-        Raises:
-            ConfigError: If the key cannot be read.
-        """
+        """Make the signer of the run with a key."""
         # The purpose is hashed, too, so that this secret differs from any other that is made from the key.
         return cls(hashlib.sha256(_PURPOSE + _read(key.private_key)).digest())
 
@@ -159,11 +140,7 @@ def _read(path: Path) -> bytes:
 
 
 def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
-    """Make a private key and its self-signed certificate, both in PEM.
-
-    Raises:
-        ConfigError: If no key has this secret.
-    """
+    """Make a private key and its self-signed certificate, both in PEM."""
     # Imported here, because only the process that makes a key needs it.
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization

@@ -77,10 +77,6 @@ def working_side_by_side(
 
     Yields:
         The results, in the order of the pieces.
-
-    Raises:
-        WorkerError: If a process is killed.
-        ThrowcollectError: If a piece has raised it, when it is the turn of the piece's result.
     """
     # Imported here, because most commands need neither.
     import multiprocessing

@@ -212,11 +212,7 @@ class Simulator:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Keep other threads of this process from the simulator.
-
-        Raises:
-            ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
-        """
+        """Keep other threads of this process from the simulator."""
         # That thread does not exist here, so it never releases the lock, and the world may be in the middle of a step.
         if not self._lock.acquire(timeout=-1 if self._holder == os.getpid() else _FORKED_S):
             raise ConflictError(
@@ -229,11 +225,7 @@ class Simulator:
             self._lock.release()
 
     def _require_open(self) -> None:
-        """Refuse to simulate after `close`.
-
-        Raises:
-            ConflictError: If the simulator is closed.
-        """
+        """Refuse to simulate after `close`."""
         if not self._replayer.close.alive:
             raise ConflictError("this simulator is closed", hint="make another Simulator")
 
@@ -251,11 +243,7 @@ class Simulator:
 
 
 def _check_that_it_can_be_sent(index: int, point: object) -> None:
-    """Refuse a point of a list that cannot be sent to another process.
-
-    Raises:
-        ConfigError: If it cannot.
-    """
+    """Refuse a point of a list that cannot be sent to another process."""
     try:
         pickle.dumps(point)
     except Exception as error:

@@ -19,10 +19,6 @@ def state_directory() -> Path:
     """Path of the directory, which is made if it does not exist.
 
     By default it lies in the directory for temporary files, because ``XDG_RUNTIME_DIR`` vanishes at the last logout.
-
-    Raises:
-        ConfigError: If the directory cannot be made, its path is not UTF-8, another user owns it, or others may write
-            there.
     """
     named = os.environ.get(STATE_VARIABLE)
     try:

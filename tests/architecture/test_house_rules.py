@@ -17,6 +17,8 @@ LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
 LONGEST_TEST = 500
 """Most lines of a module of tests; longer modules had several subjects."""
+CEILING = 65_516
+"""Most lines of Python in `src`. Every commit that deletes lowers it; see CONTRIBUTING.md for what may be added."""
 
 
 def name(path: Path) -> str:
@@ -43,6 +45,10 @@ def offences(path: Path, text: str) -> Iterator[str]:
         yield "has an unfinished place"
 
 
+def test_the_source_does_not_grow() -> None:
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES) <= CEILING
+
+
 def test_modules_keep_the_rules() -> None:
     found = {name(path): list(offences(path, path.read_text(encoding="utf-8"))) for path in MODULES}
     assert {path: each for path, each in found.items() if each} == {}
@@ -58,46 +64,6 @@ def test_the_rules_find_each_offence_of_a_module() -> None:
         "imports tests",
         "has an unfinished place",
     ]
-
-
-KINDS_OF_MEMBERS = (SOURCE / "engines", SOURCE / "tasks", SOURCE / "tools")
-"""Folders whose folders are members of one kind; these may have modules of the same names."""
-
-
-def search_repeated(paths: list[Path]) -> set[str]:
-    """Search for names that several modules have, so that nobody can find one of them by its name alone."""
-    places: dict[str, set[Path]] = {}
-    for path in (path for path in paths if path.name != "__init__.py"):
-        member = path.parent.parent in KINDS_OF_MEMBERS
-        places.setdefault(path.name, set()).add(path.parent.parent if member else path)
-    return {name for name, each in places.items() if len(each) > 1}
-
-
-def search_repeated_classes(trees: dict[str, ast.Module]) -> set[str]:
-    """Search for names that public classes of several modules have."""
-    classes = [
-        node.name
-        for tree in trees.values()
-        for node in tree.body
-        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
-    ]
-    return {each for each in classes if classes.count(each) > 1}
-
-
-def test_no_two_modules_or_classes_share_a_name() -> None:
-    """The ROS client is left out: it has the names of rclpy, some of which throwcollect uses, too."""
-    paths = sorted(SOURCE.rglob("*.py"))
-    assert search_repeated(paths) == set()
-    assert search_repeated_classes({name(path): parse(path.read_text(encoding="utf-8")) for path in paths}) == set()
-
-
-def test_the_rule_about_names_finds_repeated_modules_and_classes() -> None:
-    engines = SOURCE / "engines"
-    alike = [engines / "bullet" / "bodies.py", engines / "mujoco" / "bodies.py", SOURCE / "__init__.py"]
-    assert search_repeated(alike) == set()
-    assert search_repeated([*alike, SOURCE / "sim" / "bodies.py"]) == {"bodies.py"}
-    classes = {"a": parse("class Found: ...\nclass _Own: ..."), "b": parse("class Found: ...\nclass _Own: ...")}
-    assert search_repeated_classes(classes) == {"Found"}
 
 
 def test_modules_of_tests_are_not_too_long() -> None:
@@ -130,23 +96,6 @@ def test_the_rule_about_names_of_test_files_compares_whole_paths() -> None:
     assert is_named_after_a_module(UNITS / "sweep" / "test_plan.py")
     assert is_named_after_a_module(UNITS / "test_simulator.py")
     assert not is_named_after_a_module(UNITS / "config" / "test_plan.py")
-
-
-PRONOUNS = r"its?|they|their|that|this|these|those|what\w*|which|who\w*|one_(?:that|of|who\w*)"
-WITHOUT_SUBJECT = re.compile(rf"def (test_(?:{PRONOUNS})_\w+|test_[a-z0-9]+)\(")
-"""The name of a test that begins with a pronoun, or is one word, does not say what failed."""
-
-
-def test_names_of_tests_begin_with_their_subject() -> None:
-    sources = sorted((ROOT / "tests").rglob("*.py"))
-    found = {name.name: WITHOUT_SUBJECT.findall(name.read_text(encoding="utf-8")) for name in sources}
-    assert {name: names for name, names in found.items() if names} == {}
-
-
-def test_the_rule_about_subjects_finds_pronouns_and_single_words() -> None:
-    for wrong in ("test_it_is_read", "test_what_is_missing_is_named", "test_one_that_died_is_seen", "test_chaos"):
-        assert WITHOUT_SUBJECT.findall(f"def {wrong}(") == [wrong]
-    assert not WITHOUT_SUBJECT.findall("def test_one_ready_simulation_is_enough(")
 
 
 CLOCK_OF_ALL = re.compile(r"""setattr\((?:\w+\.)*time, ["']|setattr\(["']time\.""")

@@ -78,11 +78,7 @@ _COMPLETE: set[str] = set()
 
 
 def structure(name: str) -> Structure:
-    """Constants and fields of a structure, such as ``sensor_msgs/msg/JointState`` or ``std_srvs/srv/Trigger_Response``.
-
-    Raises:
-        ValueError: If no such structure is known.
-    """
+    """Constants and fields of a structure: ``sensor_msgs/msg/JointState`` or ``std_srvs/srv/Trigger_Response``."""
     _require(name)
     constants, fields = _FIELDDEFS[name]
     defaults = _DEFAULTS.get(name, {})
@@ -98,11 +94,7 @@ def structure(name: str) -> Structure:
 
 @cache
 def type_hash(name: str) -> str:
-    """Type hash (REP 2016) of a message, service, action or a part of one: ``RIHS01_`` and 64 hexadecimal digits.
-
-    Raises:
-        ValueError: If no such interface is known.
-    """
+    """Type hash (REP 2016) of a message, service, action or a part of one: ``RIHS01_`` and 64 hexadecimal digits."""
     _require(name)
     return _STORE.hash_rihs01(name)
 
@@ -113,9 +105,6 @@ def message_definition(name: str) -> str:
 
     The definition of the message comes first, then those of its dependencies, each after a line of 80 ``=`` and
     ``MSG: <name>``.
-
-    Raises:
-        ValueError: If no such message is known; parts of services and actions are no messages.
     """
     _require(name)
     if "/msg/" not in name:
@@ -139,11 +128,7 @@ def _make_field(name: str, description: tuple[Nodetype, Any], default: Default |
 
 
 def _require(name: str) -> None:
-    """Read the definitions of ``name`` and of everything it refers to, unless they have been read before.
-
-    Raises:
-        ValueError: If there is no such interface.
-    """
+    """Read the definitions of ``name`` and of everything it refers to, unless they have been read before."""
     if name in _COMPLETE:
         return
     package, _, rest = name.partition("/")

@@ -13,12 +13,7 @@ _M = TypeVar("_M", bound=Message)
 
 
 def serialize(message: Message) -> bytes:
-    """Little-endian CDR of a message, with the encapsulation header.
-
-    Raises:
-        TypeError: If a field holds something that is not of its type.
-        ValueError: If a number does not fit its type, or an array has the wrong length.
-    """
+    """Little-endian CDR of a message, with the encapsulation header."""
     try:
         return bytes(encoder(message.TYPE)(message))
     except (AttributeError, TypeError) as error:
@@ -32,9 +27,6 @@ def deserialize(data: bytes, message_class: type[_M]) -> _M:
 
     The message shares no memory with ``data``, and its number sequences may be changed. Bytes after the message are
     ignored: rmw_serialize gives as many bytes as the message might take, and programs publish all of them.
-
-    Raises:
-        ValueError: If the data is malformed or too short.
     """
     name = message_class.TYPE
     # Only the first two bytes of the header name the encoding. The others are options (DDSI-RTPS, serialized payload).

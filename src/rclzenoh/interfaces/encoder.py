@@ -72,22 +72,14 @@ def _check_length(values: Sequence[Any], field: Field) -> None:
 
 
 def _check_bool(value: object) -> object:
-    """Refuse what is no truth value, as `struct` takes anything for one.
-
-    Raises:
-        TypeError: If it is none.
-    """
+    """Refuse what is no truth value, as `struct` takes anything for one."""
     if not isinstance(value, bool | np.bool_):
         raise TypeError(f"expected a bool, got {value!r}")
     return value
 
 
 def _check_list(values: Sequence[str]) -> tuple[str, ...]:
-    """Refuse a single string in place of a sequence, as its letters are strings, too.
-
-    Raises:
-        TypeError: If it is one.
-    """
+    """Refuse a single string in place of a sequence, as its letters are strings, too."""
     if isinstance(values, str):
         raise TypeError(f"expected a sequence of strings, got {values!r}")
     return tuple(values)

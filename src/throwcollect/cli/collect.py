@@ -111,11 +111,7 @@ def up(
 
 
 def _refuse_submitted(directory: Path) -> None:
-    """Refuse a dataset whose slices tasks of a cluster collect.
-
-    Raises:
-        ConfigError: If it is one.
-    """
+    """Refuse a dataset whose slices tasks of a cluster collect."""
     from throwcollect.cluster.submission import is_submitted, read_submission
 
     # A submission that is one run on several nodes goes on by the same command.

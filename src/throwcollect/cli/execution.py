@@ -72,10 +72,6 @@ def _check_surroundings() -> None:
     """Refuse a clock that records cannot hold, and a command line and a directory that names of files cannot hold.
 
     Processes of a run need no current directory, because they are given absolute paths. That of their user may be gone.
-
-    Raises:
-        ConfigError: If the clock is wrong, the current directory is gone, or it or a word of the command line is not
-            UTF-8.
     """
     try:
         is_dated = 0 <= time.time() < _CLOCK_END_S

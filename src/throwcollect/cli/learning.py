@@ -279,11 +279,7 @@ def _write_example(model: Model) -> str:
 
 
 def _read_target(text: str, names: Sequence[str]) -> list[float]:
-    """Read the numbers of an option --at, one for each name.
-
-    Raises:
-        ConfigError: If they are no numbers, or not as many as names.
-    """
+    """Read the numbers of an option --at, one for each name."""
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
@@ -294,12 +290,7 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
 
 
 def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Row]:
-    """Read the throws of a dataset that succeeded: the keys and the targets of each.
-
-    Raises:
-        ConfigError: If the dataset does not vary a key of the model, or is of another robot or task.
-        DatasetError: If the dataset is damaged.
-    """
+    """Read the throws of a dataset that succeeded: the keys and the targets of each."""
     from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.lists import Row
 

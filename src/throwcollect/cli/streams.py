@@ -130,10 +130,6 @@ def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -
     Args:
         reader_may_leave: Whether output may be lost because its reader has ended, as `head` does.
         hint: How the user gets the output that was lost.
-
-    Raises:
-        OutputError: If output was lost.
-        ReaderGone: If the reader has ended, and the command should end with it.
     """
     sys.stdout.flush()
     stream = _find_standard_output()

@@ -38,11 +38,7 @@ class ClusterRun:
 
     @classmethod
     def open(cls, directory: Path) -> ClusterRun:
-        """Open the run of a dataset.
-
-        Raises:
-            ConfigError: If nothing was submitted for it.
-        """
+        """Open the run of a dataset."""
         return cls(directory, read_submission(directory))
 
     @cached_property
@@ -67,13 +63,7 @@ class ClusterRun:
         return tuple(job for each in self.submission.jobs for job in (each.array, each.join) if job)
 
     def look(self) -> SlicesLook:
-        """Look at the queue and the files.
-
-        Raises:
-            ConfigError: If there is no Slurm here.
-            WorkerError: If it does not answer.
-            DatasetError: If the directory cannot be read.
-        """
+        """Look at the queue and the files."""
         # Ask the queue before the files are read: a task puts its slice into place before it leaves the queue.
         queue = slurm.find_tasks()
         tasks: dict[int | None, ArrayTask] = {}
@@ -86,12 +76,7 @@ class ClusterRun:
         return SlicesLook(finished, tuple(tasks.values()), joining, complete)
 
     def stop(self) -> None:
-        """End all jobs: tasks shut down properly, and keep the episodes that they have.
-
-        Raises:
-            ConfigError: If there is no Slurm here.
-            WorkerError: If it does not answer.
-        """
+        """End all jobs: tasks shut down properly, and keep the episodes that they have."""
         slurm.cancel(self.jobs)
 
     def explain(self, look: SlicesLook) -> ThrowcollectError | None:
@@ -241,11 +226,6 @@ def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> It
 
     Yields:
         The state of the run; the last one is the state after its end, unless `keep_on` has returned False.
-
-    Raises:
-        ConfigError: If there is no Slurm here.
-        WorkerError: If it does not answer.
-        DatasetError: If the directory cannot be read.
     """
     while True:
         look = run.look()

@@ -20,11 +20,7 @@ def site_path() -> Path:
 
 
 def with_site(cluster: ClusterConfig) -> ClusterConfig:
-    """Complete the section `cluster` of a configuration by the user's file; keys that the section sets itself win.
-
-    Raises:
-        ConfigError: If the file is wrong.
-    """
+    """Complete the section `cluster` of a configuration by the user's file; keys that the section sets itself win."""
     path = site_path()
     if not path.is_file():
         return cluster

@@ -77,21 +77,13 @@ def submit(script: Path, *options: str) -> str:
 
     Returns:
         Number of the job.
-
-    Raises:
-        ConfigError: If there is no Slurm here.
-        WorkerError: If Slurm refuses the script.
     """
     # With several clusters, sbatch prints NUMBER;CLUSTER.
     return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
 
 
 def check(script: Path) -> None:
-    """Check that Slurm would take a batch script, and submit nothing.
-
-    Raises:
-        ConfigError: If there is no Slurm here, or it would refuse the script.
-    """
+    """Check that Slurm would take a batch script, and submit nothing."""
     try:
         _run("sbatch", "--test-only", str(script))
     except WorkerError as error:
@@ -103,12 +95,7 @@ def check(script: Path) -> None:
 
 
 def find_tasks() -> dict[str, list[ArrayTask]]:
-    """Find the tasks of this user, by number of the job: those that live, and those that ended some minutes ago.
-
-    Raises:
-        ConfigError: If there is no Slurm here.
-        WorkerError: If it does not answer.
-    """
+    """Find the tasks of this user, by number of the job: those that live, and those that ended some minutes ago."""
     # squeue would fail for a job that Slurm has forgotten, but never fails for all jobs of this user. Ask for number of
     # the array, index in it, state, node, and reason.
     format_ = "%F|%K|%T|%N|%r"
@@ -120,11 +107,7 @@ def find_tasks() -> dict[str, list[ArrayTask]]:
 
 
 def find_ended(job: str) -> dict[int | None, ArrayTask]:
-    """Find the tasks of a job that have ended, by index, in the accounting or in the memory of the controller.
-
-    Raises:
-        ConfigError: If there is no Slurm here.
-    """
+    """Find the tasks of a job that have ended, by index, in the accounting or in the memory of the controller."""
     ended: dict[int | None, ArrayTask] = {}
     try:
         text = _run("scontrol", "--oneliner", "show", "job", job)
@@ -157,34 +140,19 @@ def _find_accounted(job: str) -> dict[int | None, ArrayTask]:
 
 
 def find_directories() -> list[str]:
-    """Find the directories of the datasets that jobs of this user in the queue collect, sorted.
-
-    Raises:
-        ConfigError: If there is no Slurm here.
-        WorkerError: If it does not answer.
-    """
+    """Find the directories of the datasets that jobs of this user in the queue collect, sorted."""
     lines = _run("squeue", "--noheader", "--me", "--format=%F|%k", patience_s=_GLANCE_S).splitlines()
     rows = (line.strip().partition(f"|{MARK}") for line in lines)
     return sorted({directory for _, mark, directory in rows if mark})
 
 
 def cancel(jobs: Sequence[str]) -> None:
-    """End jobs; those that have ended stay as they are.
-
-    Raises:
-        ConfigError: If there is no Slurm here.
-        WorkerError: If it does not answer.
-    """
+    """End jobs; those that have ended stay as they are."""
     _run("scancel", "--quiet", *jobs)
 
 
 def find_largest_array() -> int | None:
-    """Find the limit of Slurm for the size of an array; None if Slurm does not tell it.
-
-    Raises:
-        ConfigError: If there is no Slurm here.
-        WorkerError: If it does not answer.
-    """
+    """Find the limit of Slurm for the size of an array; None if Slurm does not tell it."""
     for line in _run("scontrol", "show", "config").splitlines():
         name, _, value = line.partition("=")
         if name.strip() == "MaxArraySize" and value.strip().isdigit():
@@ -207,12 +175,7 @@ def _read_index(text: str) -> int | None:
 
 
 def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
-    """Run a command of Slurm, and return its output.
-
-    Raises:
-        ConfigError: If there is no such command.
-        WorkerError: If it fails or does not answer; the message quotes what it printed.
-    """
+    """Run a command of Slurm, and return its output."""
     try:
         done = subprocess.run(
             [program, *arguments],

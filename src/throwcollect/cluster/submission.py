@@ -71,11 +71,7 @@ def is_submitted(directory: Path) -> bool:
 
 
 def read_submission(directory: Path) -> Submission:
-    """Read the record of a dataset.
-
-    Raises:
-        ConfigError: If nothing was submitted for it, or the record is damaged.
-    """
+    """Read the record of a dataset."""
     path = directory / CLUSTER / _FILE
     try:
         return _JSON.validate_json(read_text(path, most_bytes=_MOST_BYTES))
@@ -85,11 +81,7 @@ def read_submission(directory: Path) -> Submission:
 
 
 def write_submission(directory: Path, submission: Submission) -> None:
-    """Write the record of a dataset, whole or not at all.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write the record of a dataset, whole or not at all."""
     write_file(directory / CLUSTER / _FILE, _JSON.dump_json(submission, indent=1) + b"\n")
 
 

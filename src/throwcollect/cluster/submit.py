@@ -76,12 +76,6 @@ def submit(
         live: Whether it is one run on several nodes, as a plan needs that grows with its results.
         dry: Whether to make only the script, and write nothing.
         onlooker: Is told what is planned and submitted.
-
-    Raises:
-        ConfigError: If the configuration cannot be collected this way, something is missing that tasks need, or Slurm
-            would refuse them; nothing is left behind then.
-        WorkerError: If Slurm refuses the jobs.
-        DatasetError: If the directory cannot be written.
     """
     directory = directory.absolute()
     if not str(directory).isprintable():
@@ -124,11 +118,6 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), onlooker: 
 
     Returns:
         The submission; None if nothing is missing.
-
-    Raises:
-        ConfigError: If nothing was ever submitted for it, or Slurm would refuse the jobs.
-        WorkerError: If Slurm refuses them.
-        DatasetError: If the directory cannot be read or written.
     """
     directory = directory.absolute()
     submission = read_submission(directory)
@@ -151,11 +140,7 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), onlooker: 
 
 
 def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], onlooker: Onlooker) -> Submitted:
-    """Write the scripts and submit them; without slices, submit only the job that joins what is finished.
-
-    Raises:
-        DatasetError: If a script cannot be written.
-    """
+    """Write the scripts and submit them; without slices, submit only the job that joins what is finished."""
     directory = scripts.directory
     try:
         scripts.logs.mkdir(parents=True, exist_ok=True)

@@ -225,11 +225,7 @@ def _make_constructor() -> SafeConstructor:
 
 
 def _read_scalar(node: Node) -> Any:
-    """Read a YAML 1.2 scalar; dates and other extensions stay text.
-
-    Raises:
-        ValueError: If the text does not fit its tag.
-    """
+    """Read a YAML 1.2 scalar; dates and other extensions stay text."""
     constructor = _make_constructor()
     readers: dict[str, Callable[[ScalarNode], Any]] = {
         "null": lambda _: None,

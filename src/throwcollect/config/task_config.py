@@ -17,11 +17,7 @@ from throwcollect.wording import join_names, suggest
 
 
 def _refuse_base(until: type[UntilConfig]) -> type[UntilConfig]:
-    """Make sure that a section `until` has a key.
-
-    Raises:
-        ValueError: If it is the base of all such sections, which has none.
-    """
+    """Make sure that a section `until` has a key."""
     if until is UntilConfig:
         raise ValueError("should be derived from UntilConfig, with the outcome that is counted as its key")
     return until

@@ -17,11 +17,7 @@ class UntilConfig(Section):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """Refuse a section that has no key, or several.
-
-        Raises:
-            TypeError: If it has.
-        """
+        """Refuse a section that has no key, or several."""
         if len(cls.model_fields) != 1:
             keys = ", ".join(cls.model_fields) or "none"
             raise TypeError(f"{cls.__qualname__} should have one key, the outcome that is counted; it has {keys}")

@@ -27,9 +27,6 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     Args:
         config: The configuration, which stays as it is.
         values: New values by dotted key, which `config` must have; an item of a list is named by its index, from 0.
-
-    Raises:
-        ConfigError: If a key does not exist, or the result would not be valid.
     """
     changes: dict[str, Any] = {}
     for key, value in values.items():

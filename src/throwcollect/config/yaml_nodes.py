@@ -49,9 +49,6 @@ def compose(text: str) -> Node | None:
 
     It remembers the last texts, because parsing takes 10 ms, and one command reads the configuration of a dataset
     several times: for the plan, for its tables, for each file that it verifies.
-
-    Raises:
-        YAMLError: If the text is no YAML, or too large.
     """
     yaml = YAML(typ="safe", pure=True)
     yaml.Scanner = _Scanner

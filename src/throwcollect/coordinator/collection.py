@@ -80,10 +80,6 @@ class TrialCollection:
 
         `say` is called with how many episodes were found, and before that with how far the search has come, if it takes
         long; `processes` is as `DatasetWriter.recover` takes it.
-
-        Raises:
-            DatasetError: If the directory holds no plan, or another process collects into it.
-            ConfigError: If its ``config.yaml`` is wrong.
         """
         collection = cls(DatasetWriter.open(directory), directory)
         count = 0
@@ -234,21 +230,13 @@ class TrialCollection:
             self._give_back(simulation, trial, reason, given_up)
 
     def write_one(self) -> None:
-        """Write the oldest episode of the backlog.
-
-        Raises:
-            DatasetError: If the dataset cannot be written.
-        """
+        """Write the oldest episode of the backlog."""
         episode, result = self._backlog.popleft()
         self.writer.append(episode, result)
         self._note(episode.header.trial, result)
 
     def grow_plan(self) -> bool:
-        """Work on the next round of the plan for some milliseconds, and return whether there was something to do.
-
-        Raises:
-            DatasetError: If the plan, or a shard that is complete without further trials, cannot be written.
-        """
+        """Work on the next round of the plan for some milliseconds, and return whether there was something to do."""
         if self._growth is None:
             return False
         if self._cut_plan(self.warn):
@@ -270,12 +258,7 @@ class TrialCollection:
         return trials is not None
 
     def look_after(self) -> None:
-        """Make what is written survive a power cut, once a second, and end a collection that cannot go on.
-
-        Raises:
-            WorkerError: If every simulation refuses every trial.
-            DatasetError: If the disk fails.
-        """
+        """Make what is written survive a power cut, once a second, and end a collection that cannot go on."""
         if (reason := self._leases.explain_hopelessness(self._names)) is not None:
             raise WorkerError("every simulation refuses its trials, and none was ever done", evidence=reason)
         if time.monotonic() >= self._synced_at + _SYNC_EVERY_S:
@@ -310,12 +293,6 @@ class TrialCollection:
         """Simulate some trials again in a fresh process, and write what describes the dataset as a whole.
 
         `meanwhile` is called again and again while that process works, and `say` with the result.
-
-        Raises:
-            Interrupted: If the collection was drained before its last trial.
-            DatasetError: If a trial came out otherwise, or a file cannot be written.
-            WorkerError: If trials cannot be simulated again.
-            LossError: If the dataset is finished, and trials of it are lost.
         """
         known = find_known_directory(self._directory)
         if not self.complete:

@@ -28,14 +28,6 @@ def run(directory: Path, *, patience_s: float = math.inf) -> None:
     Args:
         directory: Its directory.
         patience_s: How long to go on while no simulation is there [s]. A launcher looks after its simulations itself.
-
-    Raises:
-        DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was
-            simulated again.
-        WorkerError: If every simulation refuses every trial, trials cannot be simulated again, ROS 2 does not
-            answer, or no simulation is there for too long.
-        LossError: If the dataset is finished, and trials of it are lost.
-        Interrupted: If a signal ended the collection before its last trial.
     """
     # The dataset is opened before the node exists, because opening a large one takes long and a node has to answer.
     with TrialCollection.open(directory, say=_say, processes=count_cores()) as collection:
@@ -69,11 +61,7 @@ def _collect(
     *,
     patience_s: float,
 ) -> None:
-    """Collect until all trials have ended or, after a signal that asks to stop, those that run.
-
-    Raises:
-        WorkerError: If no simulation is there for longer than `patience_s`.
-    """
+    """Collect until all trials have ended or, after a signal that asks to stop, those that run."""
     told = seen = time.monotonic()
     while not collection.finished:
         heartbeat.beat()

@@ -125,11 +125,7 @@ class Leases:
         return trial
 
     def recall(self, trial: int) -> None:
-        """Count a trial as completed that an earlier collection has completed.
-
-        Raises:
-            ValueError: If it does not wait to be handed out.
-        """
+        """Count a trial as completed that an earlier collection has completed."""
         if self._open[trial] != _FRESH:
             raise ValueError(trial)
         self._take_fresh(trial)
@@ -162,9 +158,6 @@ class Leases:
 
         Returns:
             All reasons when its retries are used up, else None.
-
-        Raises:
-            ValueError: If it does not hold the trial.
         """
         self._drop(simulation, trial)
         if refused:

@@ -51,10 +51,6 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
         processes: How many processes may check the trials of a large plan. If more than one, they import the program
             that calls this, as processes of `multiprocessing` do.
         onlooker: Is told how many trials of a large plan have been checked, and warned of a robot that is misplaced.
-
-    Raises:
-        ConfigError: If the sweep cannot be drawn, or no trial is left.
-        WorkerError: If a process that checks trials is killed.
     """
     points = _draw_points(config, directory, onlooker)
     return _check_trials(config, points, processes=processes, onlooker=onlooker)
@@ -107,9 +103,6 @@ def find_sunken_robot(config: Config) -> str | None:
     """Say by how much a robot stands in the ground at the start, if its base is not where it is by default.
 
     Such trials are not refused: the robot's base is fixed, and the ground stops none of its links.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
     """
     height_m = config.robot.base_height_m
     if height_m == RobotConfig().base_height_m:
@@ -139,9 +132,6 @@ def feasibility_check(config: Config) -> Check:
     """Make a function that says why the robot cannot do a trial, in 1 to 5 ms each.
 
     With `sweep.feasibility: nominal`, the function checks the robot as its owner believes it to be.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
     """
     feasibility = Feasibility(config)
     if config.sweep.feasibility == "nominal":
@@ -186,19 +176,12 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     """Read all points of the list that a configuration names, even those beyond its plan; None if it names none.
 
     A relative `sweep.file` is looked for in the directory.
-
-    Raises:
-        ConfigError: If the list cannot be used.
     """
     return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
 
 
 def check_room(directory: Path, trials: int) -> None:
-    """Refuse, before trials are checked for hours, a plan that is certainly too large for the disk.
-
-    Raises:
-        ConfigError: If it is too large.
-    """
+    """Refuse, before trials are checked for hours, a plan that is certainly too large for the disk."""
     # The directory need not exist yet, so ask about the disk of the nearest directory above it that does.
     parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
     least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
@@ -222,10 +205,6 @@ def prepare(
 
     The directory has to be new or empty. A relative `sweep.file` is looked for in `sweep_directory`. The rest is as for
     `draw_plan`.
-
-    Raises:
-        ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.
-        WorkerError: If a process that checks trials is killed.
     """
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)

@@ -41,11 +41,7 @@ class ReplayCheck:
         self._early: _Process | None = None
 
     def begin(self, trials: Sequence[int]) -> None:
-        """Start to simulate the trials that will be chosen if all of these, the trials of the plan, get an episode.
-
-        Raises:
-            OSError: If no process can be started.
-        """
+        """Start to simulate the trials that will be chosen if all of these, the trials of the plan, get an episode."""
         self.begun = True
         if chosen := choose_trials(trials, count=self._count, seed=self._seed):
             self._early = _Process(self._directory, chosen)
@@ -56,10 +52,6 @@ class ReplayCheck:
         Args:
             rows: Row of each trial that has an episode, in order of trials.
             meanwhile: Is called again and again while a process works.
-
-        Raises:
-            DatasetError: If a trial came out otherwise.
-            WorkerError: If the process failed.
         """
         # The choice is made by place in the list, so the order must not depend on which episode came first.
         trials = choose_trials(list(rows), count=self._count, seed=self._seed)
@@ -138,11 +130,7 @@ class _Process:
 
 
 def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, Row]:
-    """Simulate trials in a fresh process, and return the columns that follow from the simulation, by trial.
-
-    Raises:
-        WorkerError: If the process failed.
-    """
+    """Simulate trials in a fresh process, and return the columns that follow from the simulation, by trial."""
     process = _Process(directory, trials)
     try:
         process.wait(meanwhile)

@@ -65,11 +65,6 @@ def resume(
             dataset as it is.
         onlooker: Is warned of what is missing or damaged in a finished dataset, and told how much there is to look
             through.
-
-    Raises:
-        ConfigError: If the configuration differs, or has fewer trials, other trials, or too many for the disk.
-        DatasetError: If another process changes the dataset, files cannot be written, or something is damaged that
-            cannot be made again.
     """
     with hold_lock(directory):
         stored = _read_stored_config(directory)
@@ -105,12 +100,7 @@ def resume(
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
-    """Write the plan of a configuration's file into a dataset's directory, or keep that of an earlier collection.
-
-    Raises:
-        ConfigError: If the configuration, the sweep or the directory cannot be used.
-        DatasetError: If files cannot be written, or something is damaged that cannot be made again.
-    """
+    """Write the plan of a configuration's file into a dataset's directory, or keep that of an earlier collection."""
     freeze = resume if is_begun(directory) else prepare
     with load_locating_errors(path) as config:
         return freeze(config, directory, sweep_directory=path.parent)
@@ -129,9 +119,6 @@ def _make_plan(
 
     Returns:
         The plan, and the list of its trials, if that has to be written.
-
-    Raises:
-        ConfigError: If the sweep cannot be drawn, or draws other trials.
     """
     config = make_self_contained(given)
     own_list = given.sweep.file is not None and sweep_directory.samefile(directory)
@@ -186,11 +173,7 @@ def _announce_search(directory: Path, onlooker: Onlooker) -> None:
 
 
 def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, onlooker: Onlooker) -> frozenset[str]:
-    """Find the names of files of a finished dataset that are missing or damaged; none if it is not finished.
-
-    Raises:
-        DatasetError: If the list of sources of a derived dataset is among them, as it cannot be made again.
-    """
+    """Find the names of files of a finished dataset that are missing or damaged; none if it is not finished."""
     if not is_there(directory / METADATA):
         return frozenset()
     findings = find_damage(directory, plan, in_full=check)
@@ -251,11 +234,7 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
 
 
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
-    """Refuse a configuration that differs from the stored one, with which a dataset was begun.
-
-    Raises:
-        ConfigError: If it differs in anything else than how it is run, or how far its plan may grow.
-    """
+    """Refuse a configuration that differs from the stored one, with which a dataset was begun."""
     changed = differences(stored.without_run(), config.without_run())
     may_grow = {leaf.name for config in (stored, config) for leaf in leaves(config) if leaf.key.grows}
     problems = [
@@ -279,11 +258,7 @@ def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
-    """Check that the new plan begins with the trials of the old one, and keep those that results have added.
-
-    Raises:
-        ConfigError: If it is shorter, or its sampler draws other trials when there are more.
-    """
+    """Check that the new plan begins with the trials of the old one, and keep those that results have added."""
     if old is None:
         return new
     count = min(len(old.trials), len(new.trials))

@@ -112,11 +112,7 @@ class _PlainComposer(Composer):
 
 
 def from_yaml(path: Path) -> Mapping[str, Any]:
-    """Read a YAML file such as `to_yaml` makes: one mapping, without anchors and tags.
-
-    Raises:
-        DatasetError: If the file cannot be read, is no such YAML, or is larger than any bag's metadata.
-    """
+    """Read a YAML file such as `to_yaml` makes: one mapping, without anchors and tags."""
     try:
         document = _parse(read_text(path, most_bytes=_MOST_BYTES))
     except RecursionError as error:
@@ -154,11 +150,7 @@ def find_next_command(directory: Path) -> NextCommand:
 
 
 def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
-    """Read the fields of the rosbag2 metadata of a finished dataset.
-
-    Raises:
-        DatasetError: If the directory holds no dataset or an unfinished one, or ``metadata.yaml`` is damaged.
-    """
+    """Read the fields of the rosbag2 metadata of a finished dataset."""
     refuse_other_directory(directory)
     path = directory / METADATA
     if not path.exists():
@@ -173,11 +165,7 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
 
 
 def refuse_other_directory(directory: Path) -> None:
-    """Refuse a directory without any file of a dataset, as advice on damaged datasets would not help there.
-
-    Raises:
-        DatasetError: If there is no such directory, or it has no such file, or pointers of Git LFS in place of files.
-    """
+    """Refuse a directory without any file of a dataset, as advice on damaged datasets would not help there."""
     if not has_files(directory):
         raise DatasetError(describe_other(directory), path=directory, hint=_name_nearby(directory))
     refuse_pointers(directory)

@@ -14,12 +14,7 @@ from throwcollect.wording import command
 
 
 def read_config(directory: Path) -> Config:
-    """Read the configuration of a dataset.
-
-    Raises:
-        DatasetError: If its file is missing, cannot be read, or is wrong and not as it was written.
-        ConfigError: If a key is wrong here that was right where it was written, as when a package is not installed.
-    """
+    """Read the configuration of a dataset."""
     try:
         return load(config_path(directory))
     except ConfigError as error:
@@ -36,11 +31,7 @@ def unfitting_plan(error: ForeignPlanError) -> ForeignPlanError:
 
 
 def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
-    """Refuse a dataset if damage of its configuration is the reason why reading it has ended with an error.
-
-    Raises:
-        DatasetError: If the file is missing, cannot be read, or is not as it was written.
-    """
+    """Refuse a dataset if damage of its configuration is the reason why reading it has ended with an error."""
     first = error.problems[0]
     # Without a key, it is the file itself that is wrong.
     if not first.key or was_changed(directory, CONFIG):
@@ -50,11 +41,7 @@ def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
 
 
 def refuse_lost_config(directory: Path) -> None:
-    """Refuse a directory that holds files of a dataset, but no configuration.
-
-    Raises:
-        DatasetError: If it is one.
-    """
+    """Refuse a directory that holds files of a dataset, but no configuration."""
     if has_files(directory) and not is_there(directory / CONFIG):
         raise DatasetError("no such file", path=directory / CONFIG, hint=_say_how_to_restore(directory))
 

@@ -27,10 +27,6 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         directory: Must not exist, or be empty.
         plan: The trials and their configuration.
         listed: Points for ``trials.parquet``, where the sampler of the configuration finds them; None if it needs none.
-
-    Raises:
-        ConfigError: If the directory holds files already, or cannot be made, or the dataset would have too many files.
-        DatasetError: If the files cannot be written; nothing is left behind then.
     """
     refuse_many_files(plan.config, len(plan.trials))
     try:
@@ -44,11 +40,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
 
 
 def refuse_many_files(config: Config, trials: int) -> None:
-    """Refuse a dataset with so many recordings that no command would read its metadata.
-
-    Raises:
-        ConfigError: If it would have more than `MOST_FILES`.
-    """
+    """Refuse a dataset with so many recordings that no command would read its metadata."""
     files = -(-trials // config.record.trials_per_shard)
     if files > MOST_FILES:
         raise ConfigError(
@@ -58,11 +50,7 @@ def refuse_many_files(config: Config, trials: int) -> None:
 
 
 def refuse_taken(directory: Path) -> None:
-    """Refuse a directory that holds anything; one that does not exist yet is as good as an empty one.
-
-    Raises:
-        ConfigError: If it holds files, or cannot be a directory.
-    """
+    """Refuse a directory that holds anything; one that does not exist yet is as good as an empty one."""
     try:
         taken = sorted(path.name for path in directory.iterdir())
     except FileNotFoundError:

@@ -13,11 +13,7 @@ from throwcollect.wording import command
 
 @contextmanager
 def locating_damage(dataset: Dataset, trial: int) -> Iterator[None]:
-    """Add the dataset, the trial and a command that finds more to an error that an episode raises without them.
-
-    Raises:
-        DatasetError: If the block raises one.
-    """
+    """Add the dataset, the trial and a command that finds more to an error that an episode raises without them."""
     try:
         yield
     except DatasetError as error:
@@ -29,11 +25,7 @@ def locating_damage(dataset: Dataset, trial: int) -> Iterator[None]:
 
 
 def read_samples(dataset: Dataset, trial: int) -> tuple[EpisodeHeader, Samples]:
-    """Read header and samples of a trial's episode.
-
-    Raises:
-        DatasetError: If there is no episode, it is not where the table says, or it is damaged.
-    """
+    """Read header and samples of a trial's episode."""
     with locating_damage(dataset, trial):
         episode = dataset.episode(trial)
         return episode.header, episode.samples(dataset.joints)

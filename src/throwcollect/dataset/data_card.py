@@ -87,11 +87,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
 
 
 def read_card(path: Path) -> str:
-    """Read a data card, which people may have edited.
-
-    Raises:
-        DatasetError: If the file cannot be read, or is no UTF-8 text.
-    """
+    """Read a data card, which people may have edited."""
     return read_text(path, most_bytes=_MOST_BYTES)
 
 

@@ -99,11 +99,7 @@ def find_known_directory(directory: Path) -> Path | None:
 
 
 def config_path(directory: Path) -> Path:
-    """Make the path of the configuration in a dataset's directory.
-
-    Raises:
-        DatasetError: If something else than a file of the directory has its name.
-    """
+    """Make the path of the configuration in a dataset's directory."""
     path = directory / CONFIG
     check_regular(path)
     return path

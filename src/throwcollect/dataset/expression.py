@@ -148,11 +148,7 @@ class _Evaluation:
         self._make_error = error
 
     def value(self, node: ast.expr) -> _Value:
-        """Compute the value of a part.
-
-        Raises:
-            ConfigError: If an expression may not have such a part.
-        """
+        """Compute the value of a part."""
         match node:
             case ast.Constant():
                 return self._read_constant(node)

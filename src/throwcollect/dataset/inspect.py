@@ -24,21 +24,12 @@ _MOST_NAMED = 5
 
 
 def info(directory: Path) -> Info:
-    """Summarise a dataset from its tables; `verify` says whether they are right.
-
-    Raises:
-        DatasetError: If the directory holds no finished dataset, or its tables are damaged.
-        ConfigError: If its ``config.yaml`` is wrong.
-    """
+    """Summarise a dataset from its tables; `verify` says whether they are right."""
     return summary(Dataset.open(directory))
 
 
 def summary(dataset: Dataset) -> Info:
-    """Summarise an open dataset.
-
-    Raises:
-        DatasetError: If its metadata lack a field, or its directory cannot be read.
-    """
+    """Summarise an open dataset."""
     directory = dataset.directory
     shards, topics = dataset.shards, dataset.topics
     try:
@@ -78,12 +69,7 @@ def _find_landing_area(throws: pa.Table, success: str) -> Mapping[str, tuple[flo
 
 
 def check_recordings_are_there(directory: Path) -> None:
-    """Refuse a finished dataset of which recordings are missing; `verify` says whether the others are right.
-
-    Raises:
-        DatasetError: If recordings are missing, or the directory holds no finished dataset.
-        ConfigError: If its ``config.yaml`` is wrong.
-    """
+    """Refuse a finished dataset of which recordings are missing; `verify` says whether the others are right."""
     missing = [name for name in Dataset.open(directory).shards if not is_there(directory / name)]
     if missing:
         raise DatasetError(
@@ -95,12 +81,7 @@ def check_recordings_are_there(directory: Path) -> None:
 
 
 def digest(directory: Path) -> str:
-    """Compute the digest of a dataset again from the bytes of its episodes, and from the targets if trials have some.
-
-    Raises:
-        DatasetError: If an episode is damaged, or the digest of one or of all is not what the dataset says.
-        ConfigError: If its ``config.yaml`` is wrong.
-    """
+    """Compute the digest of a dataset again from the bytes of its episodes, and from targets if there are some."""
     dataset = Dataset.open(directory)
     stated = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["digest"].to_pylist(), strict=True))
     digests = []

@@ -34,12 +34,7 @@ _MOST_NAMED = 8
 
 
 def join(directory: Path) -> None:
-    """Make a finished dataset of its slices; one that is finished already stays as it is.
-
-    Raises:
-        ConfigError: If the directory holds no slices, or slices I/N with different N.
-        DatasetError: If a slice is missing, damaged or not of this plan, or the dataset cannot be written.
-    """
+    """Make a finished dataset of its slices; one that is finished already stays as it is."""
     with hold_lock(directory, needed=False):
         if not (directory / METADATA).exists():
             _join(directory)
@@ -47,11 +42,7 @@ def join(directory: Path) -> None:
 
 
 def _count_slices(directory: Path, finished: Collection[Slice]) -> int:
-    """Find the number of slices that a dataset was cut into.
-
-    Raises:
-        ConfigError: If none is finished, or there are slices I/N with different N.
-    """
+    """Find the number of slices that a dataset was cut into."""
     counts = sorted({each.count for each in finished})
     if not counts:
         hint = "throwcollect up --slice 0/8 --output DIR collects the first of eight"
@@ -83,11 +74,7 @@ def _join(directory: Path) -> None:
 
 
 def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> None:
-    """Move the recordings of a slice to the dataset, and hand them to its writer.
-
-    Raises:
-        DatasetError: If the slice is not one of this plan, or damaged.
-    """
+    """Move the recordings of a slice to the dataset, and hand them to its writer."""
     place = slice_directory(directory, slice)
     entries = {entry.path: entry for entry in read_manifest(place)}
     if entries.get(PLAN) != entry_of(PLAN, part.encode()):
@@ -107,11 +94,7 @@ def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> N
 
 
 def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:
-    """Move a recording, unless an earlier join has moved it, and read its statistics.
-
-    Raises:
-        DatasetError: If it is not there, or not as the manifest says.
-    """
+    """Move a recording, unless an earlier join has moved it, and read its statistics."""
     if source.exists():
         try:
             os.replace(source, target)

@@ -70,11 +70,7 @@ class Journal:
         return round(self._earlier_s + time.monotonic() - self._opened_s, 3)
 
     def note(self, event: Event, **details: Any) -> None:
-        """Append an event.
-
-        Raises:
-            DatasetError: If it cannot be written.
-        """
+        """Append an event."""
         self._append(json.dumps({"event": event, "time": round(time.time(), 3), **details}).encode() + b"\n")
 
     def close(self) -> None:
@@ -138,9 +134,6 @@ def read_commits(
 
     Returns:
         The values of `columns` of each trial, where the part ended, and whether there is more.
-
-    Raises:
-        DatasetError: If it cannot be read.
     """
     try:
         with open(open_log(path, os.O_RDONLY), "rb") as file:

@@ -18,10 +18,6 @@ def judge_episode(config: Config, episode: Episode, trajectory: JointTrajectory 
     """Say how a trial with this configuration ended, from its episode.
 
     The trajectory is the one that its controllers were sent; it is computed here if it is None.
-
-    Raises:
-        DatasetError: If the episode is damaged, or another robot's.
-        MemberError: If the task is of another package and fails.
     """
     samples = episode.samples(robot_of(config).joints)
     if (np.diff(samples.stamps_ns) <= 0).any():

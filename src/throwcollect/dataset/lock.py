@@ -46,9 +46,6 @@ def hold_lock(directory: Path, *, alone: bool = True, needed: bool = True) -> It
         directory: Its directory.
         alone: Whether no other process may hold the lock; the processes of a run hold it together.
         needed: Whether it has to be locked; if not, a file system without locks will do.
-
-    Raises:
-        DatasetError: If another process changes it, or it cannot be locked.
     """
     try:
         # A directory cannot be opened for writing, and flock does not ask for that.
@@ -64,11 +61,7 @@ def hold_lock(directory: Path, *, alone: bool = True, needed: bool = True) -> It
 
 
 def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool = True) -> None:
-    """Lock an open file or directory of a dataset, as `hold_lock` does, until it is closed; an attempt never needs it.
-
-    Raises:
-        DatasetError: If another process holds it, or it cannot be locked.
-    """
+    """Lock an open file or directory of a dataset, as `hold_lock` does, until it is closed."""
     # A process of a run waits only as long as `is_locked` takes: if it waited for a preparation to end, it would go on
     # with another plan than it was started for.
     deadline = time.monotonic() + (PATIENCE_S if alone else _GLANCE_S)

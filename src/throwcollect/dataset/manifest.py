@@ -57,11 +57,7 @@ def entry_of(path: str, data: bytes) -> FileEntry:
 
 
 def entry_of_file(path: Path) -> FileEntry:
-    """Make the entry of a file on disk.
-
-    Raises:
-        DatasetError: If it cannot be read, or is no regular file.
-    """
+    """Make the entry of a file on disk."""
     digest, size = hashlib.sha256(), 0
     try:
         with open(open_regular(path), "rb") as file:
@@ -74,11 +70,7 @@ def entry_of_file(path: Path) -> FileEntry:
 
 
 def size_of_file(path: Path) -> int:
-    """Find the size of a file on disk [bytes].
-
-    Raises:
-        DatasetError: If it cannot be opened, or is no regular file.
-    """
+    """Find the size of a file on disk [bytes]."""
     try:
         with open(open_regular(path), "rb") as file:
             return os.fstat(file.fileno()).st_size
@@ -146,20 +138,12 @@ def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
 
 
 def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
-    """Read the entries of the manifest of a dataset, in order of their paths.
-
-    Raises:
-        DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
-    """
+    """Read the entries of the manifest of a dataset, in order of their paths."""
     return read_named_manifest(directory)[1]
 
 
 def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
-    """Read the name of the collection that a manifest has, and its entries; see `read_manifest`.
-
-    Raises:
-        DatasetError: If the manifest is missing, or its text is not one that `manifest_text` makes.
-    """
+    """Read the name of the collection that a manifest has, and its entries; see `read_manifest`."""
     path = directory / MANIFEST
     if not is_there(path):
         raise DatasetError("is missing", path=path, hint=command("dataset", "rebuild", directory))

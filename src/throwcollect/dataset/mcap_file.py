@@ -122,11 +122,7 @@ def _end_of(index: records.ChunkIndex) -> int:
 
 
 def episode_run(episode: Episode) -> RecordGroup:
-    """Encode the records of an episode.
-
-    Raises:
-        DatasetError: If a chunk of the episode is damaged.
-    """
+    """Encode the records of an episode."""
     chunks = [(each.chunk, indexes) for each, indexes in zip(episode.chunks, episode.message_indexes, strict=True)]
     facts = {
         "trial": str(episode.header.trial),

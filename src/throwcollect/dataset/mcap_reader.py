@@ -59,11 +59,7 @@ class McapRecord(NamedTuple):
         return Opcode(self.opcode).name.lower() if self.opcode in set(Opcode) else f"record 0x{self.opcode:02x}"
 
     def parse(self, kind: _Kind[_R]) -> _R:
-        """Read its fields; `kind` is its class, which cannot be Message, as that has no length of its own.
-
-        Raises:
-            DatasetError: If it is not such a record.
-        """
+        """Read its fields; `kind` is its class, which cannot be Message, as that has no length of its own."""
         try:
             return kind.read(ReadDataStream(io.BytesIO(self.data[_RECORD_HEADER.size :])))
         except (EndOfFile, struct.error, UnicodeDecodeError) as error:
@@ -102,12 +98,7 @@ class StoredEpisode:
 
     @classmethod
     def of(cls, chunks: Sequence[StoredChunk], facts: McapRecord, stated: Mapping[str, str]) -> StoredEpisode:
-        """Make the episode of some chunks and of the Metadata record `facts` behind them, whose contents are `stated`.
-
-        Raises:
-            DatasetError: If the metadata are not those of an episode with this number of chunks; the contents of the
-                chunks are not looked at.
-        """
+        """Make the episode of some chunks and the Metadata record `facts` behind them, whose contents are `stated`."""
         hashes = [stated.get("records_sha256", ""), *stated.get(SENSORS_SHA256, "").split()]
         parsed = [Chunk.parse(memoryview(each.record.data)) for each in chunks]
         episode = make_episode(stated.get("header", ""), hashes, parsed)
@@ -115,11 +106,7 @@ class StoredEpisode:
 
     @cached_property
     def intact_run(self) -> RecordGroup:
-        """Its records as the writer makes them for the episode, which may differ from those in the file.
-
-        Raises:
-            DatasetError: If a chunk is damaged.
-        """
+        """Its records as the writer makes them for the episode, which may differ from those in the file."""
         return episode_run(self.episode)
 
     def run(self) -> RecordGroup:
@@ -129,11 +116,7 @@ class StoredEpisode:
         return RecordGroup.of(runs, self.facts.data)
 
     def check_whole(self) -> None:
-        """Compare everything that is hashed with its hashes.
-
-        Raises:
-            DatasetError: If a chunk or the header is damaged, or does not have its hash.
-        """
+        """Compare everything that is hashed with its hashes."""
         self.episode.check_records()
         if self.stated_digest != self.episode.digest:
             place, expected = f"byte {self.facts.offset}", self.episode.digest
@@ -154,11 +137,7 @@ class McapContents:
         return self._data[start:end]
 
     def record(self, offset: int) -> McapRecord:
-        """Read the record that begins at an offset.
-
-        Raises:
-            DatasetError: If the file ends before the record does.
-        """
+        """Read the record that begins at an offset."""
         header = self._data[offset : offset + _RECORD_HEADER.size]
         if offset < 0 or len(header) < _RECORD_HEADER.size:
             raise DatasetError("the file is cut off", place=f"byte {offset}")
@@ -188,11 +167,7 @@ class McapContents:
         return -1
 
     def records(self, offset: int = len(MAGIC)) -> Iterator[McapRecord]:
-        """Read the records from an offset on, to the footer or the end of the file.
-
-        Raises:
-            DatasetError: If the file ends within a record.
-        """
+        """Read the records from an offset on, to the footer or the end of the file."""
         while offset < len(self._data):
             record = self.record(offset)
             yield record
@@ -201,11 +176,7 @@ class McapContents:
             offset = record.end
 
     def read_robot_description(self) -> str:
-        """Read the URDF text of the robot, which is among the latched messages that every file begins with.
-
-        Raises:
-            DatasetError: If it is missing or damaged.
-        """
+        """Read the URDF text of the robot, which is among the latched messages that every file begins with."""
         try:
             table = read_latched_table(self.record(self.next_chunk(0)))
             message = table.messages(ROBOT_DESCRIPTION_ID)[0].tobytes()
@@ -215,11 +186,7 @@ class McapContents:
         return text
 
     def message_indexes(self, offset: int) -> tuple[dict[int, McapRecord], McapRecord]:
-        """Read the Message Index records from an offset on, by channel, and the record that follows them.
-
-        Raises:
-            DatasetError: If the file ends before that, or a channel has more than one.
-        """
+        """Read the Message Index records from an offset on, by channel, and the record that follows them."""
         indexes: dict[int, McapRecord] = {}
         record = self.record(offset)
         while record.opcode == Opcode.MESSAGE_INDEX:
@@ -231,11 +198,7 @@ class McapContents:
         return indexes, record
 
     def episode(self, first: McapRecord) -> StoredEpisode:
-        """Read the episode whose first chunk a record is.
-
-        Raises:
-            DatasetError: If it is none, or later records are damaged; the contents of the chunk are not looked at.
-        """
+        """Read the episode whose first chunk a record is."""
         chunks: list[StoredChunk] = []
         record = first
         # Bounded, as a damaged file may have chunk after chunk and no metadata.
@@ -256,11 +219,7 @@ class McapContents:
 
 
 def read_latched_table(record: McapRecord) -> MessageTable:
-    """Read the messages of the chunk of the latched topics.
-
-    Raises:
-        DatasetError: If the record is no such chunk.
-    """
+    """Read the messages of the chunk of the latched topics."""
     return MessageTable(Chunk.parse(record.data).decompress(), 1)
 
 
@@ -282,11 +241,7 @@ def _measure(descriptor: int) -> int:
 
 @contextmanager
 def map_file(path: Path) -> Iterator[McapContents]:
-    """Map a file into memory while the block lasts, whatever it contains; one of holes only up to twice its data.
-
-    Raises:
-        DatasetError: If the file is missing, cannot be read, or is no regular file.
-    """
+    """Map a file into memory while the block lasts, whatever it contains; one of holes only up to twice its data."""
     try:
         descriptor = open_regular(path)
         try:
@@ -307,11 +262,7 @@ def map_file(path: Path) -> Iterator[McapContents]:
 
 @contextmanager
 def open_mcap(path: Path) -> Iterator[McapContents]:
-    """Map an MCAP file into memory while the block lasts.
-
-    Raises:
-        DatasetError: If the file is missing, cannot be read, or is no MCAP file.
-    """
+    """Map an MCAP file into memory while the block lasts."""
     with map_file(path) as contents:
         if contents.slice(0, len(MAGIC)) != MAGIC:
             raise DatasetError("not an MCAP file", path=path)

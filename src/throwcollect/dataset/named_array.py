@@ -78,11 +78,7 @@ class NamedArray:
         return len(self.values)
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """Return one column.
-
-        Raises:
-            ConfigError: If there is none of this name; it is also a `KeyError`.
-        """
+        """Return one column."""
         if name not in self.names:
             raise refuse_name("no column", name, self.names)
         return self.values[:, self.names.index(name)]

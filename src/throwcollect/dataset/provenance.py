@@ -117,11 +117,7 @@ class Provenance:
 
 
 def write_provenance(directory: Path, provenance: Provenance) -> None:
-    """Write how a dataset was collected beside its data card.
-
-    Raises:
-        DatasetError: If the file cannot be written.
-    """
+    """Write how a dataset was collected beside its data card."""
     write_file(directory / PROVENANCE, _JSON.dump_json(provenance, indent=2) + b"\n")
 
 
@@ -133,11 +129,7 @@ def read_provenance(directory: Path) -> Provenance | None:
 
 
 def load_provenance(path: Path) -> Provenance:
-    """Read the file that says how a dataset was collected.
-
-    Raises:
-        DatasetError: If it is missing or damaged.
-    """
+    """Read the file that says how a dataset was collected."""
     try:
         return _JSON.validate_json(read_text(path, most_bytes=_MOST_BYTES))
     except ValidationError as error:

@@ -238,11 +238,7 @@ class Dataset(Sequence[Throw]):
         return DatasetError(f"{name} is missing", path=self.directory / METADATA)
 
     def _read_custom(self, name: str) -> str:
-        """Return what the product itself wrote into the metadata.
-
-        Raises:
-            DatasetError: If it is not there.
-        """
+        """Return what the product itself wrote into the metadata."""
         custom = self._bag.get("custom_data")
         value = custom.get(name) if isinstance(custom, dict) else None
         if not isinstance(value, str):

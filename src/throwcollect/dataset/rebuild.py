@@ -74,11 +74,6 @@ def rebuild(directory: Path) -> Rebuilt:
     They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The earlier
     table, if it can be read, says why trials are lost and which recordings there should be. Where the recordings are
     judged differently than it says, the data card gets the new numbers of outcomes.
-
-    Raises:
-        DatasetError: If the plan or a recording is missing or damaged, ``config.yaml`` is not as the manifest says,
-            another process changes the dataset, it is not collected to its end, or a file cannot be written.
-        ConfigError: If the ``config.yaml`` is wrong.
     """
     refuse_other_directory(directory)
     with hold_lock(directory):
@@ -86,12 +81,7 @@ def rebuild(directory: Path) -> Rebuilt:
 
 
 def _read_config(directory: Path) -> Config:
-    """Read the configuration, and refuse one that is not as the manifest says.
-
-    Raises:
-        ConfigError: If it is wrong.
-        DatasetError: If its file is missing, or was changed.
-    """
+    """Read the configuration, and refuse one that is not as the manifest says."""
     config = read_config(directory)
     # A line that equals its default can be lost without a change of the plan's digest. A new manifest would then hide
     # that the file is not the one that the same collection gives.
@@ -105,12 +95,7 @@ def _read_config(directory: Path) -> Config:
 
 
 def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
-    """Read the plan.
-
-    Raises:
-        DatasetError: If it is missing or damaged; its hint is to repair the dataset, which makes the plan again.
-        ForeignPlanError: If it is the plan of another configuration.
-    """
+    """Read the plan."""
     try:
         return Plan.read(directory / PLAN, config)
     except ForeignPlanError:
@@ -175,9 +160,6 @@ def _tabulate(
     """Read the recordings one after the other, and make the table of the trials of each.
 
     No more than the rows of one recording are held at once, as rows take ten times the memory of a table.
-
-    Raises:
-        DatasetError: If a recording is missing or damaged; its hint is `repair`.
     """
     table, task = ThrowsTable.of(plan), task_of(plan.config)
     named = {row["shard"] for row in earlier.values()}

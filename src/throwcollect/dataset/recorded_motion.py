@@ -116,11 +116,7 @@ class Joints(Series):
     _prefix = "joints"
 
     def __getitem__(self, name: str) -> Joint:
-        """Return one joint; its arrays are columns of the arrays of all joints.
-
-        Raises:
-            ConfigError: If the robot has none of this name; it is also a `KeyError`.
-        """
+        """Return one joint; its arrays are columns of the arrays of all joints."""
         if name not in self.names:
             raise refuse_name("no joint", name, self.names)
         which = self.names.index(name)

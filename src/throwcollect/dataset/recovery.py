@@ -83,11 +83,7 @@ class LeftShard:
 
 
 def remove_unfinished(directory: Path) -> None:
-    """Remove half-written files that a killed process left beside the recordings; the files themselves stay.
-
-    Raises:
-        DatasetError: If something cannot be removed.
-    """
+    """Remove half-written files that a killed process left beside the recordings; the files themselves stay."""
     for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
         remove(directory / f"{name}.new")
     # Earlier versions gave this name to an unfinished plan.
@@ -101,10 +97,6 @@ def find_left(parts: Sequence[LeftShard], channels: Channels, *, processes: int 
 
     Yields:
         What is left of each, in order.
-
-    Raises:
-        DatasetError: If files cannot be read.
-        WorkerError: If a process that looks is killed.
     """
     if sum(len(part.plan.trials) for part in parts) < _MANY_EPISODES:
         processes = 1
@@ -131,9 +123,6 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
 
     Returns:
         The episodes, in order of trials.
-
-    Raises:
-        DatasetError: If files cannot be read or written.
     """
     remove(shard.path.with_name(f"{shard.path.name}.new"))
     final, begun = left.final, left.begun
@@ -170,9 +159,6 @@ def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> d
         path: The file; if it is missing, it has none.
         plan: The trials; episodes of others, and of refused ones, are left out.
         channels: What is recorded; None if the file is only read, and then channels are not compared.
-
-    Raises:
-        DatasetError: If the file cannot be read.
     """
     episodes: dict[int, RecoveredEpisode] = {}
     trials_to_run = frozenset(plan.trials.numbers_to_run)

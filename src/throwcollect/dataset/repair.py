@@ -86,11 +86,6 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
         directory: Directory of the damaged dataset; it stays as it is.
         output: Directory of the new one; must be new or empty.
         remake: Draws the plan if neither the one in the directory nor the table of throws can be read.
-
-    Raises:
-        ConfigError: If `output` holds something already.
-        DatasetError: If configuration or plan cannot be read or made again, files cannot be read or written, or the
-            dataset is being collected.
     """
     refuse_other_directory(directory)
     # The lock is refused while the dataset is being collected: trials that have not run yet would be taken for lost.
@@ -153,11 +148,7 @@ def _read_or_remake_plan(directory: Path, config: Config, remake: Remake, remark
 
 
 def _make_plan_of_table(path: Path, config: Config) -> Plan:
-    """Make the plan of the trials that a table of throws has.
-
-    Raises:
-        DatasetError: If the table is missing or damaged, or not one of this configuration.
-    """
+    """Make the plan of the trials that a table of throws has."""
     table = read_parquet(path)
     names = table.column_names
     # Between number and outcome are the columns that were drawn: swept keys, then targets.
@@ -289,9 +280,6 @@ def _find_again(path: Path, wanted: DifferingEpisode, reading: dict[Path, Iterat
         path: The file.
         wanted: The episode.
         reading: The file that was read last, and the episodes that follow there, as most files are in order of trials.
-
-    Raises:
-        DatasetError: If it is not there any more.
     """
     for episodes in (reading.get(path, iter(())), scan_whole(path)):
         reading.clear()

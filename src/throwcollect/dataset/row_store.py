@@ -38,11 +38,7 @@ class _NamelessFile:
         self._map: mmap.mmap | None = None
 
     def append(self, parts: Iterable[pa.Buffer]) -> _Place:
-        """Append the bytes of some parts, each right behind the one before.
-
-        Raises:
-            DatasetError: If they cannot be written.
-        """
+        """Append the bytes of some parts, each right behind the one before."""
         first = self._size
         for part in parts:
             self._write(part)
@@ -90,11 +86,7 @@ class RowStore:
         self._places: dict[int, _Place] = {}
 
     def put(self, number: int, rows: pa.Table) -> None:
-        """Store the rows of a shard, in order of trials, under its number; `table` must not have been read yet.
-
-        Raises:
-            DatasetError: If they cannot be written.
-        """
+        """Store the rows of a shard, in order of trials, under its number; `table` must not have been read yet."""
         sink = pa.BufferOutputStream()
         with pa.ipc.new_stream(sink, self._schema) as stream:
             stream.write_table(rows)
@@ -108,11 +100,7 @@ class RowStore:
 
     @cached_property
     def table(self) -> pa.Table:
-        """All rows in order of trials, each column in one piece; values come from the disk when they are looked at.
-
-        Raises:
-            DatasetError: If the columns cannot be written.
-        """
+        """All rows in order of trials, each column in one piece; values come from the disk when they are looked at."""
         self._by_shards.map()
         places = [place for _, place in sorted(self._places.items())]
         rows = pa.concat_tables([self._read(place) for place in places])
@@ -174,11 +162,7 @@ class EpisodeRows(Mapping[int, Row]):
         self._throws = throws
 
     def __getitem__(self, trial: int) -> Row:
-        """Return the row of a trial.
-
-        Raises:
-            KeyError: If it has no episode.
-        """
+        """Return the row of a trial."""
         # Trials are in order, so this needs no table of places in memory.
         place = int(np.searchsorted(self._trials, trial))
         if place == len(self) or self._trials[place] != trial:

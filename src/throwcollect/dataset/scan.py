@@ -76,11 +76,7 @@ def scan(contents: McapContents, start: int = 0) -> Iterator[FoundEpisode]:
 
 
 def scan_whole(path: Path) -> Iterator[FoundEpisode]:
-    """Find all whole episodes of an MCAP file or of its beginning, in order; a missing file has none.
-
-    Raises:
-        DatasetError: If the file cannot be read.
-    """
+    """Find all whole episodes of an MCAP file or of its beginning, in order; a missing file has none."""
     try:
         with map_file(path) as contents:
             yield from (found for found in scan(contents) if found.damage is None)
@@ -114,11 +110,7 @@ def _find(contents: McapContents, first: McapRecord, facts: int) -> FoundEpisode
 
 
 def _gather(contents: McapContents, first: McapRecord, facts: McapRecord) -> StoredEpisode:
-    """Make an episode of a chunk and of some metadata, with as many further chunks as the metadata have hashes of.
-
-    Raises:
-        DatasetError: If they do not belong together.
-    """
+    """Make an episode of a chunk and of some metadata, with as many further chunks as the metadata have hashes of."""
     chunks = [StoredChunk(first, {})]
     stated = facts.parse(records.Metadata).metadata
     # A forged file may name any number of hashes.

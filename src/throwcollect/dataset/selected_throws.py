@@ -49,11 +49,7 @@ def select_throws(throws: pa.Table, which: str | Iterable[Any], directory: Path)
 
 
 def _make_array(which: Any) -> pa.Array:
-    """Make an Arrow array of booleans or integers, from whatever holds them.
-
-    Raises:
-        ConfigError: If it holds anything else.
-    """
+    """Make an Arrow array of booleans or integers, from whatever holds them."""
     if isinstance(which, pa.ChunkedArray):
         which = which.combine_chunks()
     # Arrow would take the bytes for numbers, and an empty mapping for an empty list.

@@ -94,11 +94,7 @@ class OpenShard:
         self._runs: dict[int, tuple[int, RecordGroup]] = {}
 
     def adopt(self, runs: Runs) -> None:
-        """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off.
-
-        Raises:
-            DatasetError: If the file cannot be written.
-        """
+        """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off."""
         size = max(offset + run.length for offset, run in runs.values())
         try:
             self._descriptor = open_regular(self.part, os.O_RDWR)
@@ -110,11 +106,7 @@ class OpenShard:
             self._remember(trial, offset, run)
 
     def append(self, episode: Episode) -> None:
-        """Write an episode; when it fails, the file is as it was before.
-
-        Raises:
-            DatasetError: If the episode's chunk is damaged, or the file cannot be written.
-        """
+        """Write an episode; when it fails, the file is as it was before."""
         run = episode_run(episode)
         start = self._size
         try:
@@ -134,11 +126,7 @@ class OpenShard:
         self._remember(episode.header.trial, offset, run)
 
     def finish(self) -> FinishedShard:
-        """Write the shard in trial order and remove what it was copied from.
-
-        Raises:
-            DatasetError: If the shard cannot be written.
-        """
+        """Write the shard in trial order and remove what it was copied from."""
         finished = FinishedShard(None, {})
         if self._runs:
             # The final file is on the disk before the unfinished one is removed, so at any moment one has all episodes.
@@ -151,11 +139,7 @@ class OpenShard:
         return finished
 
     def sync(self) -> None:
-        """Make the appended episodes survive a power cut.
-
-        Raises:
-            DatasetError: If the disk fails.
-        """
+        """Make the appended episodes survive a power cut."""
         if self._descriptor is None or self._synced:
             return
         try:

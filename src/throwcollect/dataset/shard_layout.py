@@ -51,11 +51,7 @@ class ShardLayout:
         return is_there(path) or is_there(path_of_part(path))
 
     def remove_files(self, number: int) -> None:
-        """Remove the files of a shard, finished or not.
-
-        Raises:
-            DatasetError: If they cannot be removed.
-        """
+        """Remove the files of a shard, finished or not."""
         path = self.path(number)
         remove(path)
         remove(path_of_part(path))

@@ -42,31 +42,19 @@ def slice_directory(directory: Path, slice: Slice) -> Path:
 
 
 def find_finished(directory: Path) -> frozenset[Slice]:
-    """Find the finished slices of a dataset.
-
-    Raises:
-        DatasetError: If the directory of slices cannot be read.
-    """
+    """Find the finished slices of a dataset."""
     names = _list(directory / SLICES)
     return frozenset(Slice(int(match[1]), int(match[2])) for name in names if (match := _NAME.fullmatch(name)))
 
 
 def find_attempts(directory: Path, slice: Slice) -> list[Path]:
-    """Find the directories of unfinished attempts at a slice, by name.
-
-    Raises:
-        DatasetError: If the directory of slices cannot be read.
-    """
+    """Find the directories of unfinished attempts at a slice, by name."""
     start = f"{slice_directory(directory, slice).name}{ATTEMPT}"
     return sorted(directory / SLICES / name for name in _list(directory / SLICES) if name.startswith(start))
 
 
 def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) -> Path:
-    """Make an empty directory for an attempt at a slice, in `scratch` or else beside all slices, unlike any other.
-
-    Raises:
-        DatasetError: If it cannot be made.
-    """
+    """Make an empty directory for an attempt at a slice, in `scratch` or else beside all slices, unlike any other."""
     name = f"{slice_directory(directory, slice).name}{ATTEMPT}{socket.gethostname()}-{secrets.token_hex(4)}"
     path = (scratch or directory / SLICES) / name
     try:
@@ -81,9 +69,6 @@ def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
 
     A finished file counts as longer than an unfinished one. Unfinished files are not moved, as an earlier attempt may
     still write to them; the new one looks for whole episodes in its copy.
-
-    Raises:
-        DatasetError: If something cannot be copied.
     """
     most: dict[str, Path] = {}
     # The longest copy comes last, and takes the place of the shorter ones.
@@ -126,9 +111,6 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
 
     Returns:
         Whether it was the first one; if not, it is removed.
-
-    Raises:
-        DatasetError: If files cannot be moved; the attempt stays then.
     """
     place = slice_directory(directory, slice)
     # If this process is killed in between, the next attempt takes the recordings from here, as from any other one.

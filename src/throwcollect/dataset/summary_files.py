@@ -43,9 +43,6 @@ def write_description(
         channels: What is recorded.
         recordings: The MCAP files, in their order.
         on_piece: Called after each piece of the table, which is read column by column, so that its memory can be freed.
-
-    Raises:
-        DatasetError: If a file cannot be read or written.
     """
     digest = combine_digests(_read_digests(throws, on_piece), read_targets(throws))
     custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}

@@ -79,12 +79,7 @@ def ball_state(row: Row, name: str) -> BallState | None:
 
 
 def _check_task(task: Task[Any], columns: Sequence[str]) -> None:
-    """Make sure that a task, which may be of another package, can have its results in a table of these columns.
-
-    Raises:
-        ConfigError: If it lacks an outcome that it needs, two columns have the same name, or a column of its results
-            has the name of a target.
-    """
+    """Make sure that a task, which may be of another package, can have its results in a table of these columns."""
     name, outcomes = task.config.task.name, {each.value for each in task.outcomes}
     needed = (task.config.task.success, LIMIT_VIOLATED, TRACKING_FAILED, LOST)
     if missing := [each for each in needed if each not in outcomes]:
@@ -180,9 +175,6 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
     """Read a table of throws with the columns of a plan, whatever trials its rows are of.
 
     The table of an earlier version lacks the columns that came later.
-
-    Raises:
-        DatasetError: If the table is missing or damaged, or has other columns.
     """
     table = read_parquet(path)
     expected = ThrowsTable.of(plan)
@@ -223,11 +215,7 @@ class RowsByTrial(Mapping[int, Row]):
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:
-    """Read the table of throws of a dataset, whose rows are the trials of its plan in order.
-
-    Raises:
-        DatasetError: If the table is missing or damaged, or is not one of this plan.
-    """
+    """Read the table of throws of a dataset, whose rows are the trials of its plan in order."""
     path = directory / THROWS
     table = read_throws_table(path, plan)
     if table["trial"].to_pylist() != list(plan.trials.numbers):

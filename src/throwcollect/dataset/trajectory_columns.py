@@ -74,11 +74,7 @@ class StoredThrow:
     joints: tuple[str, ...]
 
     def read(self) -> Episode:
-        """Read the episode from its file.
-
-        Raises:
-            DatasetError: If the file is damaged there, or has another trial; the samples are not looked at.
-        """
+        """Read the episode from its file."""
         with open_mcap(self.path) as contents:
             try:
                 episode = contents.episode(contents.record(self.offset)).episode
@@ -90,11 +86,7 @@ class StoredThrow:
         return episode
 
     def read_rows(self) -> NDArray[np.void]:
-        """Read the rows of its samples from its file; see `trajectory_rows`.
-
-        Raises:
-            DatasetError: If the episode is not where it should be, or its chunk is damaged.
-        """
+        """Read the rows of its samples from its file; see `trajectory_rows`."""
         (rows,) = read_stored_rows([self])
         return rows
 
@@ -164,11 +156,7 @@ def _make_empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
 
 
 def read_stored_rows(throws: Iterable[StoredThrow]) -> Iterator[NDArray[np.void]]:
-    """Read the rows of episodes, one after the other; each file is open while its throws follow each other.
-
-    Raises:
-        DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
-    """
+    """Read the rows of episodes, one after the other; each file is open while its throws follow each other."""
     for path, group in groupby(throws, attrgetter("path")):
         with open_mcap(path) as contents:
             for place in group:
@@ -200,9 +188,6 @@ def fill(
         throws: The throws, at least one; all have the same joints.
         tables: Their rows, as `read_stored_rows` gives them.
         joints: Joints that the columns of joints have; some of those of the throws.
-
-    Raises:
-        DatasetError: Whatever `tables` raises.
     """
     # Times follow from stamps, and velocities in world from orientations, so these are read even if nobody asks.
     lengths, known = [place.samples for place in throws], throws[0].joints

@@ -86,10 +86,6 @@ def verify(
 
     Returns:
         What is wrong, file by file; empty when nothing is.
-
-    Raises:
-        DatasetError: If the directory holds no finished dataset.
-        WorkerError: If a process that checks recordings is killed.
     """
     bag, findings = None, []
     refuse_other_directory(directory)

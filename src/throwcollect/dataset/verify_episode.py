@@ -89,21 +89,13 @@ class EpisodeCheck:
             yield from _find_row_problems(expected, row)
 
     def row(self, stored: StoredEpisode, shard: str) -> Row:
-        """Make the row that an episode in the file `shard` should have in the table of throws; needs the plan.
-
-        Raises:
-            DatasetError: If the episode is damaged, or the plan is not known.
-        """
+        """Make the row that an episode in the file `shard` should have in the table of throws; needs the plan."""
         trials = self._need_trials()
         trial = trials.trial(stored.episode.header.trial)
         return trials.table.row(trial, self.judge(stored.episode), _place_of(stored, shard))
 
     def judge(self, episode: Episode) -> Result:
-        """Say how the trial of an episode ended; needs the plan.
-
-        Raises:
-            DatasetError: If the episode is damaged, or the plan is not known.
-        """
+        """Say how the trial of an episode ended; needs the plan."""
         trials, number = self._need_trials(), episode.header.trial
         return judge_episode(trials.config(number), episode, trials.trajectory(number))
 

@@ -94,11 +94,7 @@ class _Drawing(NamedTuple):
 
 
 def _draw(directory: Path, plan: Plan) -> _Drawing:
-    """Draw the trials of a plan that is fixed before anything runs.
-
-    Raises:
-        ConfigError: If it cannot be drawn.
-    """
+    """Draw the trials of a plan that is fixed before anything runs."""
     if plan.config.sweep.file is not None:
         # The list lies beside the plan and is compared with it there.
         return _Drawing(plan.trials.values, None)
@@ -111,11 +107,7 @@ def _draw(directory: Path, plan: Plan) -> _Drawing:
 
 
 def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
-    """Draw the trials of a plan that grew, round by round from their results.
-
-    Raises:
-        ConfigError: If it cannot be drawn.
-    """
+    """Draw the trials of a plan that grew, round by round from their results."""
     rounds, table, there = Rounds(plan.config), ThrowsTable.of(plan), len(plan.trials)
     values: list[NDArray[np.float64]] = []
     lost: int | None = None

@@ -68,9 +68,6 @@ def check_shard(
         config: Configuration of the dataset; None if it is not known, and then only episodes and checksums are checked.
         trials: Trials whose episodes the file should hold, in order; None if they are not known.
         find_problems: Finds what is wrong with an episode.
-
-    Raises:
-        MemberError: If the task is of another package and fails; that says nothing of the file.
     """
     report = ShardReport()
     try:
@@ -121,11 +118,7 @@ class _ShardCheck:
         self._report(place, problem + (f"; the next episode is at byte {resumed}" if resumed >= 0 else ""))
 
     def run(self) -> None:
-        """Check everything.
-
-        Raises:
-            DatasetError: If the file is too short to be looked at.
-        """
+        """Check everything."""
         contents = self.contents
         if len(contents) < len(MAGIC):
             raise DatasetError(f"has {len(contents)} bytes: the file is cut off")
@@ -175,11 +168,7 @@ class _ShardCheck:
         return first.offset if first else -1
 
     def _compare(self, start: int, expected: bytes) -> int:
-        """Compare the records from `start` on with those that should be there; returns where they end [bytes].
-
-        Raises:
-            DatasetError: If the file ends before they do, or holds records of other kinds.
-        """
+        """Compare the records from `start` on with those that should be there; returns where they end [bytes]."""
         offset = start
         for wanted in McapContents(expected).records(0):
             # The closing magic is no record and cannot be read as one.
@@ -297,11 +286,7 @@ class _ShardCheck:
         return ends
 
     def _check_footer(self) -> None:
-        """Check only the CRC of the summary, as it is not known which contents it should have.
-
-        Raises:
-            DatasetError: If the file does not end with a footer.
-        """
+        """Check only the CRC of the summary, as it is not known which contents it should have."""
         contents = self.contents
         if not self._check_magic() or len(contents) < len(MAGIC) + len(_FOOTER):
             return

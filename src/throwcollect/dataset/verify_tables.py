@@ -96,11 +96,7 @@ def _find_unit_problems(schema: pa.Schema) -> Iterator[Finding]:
 
 
 def read_list(directory: Path, plan: Plan) -> Points:
-    """Read the list of points that a dataset's own configuration names.
-
-    Raises:
-        DatasetError: If it is missing or damaged, or its first points are not those of the plan.
-    """
+    """Read the list of points that a dataset's own configuration names."""
     path = directory / TRIALS
     if not path.exists():
         raise DatasetError("is missing", path=path)

@@ -89,12 +89,7 @@ class DatasetWriter:
 
     @classmethod
     def open(cls, directory: Path) -> DatasetWriter:
-        """Open a dataset to collect into, and keep all others from doing so; call `recover` next.
-
-        Raises:
-            DatasetError: If the directory holds no plan of its configuration, or another process collects into it.
-            ConfigError: If its ``config.yaml`` is wrong.
-        """
+        """Open a dataset to collect into, and keep all others from doing so; call `recover` next."""
         for name in (CONFIG, PLAN):
             if not (directory / name).is_file():
                 raise DatasetError(f"holds no {name}", path=directory, expected="a dataset that was created")
@@ -119,10 +114,6 @@ class DatasetWriter:
 
         Returns:
             Number of episodes.
-
-        Raises:
-            DatasetError: If files cannot be read or written.
-            WorkerError: If a process that looks through recordings is killed.
         """
         remove_unfinished(self._directory)
         # metadata.yaml goes first, as it marks a finished dataset, which this is not without the others.
@@ -148,11 +139,7 @@ class DatasetWriter:
         return count
 
     def extend(self, trials: Trials) -> None:
-        """Add trials to the plan, whose numbers continue it, and write them to disk before this returns.
-
-        Raises:
-            DatasetError: If the plan cannot be written.
-        """
+        """Add trials to the plan, whose numbers continue it, and write them to disk before this returns."""
         # If a lost plan was made again, files of its later shards are still there.
         for number in self._layout.numbers_of(trials.numbers):
             if number not in self._unfinished:
@@ -166,9 +153,6 @@ class DatasetWriter:
         """Remove the trials from a number on from the plan, with their episodes, as if they had never been planned.
 
         If this is interrupted, the plan still has them, or `recover` leaves out what remains of them.
-
-        Raises:
-            DatasetError: If the disk fails.
         """
         shards = self._layout.numbers_of(range(first, self.plan.trials.numbers.stop))
         rows = [self._forget_shard(number) for number in shards]
@@ -183,11 +167,7 @@ class DatasetWriter:
             self._reopen(shards[0], rows[0])
 
     def close_plan(self) -> None:
-        """Declare that the plan has all its trials.
-
-        Raises:
-            DatasetError: If the plan, or a shard that is now complete, cannot be written.
-        """
+        """Declare that the plan has all its trials."""
         self._layout.growing = False
         self.plan.take_in_rounds(self._directory / PLAN)
         # A copy, as shards that are finished leave the dictionary.
@@ -195,22 +175,14 @@ class DatasetWriter:
             self._finish_shard_if_complete(number)
 
     def take_shard(self, number: int, recording: Recording | None, rows: pa.Table) -> None:
-        """Take in a finished shard with the rows of its trials; its file, if it has one, already has its final name.
-
-        Raises:
-            DatasetError: If the disk fails.
-        """
+        """Take in a finished shard with the rows of its trials; its file, if it has one, already has its final name."""
         self._unfinished.discard(number)
         self._finished_rows.put(number, rows)
         if recording is not None:
             self._recordings[number] = recording
 
     def append(self, episode: Episode, result: Result) -> None:
-        """Write an episode, whose trial ended with this result.
-
-        Raises:
-            DatasetError: If the episode is damaged, is of no trial that is waited for, or cannot be written.
-        """
+        """Write an episode, whose trial ended with this result."""
         trial = episode.header.trial
         number = self._find_waiting_shard(trial)
         shard = self._get_shard(number)
@@ -223,11 +195,7 @@ class DatasetWriter:
         self._finish_shard_if_complete(number)
 
     def append_lost(self, trial: int, reason: str) -> None:
-        """Write that a trial has no episode, and the reason for it.
-
-        Raises:
-            DatasetError: If the trial is not waited for, or the shard that it completes cannot be written.
-        """
+        """Write that a trial has no episode, and the reason for it."""
         number = self._find_waiting_shard(trial)
         shard = self._get_shard(number)
         shard.missing.remove(trial)
@@ -236,29 +204,17 @@ class DatasetWriter:
         self._finish_shard_if_complete(number)
 
     def note(self, event: Event, **details: object) -> None:
-        """Write an event into the journal.
-
-        Raises:
-            DatasetError: If it cannot be written.
-        """
+        """Write an event into the journal."""
         if self._journal is not None:
             self._journal.note(event, **details)
 
     def sync(self) -> None:
-        """Make everything that was appended survive a power cut.
-
-        Raises:
-            DatasetError: If the disk fails.
-        """
+        """Make everything that was appended survive a power cut."""
         for shard in self._shards.values():
             shard.sync()
 
     def episode_rows(self) -> EpisodeRows:
-        """Return the row of each trial that has an episode; all shards must be finished.
-
-        Raises:
-            DatasetError: If the disk fails.
-        """
+        """Return the row of each trial that has an episode; all shards must be finished."""
         return EpisodeRows(self._finished_rows.table)
 
     def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> dict[str, int]:
@@ -270,9 +226,6 @@ class DatasetWriter:
 
         Returns:
             Number of trials of each outcome.
-
-        Raises:
-            DatasetError: If trials are missing, or a file cannot be written.
         """
         if self._unfinished:
             missing = sorted(trial for number in self._unfinished for trial in self._get_shard(number).missing)

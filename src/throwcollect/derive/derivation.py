@@ -68,10 +68,6 @@ def derive(sources: Sequence[Source], output: Path, *, name: str | None = None) 
 
     Its directory must be new or empty, and nothing is left there after an error. Without `name`, it has the name of the
     first source.
-
-    Raises:
-        ConfigError: If there is no trial, the sources do not go together, or the directory cannot be used.
-        DatasetError: If an episode of a source is damaged, or the dataset cannot be written.
     """
     with new_directory(output) as directory:
         return _write(sources, directory, name)

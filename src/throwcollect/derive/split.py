@@ -139,11 +139,7 @@ def assign(
 
 
 def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
-    """Find the cell of each row by expressions and widths; None for a row without a finite value on an axis.
-
-    Raises:
-        ConfigError: If there is no axis, or one is no expression with a width, or cannot be evaluated.
-    """
+    """Find the cell of each row by expressions and widths; None for a row without a finite value on an axis."""
     columns = []
     texts = read_list("cells", axes, "texts EXPRESSION=WIDTH")
     if not texts:
@@ -176,11 +172,7 @@ def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
 
 
 def _write_shares(shares: object) -> str:
-    """Write a mapping as users of commands write it; as fractions, because floats of 1/3 would not add up to 1.
-
-    Raises:
-        ConfigError: If it is no mapping.
-    """
+    """Write a mapping as users of commands write it; as fractions, because floats of 1/3 would not add up to 1."""
     check_mapping("fractions", shares, "{'train': 0.8, 'test': 0.2}, or the text train=0.8,test=0.2")
     texts = []
     for name, share in cast(Mapping[str, object], shares).items():

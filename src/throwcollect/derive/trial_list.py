@@ -26,9 +26,6 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
         The configuration of the first source, which takes its points from a file; and the points. The sweep varies the
         keys that any source sweeps, and those that the sources have fixed at different values; for this, the
         configuration has the offsets of all joints for which any source has one.
-
-    Raises:
-        ConfigError: If the sources differ in keys that cannot be swept; it shows all of them.
     """
     configs = _add_missing_offsets([source.dataset.config for source in sources])
     keys = list(dict.fromkeys(key for source in sources for key in source.dataset.plan.keys))

@@ -32,9 +32,6 @@ def check_loaded(engine: Engine, name: str, scene: Scene) -> None:
         engine: The engine.
         name: Its name, for messages.
         scene: The scene that it has loaded.
-
-    Raises:
-        ConfigError: If links, masses, inertias, shapes, axes or limits differ.
     """
     if (loaded := engine.describe_robot()) is None:
         return

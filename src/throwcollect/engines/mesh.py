@@ -38,11 +38,7 @@ class Mesh:
 
     @cached_property
     def triangles(self) -> Triangles:
-        """The triangles of the file, at least one; all numbers are finite.
-
-        Raises:
-            ConfigError: If there is no such file, or it has another format, is too large or is broken.
-        """
+        """The triangles of the file, at least one; all numbers are finite."""
         path = self.path
         self.check()
         read = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}[path.suffix.lower()]
@@ -57,11 +53,7 @@ class Mesh:
         return triangles
 
     def check(self) -> None:
-        """Check the file as far as that is possible without reading it.
-
-        Raises:
-            ConfigError: If there is no such file, or it has another format or is too large.
-        """
+        """Check the file as far as that is possible without reading it."""
         path = self.path
         try:
             size = path.stat().st_size if path.is_file() else None
@@ -116,11 +108,7 @@ def _read_obj(path: Path) -> Triangles:
 
 
 def _find_index(number: int, vertices: int) -> int:
-    """Find the index of a vertex: OBJ counts vertices from 1, or backwards from -1 for the last vertex so far.
-
-    Raises:
-        ValueError: If there is no such vertex.
-    """
+    """Find the index of a vertex: OBJ counts vertices from 1, or backwards from -1 for the last vertex so far."""
     index = number - 1 if number > 0 else vertices + number
     if not (number and 0 <= index < vertices):
         raise ValueError(f"a face uses vertex {number} of {vertices}")

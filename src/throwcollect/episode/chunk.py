@@ -77,11 +77,7 @@ def count_indexed(index: bytes) -> int:
 
 
 def _cut_message_index(records: memoryview) -> tuple[int, bytes]:
-    """Take the Message Index record at the beginning of some records: its channel, and its bytes.
-
-    Raises:
-        DatasetError: If `encode_message_index` has not written it.
-    """
+    """Take the Message Index record at the beginning of some records: its channel, and its bytes."""
     start = bytes(records[: _MESSAGE_INDEX_HEADER.size])
     if len(start) == _MESSAGE_INDEX_HEADER.size:
         _, length, channel, size = _MESSAGE_INDEX_HEADER.unpack(start)
@@ -154,9 +150,6 @@ class Chunk:
 
         Returns:
             The chunks, and the index records of each by channel.
-
-        Raises:
-            DatasetError: If the bytes are anything else.
         """
         chunks: list[Chunk] = []
         indexes: list[dict[int, bytes]] = []
@@ -174,11 +167,7 @@ class Chunk:
 
     @classmethod
     def parse(cls, record: bytes | memoryview) -> Chunk:
-        """Read an MCAP Chunk record that `record` has written, without decompressing it.
-
-        Raises:
-            DatasetError: If the bytes are anything else.
-        """
+        """Read an MCAP Chunk record that `record` has written, without decompressing it."""
         announced = cls.read_announced_size(bytes(record[:CHUNK_HEADER_BYTES]))
         if not announced or announced != len(record):
             raise DatasetError(f"chunk: {len(record)} bytes are not one record of a chunk compressed with zstd")
@@ -186,11 +175,7 @@ class Chunk:
         return cls(record[_CHUNK_HEADER.size :], size, crc, start, end)
 
     def check_size(self) -> None:
-        """Check that the announced size of the records is plausible, without decompressing them.
-
-        Raises:
-            DatasetError: If the data are no zstd frame of that size, or the size is more than `MOST_RATIO` allows.
-        """
+        """Check that the announced size of the records is plausible, without decompressing them."""
         try:
             size = zstandard.frame_content_size(self.data)
         except zstandard.ZstdError as error:
@@ -204,11 +189,7 @@ class Chunk:
             )
 
     def decompress(self) -> bytes:
-        """Decompress the records.
-
-        Raises:
-            DatasetError: If the data are not one zstd frame of the announced size, or the CRC differs.
-        """
+        """Decompress the records."""
         self.check_size()
         try:
             contents = _of_this_thread.decompressor.decompress(self.data, allow_extra_data=False)

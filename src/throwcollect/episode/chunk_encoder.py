@@ -37,9 +37,6 @@ class ChunkEncoder:
 
         Returns:
             The state chunk with its message indexes, and its message records.
-
-        Raises:
-            KeyError: If the set points of a recorded controller are missing.
         """
         recording = Recording(samples, controllers or {})
         table = MessageTable(self._row * len(samples), len(samples))

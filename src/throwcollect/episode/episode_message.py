@@ -73,31 +73,18 @@ class Episode:
 
     @cached_property
     def table(self) -> MessageTable:
-        """The message records of the state chunk as a table.
-
-        Raises:
-            DatasetError: If the chunk is damaged, or does not hold one message per channel and sample.
-        """
+        """The message records of the state chunk as a table."""
         return MessageTable(self.state.contents, self.header.samples)
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
-        """Read the samples; `joints` must have been recorded, in this order.
-
-        Raises:
-            DatasetError: If the chunk is damaged, its messages have another layout than this version writes, or other
-                joints were recorded.
-        """
+        """Read the samples; `joints` must have been recorded, in this order."""
         if joints is not None:
             _require_joints(self.table.joints, tuple(joints))
         return self.table.samples
 
     @cached_property
     def message_indexes(self) -> tuple[Mapping[int, bytes], ...]:
-        """The MCAP Message Index records of each chunk, by channel.
-
-        Raises:
-            DatasetError: If a chunk that came without them is damaged.
-        """
+        """The MCAP Message Index records of each chunk, by channel."""
         sensors = (sensor.indexes or sensor.messages.message_indexes for sensor in self.sensors)
         return (self.state.indexes or self.table.message_indexes, *sensors)
 
@@ -108,19 +95,11 @@ class Episode:
         return hashlib.sha256(self.header_json.encode() + b"\0" + records).hexdigest()
 
     def channels(self) -> tuple[tuple[int, ...], ...]:
-        """List the numbers of the channels of each chunk.
-
-        Raises:
-            DatasetError: If a chunk is damaged.
-        """
+        """List the numbers of the channels of each chunk."""
         return (tuple(self.table.columns), *(sensor.messages.channels for sensor in self.sensors))
 
     def check_records(self) -> None:
-        """Hash the message records of all chunks again.
-
-        Raises:
-            DatasetError: If a chunk is damaged, or its hash is not that of its records.
-        """
+        """Hash the message records of all chunks again."""
         for chunk in self.chunks:
             chunk.check_records()
 
@@ -139,11 +118,7 @@ def header_to_json(header: EpisodeHeader) -> str:
 
 
 def header_from_json(text: bytes | str) -> EpisodeHeader:
-    """Read the text that `header_to_json` writes, or one that differs from it only in blanks.
-
-    Raises:
-        DatasetError: If the text is anything else.
-    """
+    """Read the text that `header_to_json` writes, or one that differs from it only in blanks."""
     try:
         header = _HEADER.validate_json(text, strict=True)
     except ValidationError as error:
@@ -213,11 +188,7 @@ def _encode_prefix(sizes: list[int]) -> bytes:
 
 
 def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
-    """Read the message that `pack` writes, without decompressing chunks.
-
-    Raises:
-        DatasetError: If it is another message, or is signed with another key.
-    """
+    """Read the message that `pack` writes, without decompressing chunks."""
     layout = _make_layout()
     length = len(layout.template)
     if len(message) < length:
@@ -254,10 +225,6 @@ def make_episode(
     """Make an episode of its header in JSON, its chunks, the state chunk first, and the SHA-256 of their records.
 
     `indexes` has the Message Index records of each chunk by channel, if they came with the chunks.
-
-    Raises:
-        DatasetError: If the header cannot be read, a hash is no SHA-256 in hexadecimal, or there are not as many hashes
-            as chunks.
     """
     for given in hashes:
         if not _SHA256.fullmatch(given):

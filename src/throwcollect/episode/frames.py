@@ -78,9 +78,6 @@ def read_frames(urdf: str, *, base_height: float) -> FrameTree:
     """Read the frames of a robot whose root link is at a height above the ground [m].
 
     They are cached, as several parts of a process need the frames of its only robot.
-
-    Raises:
-        ConfigError: If the text is not a URDF, or a joint of it is neither fixed nor revolute.
     """
     model = read_urdf(parse_xml(urdf, "robot description"), "robot description").model
     frames = [_frame_of(joint) for joint in model.joints]

@@ -56,11 +56,7 @@ class RecordPlace(NamedTuple):
 def _find_records(
     contents: bytes | bytearray | memoryview, *, shortest: int, wrong: str
 ) -> Iterator[tuple[int, RecordPlace]]:
-    """Find the channels and places of Message records that follow each other, each of at least `shortest` bytes.
-
-    Raises:
-        DatasetError: If the contents are anything else; `wrong` says in the message what they are.
-    """
+    """Find the channels and places of Message records that follow each other, each of at least `shortest` bytes."""
     offset = 0
     while offset < len(contents):
         if len(contents) - offset < MESSAGE_HEADER.size:
@@ -96,19 +92,11 @@ class RowLayout:
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of the columns of joints: those that the first joint state has.
-
-        Raises:
-            DatasetError: If there is no readable joint state.
-        """
+        """Names of the joints, in the order of the columns of joints: those that the first joint state has."""
         return read_joint_names(bytes(self._find_first_message(JOINT_STATES_ID, "/joint_states")))
 
     def check_topic(self, channel: int, topic: Topic) -> None:
-        """Check that the message of a channel has the layout of a topic.
-
-        Raises:
-            DatasetError: If there is no such channel, or its message has another layout.
-        """
+        """Check that the message of a channel has the layout of a topic."""
         if not topic.layout.describes_message(self._find_first_message(channel, topic.name)):
             raise DatasetError(
                 f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
@@ -149,11 +137,7 @@ class MessageTable(RowLayout):
         return len(self._table)
 
     def headers(self, channel: int) -> Rows:
-        """View sequence numbers and times of one channel's records, shape ``(n_samples,)``.
-
-        Raises:
-            KeyError: If the chunk has no such channel.
-        """
+        """View sequence numbers and times of one channel's records, shape ``(n_samples,)``."""
         column = self.columns[channel]
         return self._table[:, column.offset : column.offset + _HEADERS.itemsize].view(_HEADERS)[:, 0]
 
@@ -170,20 +154,12 @@ class MessageTable(RowLayout):
         )
 
     def messages(self, channel: int) -> NDArray[np.uint8]:
-        """View the CDR messages of one channel, shape ``(n_samples, size)``.
-
-        Raises:
-            KeyError: If the chunk has no such channel.
-        """
+        """View the CDR messages of one channel, shape ``(n_samples, size)``."""
         column = self.columns[channel]
         return self._table[:, column.offset + MESSAGE_HEADER.size : column.offset + column.size]
 
     def message_index(self, channel: int) -> bytes:
-        """Encode the MCAP Message Index record of one channel: log time and offset in the chunk of each message.
-
-        Raises:
-            KeyError: If the chunk has no such channel.
-        """
+        """Encode the MCAP Message Index record of one channel: log time and offset in the chunk of each message."""
         offsets = np.arange(self.columns[channel].offset, self._table.size, self._table.shape[1])
         return encode_message_index(channel, self.headers(channel)["log_time"], offsets)
 
@@ -194,12 +170,7 @@ class MessageTable(RowLayout):
 
     @cached_property
     def samples(self) -> Samples:
-        """The samples, copied from the records.
-
-        Raises:
-            DatasetError: If joint states or the ball's odometry are missing, or have another layout than this version
-                writes.
-        """
+        """The samples, copied from the records."""
         topics = {JOINT_STATES_ID: joint_states(self.joints), BALL_ODOMETRY_ID: ball_odometry()}
         return read_samples(*(self._read(channel, topic) for channel, topic in topics.items()))
 

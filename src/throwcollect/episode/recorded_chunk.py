@@ -34,20 +34,12 @@ class RecordedChunk:
 
     @cached_property
     def contents(self) -> bytes:
-        """The uncompressed message records.
-
-        Raises:
-            DatasetError: If the chunk is damaged.
-        """
+        """The uncompressed message records."""
         return self.chunk.decompress()
 
     @cached_property
     def messages(self) -> MessageList:
-        """The message records of a sensor.
-
-        Raises:
-            DatasetError: If the chunk is damaged, or is no chunk of a sensor.
-        """
+        """The message records of a sensor."""
         return MessageList(self.contents)
 
     @cached_property
@@ -55,11 +47,7 @@ class RecordedChunk:
         return hashlib.sha256(self.contents).hexdigest()
 
     def check_records(self) -> None:
-        """Hash the message records once and compare the hash with the one that was written beside them.
-
-        Raises:
-            DatasetError: If the chunk is damaged, or the hashes differ.
-        """
+        """Hash the message records once and compare the hash with the one that was written beside them."""
         actual = self._contents_sha256
         if actual != self.records_sha256:
             raise DatasetError(f"chunk: SHA-256 of its records is {actual}", expected=self.records_sha256)

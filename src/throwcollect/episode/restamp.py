@@ -29,12 +29,7 @@ class Restamper:
         self._topics = {channel.id: topic for channel, topic in channels.recorded.items()}
 
     def restamp(self, episode: Episode, trial: int) -> Episode:
-        """Make the episode that trial `trial` of the configuration would have yielded.
-
-        Raises:
-            DatasetError: If the episode is damaged, its hash is wrong, or its messages are not those that the
-                configuration records.
-        """
+        """Make the episode that trial `trial` of the configuration would have yielded."""
         # The copy gets a hash of its own, which would make damage look as if it had been recorded.
         episode.check_records()
         by_ns = self._config.trial_start_ns(trial) - episode.header.start_ns

@@ -64,11 +64,7 @@ class Topic:
         return [name.removesuffix(".sec") for name in names if name.endswith(("stamp.sec", "clock.sec"))]
 
     def encode(self, recording: Recording) -> NDArray[np.uint8]:
-        """Make the CDR messages of all samples, shape ``(n_samples, size)``.
-
-        Raises:
-            KeyError: If the set points of the topic's controller are missing.
-        """
+        """Make the CDR messages of all samples, shape ``(n_samples, size)``."""
         template = np.frombuffer(self.layout.template, np.uint8)
         messages = np.tile(template, (len(recording.samples), 1))
         self.fill(messages.view(self.layout.dtype)[:, 0], recording)
@@ -125,11 +121,7 @@ def joint_states(joints: tuple[str, ...]) -> Topic:
 
 
 def read_joint_names(message: bytes) -> tuple[str, ...]:
-    """Read the names of the joints in a message of `joint_states`, in the order of its numbers.
-
-    Raises:
-        DatasetError: If it is no such message, or names no joint.
-    """
+    """Read the names of the joints in a message of `joint_states`, in the order of its numbers."""
     try:
         joints = tuple(deserialize(message, get_message(_JOINT_STATE)).name)
     except ValueError as error:
@@ -207,11 +199,7 @@ def _fill_clock(rows: Rows, recording: Recording) -> None:
 
 
 def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
-    """``/tf``: tf2_msgs/TFMessage with the ball in world and every frame that a joint moves.
-
-    Raises:
-        ValueError: If the joint of a frame is not among `joints`, all joints in the order of the samples.
-    """
+    """``/tf``: tf2_msgs/TFMessage with the ball in world and every frame that a joint moves."""
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]
     pairs = [(WORLD, BALL, (0.0, 0.0, 0.0)), *((frame.parent, frame.child, frame.translation) for frame in frames)]
@@ -261,9 +249,6 @@ def controller_state(robot: Robot, controller: str) -> Topic:
     """``/<controller>/controller_state``: control_msgs/JointTrajectoryControllerState of one controller.
 
     Reference, feedback and error have positions and velocities, the reference has accelerations, the output positions.
-
-    Raises:
-        KeyError: If the robot has no such controller.
     """
     kind = "control_msgs/msg/JointTrajectoryControllerState"
     point = get_message("trajectory_msgs/msg/JointTrajectoryPoint")

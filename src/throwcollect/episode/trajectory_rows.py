@@ -71,9 +71,6 @@ def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> N
 
     Returns:
         Shape ``(samples,)``; the fields are the columns, as bytes.
-
-    Raises:
-        DatasetError: If they are not rows with joint states of these joints and odometry, as this version writes them.
     """
     row = RowLayout(contents, samples)
     for channel, topic in zip(_FIELDS, (joint_states(joints), ball_odometry()), strict=True):

@@ -77,11 +77,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
 
 
 def _check_written(directory: Path) -> None:
-    """Make sure that a format has written files, and none in the place of those that `export` adds.
-
-    Raises:
-        ValueError: If it has not.
-    """
+    """Make sure that a format has written files, and none in the place of those that `export` adds."""
     names = {path.name for path in directory.iterdir()} if directory.is_dir() else set()
     if not names:
         raise ValueError("write should leave files in the directory, which is empty")

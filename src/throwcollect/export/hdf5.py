@@ -112,11 +112,7 @@ class _Output(io.FileIO):
         """Do nothing, as `write` holds nothing back."""
 
     def check(self) -> None:
-        """Raise the first write error so far.
-
-        Raises:
-            OSError: If something could not be written.
-        """
+        """Raise the first write error so far."""
         if self._error is not None:
             raise self._error
 

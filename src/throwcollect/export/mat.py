@@ -84,11 +84,7 @@ _FIELDS = (
 
 
 def write(source: ExportSource, directory: Path) -> None:
-    """Write a dataset as MATLAB files of version 5; see `Exporter.write`.
-
-    Raises:
-        ConfigError: If the dataset is not one of throws, or a column has a name that MATLAB does not allow.
-    """
+    """Write a dataset as MATLAB files of version 5; see `Exporter.write`."""
     task = source.dataset.config.task
     if not task.throws:
         raise refuse_argument(

@@ -43,11 +43,7 @@ class ParquetSeries:
         return divmod(len(self.paths) - (self._writer is not None), FILES_PER_CHUNK)
 
     def append(self, table: pa.Table) -> None:
-        """Write a table.
-
-        Raises:
-            OSError: If it cannot be written.
-        """
+        """Write a table."""
         chunk, file = self.place()
         if self._writer is None:
             path = self._directory / PATH.format(chunk_index=chunk, file_index=file)

@@ -100,12 +100,7 @@ class ExportSource:
 
     @classmethod
     def open(cls, directory: Path, *, rate_hz: int | None = None) -> ExportSource:
-        """Open a dataset to export it, at a number of samples per second, or else at the recorded one.
-
-        Raises:
-            DatasetError: If the directory holds no finished dataset, or one without episodes.
-            ConfigError: If the rate is below 1 or above the recorded one.
-        """
+        """Open a dataset to export it, at a number of samples per second, or else at the recorded one."""
         dataset = Dataset.open(directory)
         recorded_hz = dataset.config.record.rate_hz
         if rate_hz is not None and not (is_whole(rate_hz) and 1 <= rate_hz <= recorded_hz):
@@ -135,11 +130,7 @@ class ExportSource:
         return tuple(entry for entries in self.shards.values() for entry in entries)
 
     def throws(self, entries: Iterable[ExportableThrow]) -> Iterator[ThrowSeries]:
-        """Read throws with their time series, one at a time, as all of them may not fit into memory.
-
-        Raises:
-            DatasetError: If an episode is damaged, or not where the table says.
-        """
+        """Read throws with their time series, one at a time, as all of them may not fit into memory."""
         dataset = self.dataset
         for entry in entries:
             header, recorded = read_samples(dataset, entry.trial)

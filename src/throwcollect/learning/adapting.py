@@ -144,9 +144,6 @@ def refuse_far_inputs(learned: LearnedMap, role: KeyRole, inputs: Array) -> None
         learned: The map.
         role: Parameters or context.
         inputs: Their scaled values, shape ``(n_throws, n_axes of the role)``.
-
-    Raises:
-        FarThrowError: If a value is outside of the range of the dataset by more than half of that range.
     """
     for number, column in np.argwhere(np.abs(inputs) > _FAR).tolist():
         axis = learned.axes_of(role)[column]
@@ -164,10 +161,6 @@ def refuse_far_places(learned: LearnedMap, places: Array) -> None:
     Args:
         learned: The map.
         places: Where they ended, shape ``(n_throws, n_targets)``.
-
-    Raises:
-        FarThrowError: If the distance of a throw's end from the region where the throws of the map ended is larger than
-            the width of that region, and larger than a metre or radian.
     """
     low, high = learned.outputs.min(axis=0), learned.outputs.max(axis=0)
     away = np.linalg.norm(np.maximum(0.0, np.maximum(low - places, places - high)), axis=1)
@@ -269,11 +262,7 @@ def _find_bounds(learned: LearnedMap, method: Method, count: int) -> tuple[Array
 
 
 def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Array) -> Array:
-    """Solve the normal equations; a number that would leave its bounds is held at its bound, and the others adjust.
-
-    Raises:
-        ConfigError: If the numbers are too large for floats.
-    """
+    """Solve the normal equations; a number that would leave its bounds is held at its bound, and the others adjust."""
     held = np.full(len(found), np.nan)
     while True:
         free = np.isnan(held)

@@ -62,9 +62,6 @@ def distil(learned: LearnedMap) -> DistilledMap:
     The polynomial is not fitted to the parameters of the throws: different parameters may lead to the same target, but
     their mean would lead elsewhere. Instead, Gauss-Newton steps for all coefficients together reduce the misses that
     the map predicts.
-
-    Raises:
-        ConfigError: If a target is the same in all throws, so that it has no range to be scaled by.
     """
     for name, ends in zip(learned.targets, learned.outputs.T, strict=True):
         if ends.min() == ends.max():

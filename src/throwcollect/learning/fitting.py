@@ -77,10 +77,6 @@ def fit_map(
         targets: Columns that say where a trial ended; those of the task by default.
         parameters: Swept keys that are chosen when aiming; those of the task by default.
         context: Swept keys that are given with a target; those that the task names by default.
-
-    Raises:
-        ConfigError: If there are no targets, a key was not swept, a name appears twice, or too few throws succeeded.
-        DatasetError: If a column is missing, or holds no numbers.
     """
     for argument, names in (("targets", targets), ("parameters", parameters), ("given", context)):
         if twice := [name for name in names if names.count(name) > 1]:
@@ -143,11 +139,7 @@ def number_cells(places: Array) -> NDArray[np.int64]:
 def _find_axes(
     dataset: Dataset, throws: pa.Table, parameters: Sequence[str], context: Sequence[str]
 ) -> tuple[Axis, ...]:
-    """List the swept keys as inputs: parameters, context, latents.
-
-    Raises:
-        ConfigError: If a key was not swept, or has one value alone.
-    """
+    """List the swept keys as inputs: parameters, context, latents."""
     swept = dataset.plan.keys
     for key in (*parameters, *context):
         if key not in swept:
@@ -177,11 +169,7 @@ def _choose_role(config: Config, key: str, parameters: Sequence[str], context: S
 
 
 def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
-    """Refuse a dataset that no model can be learned from.
-
-    Raises:
-        ConfigError: If no parameter varies, too many do, or too few throws succeeded.
-    """
+    """Refuse a dataset that no model can be learned from."""
     chosen = [axis.key for axis in axes if axis.role is KeyRole.PARAMETER]
     if not chosen:
         raise ConfigError(
@@ -203,12 +191,7 @@ def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) ->
 
 
 def _read_numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
-    """Read a column of finite numbers.
-
-    Raises:
-        ConfigError: If there is no such column of numbers.
-        DatasetError: If a number is missing, or not finite.
-    """
+    """Read a column of finite numbers."""
     if column not in throws.column_names or not pa.types.is_floating(throws.schema.field(column).type):
         numbers = [field.name for field in throws.schema if pa.types.is_floating(field.type)]
         raise ConfigError(f"no column of numbers {column!r}{suggest(column, numbers, 'docs/dataset.md')}")

@@ -37,10 +37,6 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
         path: The file.
         names: Names of the columns.
         aliases: For some of these names, the column that is read instead if the file has no column of that name.
-
-    Raises:
-        ConfigError: If it cannot be read, a column is missing or appears twice, a row has more or fewer values than the
-            header has names, or a cell is no finite number.
     """
 
     def choose(header: tuple[str, ...], line: int) -> list[str]:
@@ -56,11 +52,7 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
 
 
 def _find_columns(header: Sequence[str], names: Sequence[str], aliases: dict[str, str], place: str) -> list[str]:
-    """Find the column that is read for each name.
-
-    Raises:
-        ConfigError: If there is none, or there are two.
-    """
+    """Find the column that is read for each name."""
     columns = [name if name in header else aliases.get(name, name) for name in names]
     if missing := [name for name, column in zip(names, columns, strict=True) if column not in header]:
         other = "".join(f", or {aliases[name]} for {name}" for name in missing if name in aliases)
@@ -77,9 +69,6 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
         path: The file.
         names: Names of the numbers of a target: columns of the table of throws, and keys that are given.
         task: Declares the names that columns of targets have in such lists.
-
-    Raises:
-        ConfigError: As `read_table`, or if a number is too large for a target.
     """
     aliases = {column.of: column.name for column in task.target_columns if column.of in names}
     rows = read_table(path, names, aliases=aliases)
@@ -88,11 +77,7 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
 
 
 def refuse_large_targets(rows: Sequence[Row], names: Sequence[str]) -> None:
-    """Refuse rows with numbers that are so large that their powers are not finite.
-
-    Raises:
-        ConfigError: If a number of one of these names is too large for a target.
-    """
+    """Refuse rows with numbers that are so large that their powers are not finite."""
     for row in rows:
         for name in names:
             if abs(row.numbers[name]) > LARGEST_TARGET:
@@ -106,10 +91,6 @@ def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: Task
 
     `names` are those of the numbers of a target: columns of the table of throws, and keys that are given. The list has
     columns only for targets that the task declares.
-
-    Raises:
-        ConfigError: If the name of the file does not end in ``.csv``.
-        DatasetError: If it cannot be written.
     """
     if path.suffix != ".csv":
         raise ConfigError(f"{path}: lists are written only as CSV", expected="a name with .csv")

@@ -260,11 +260,7 @@ class Model:
         write_model(read_path("directory", directory), self.file, self.learned, self.trials, self.config)
 
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
-        """Read scaled parameters and context of points.
-
-        Raises:
-            ConfigError: If a key is missing or unknown, or a value is not finite.
-        """
+        """Read scaled parameters and context of points."""
         names = (*self.parameters, *self.given)
         listed = read_list("points", points, "mappings, one for each throw", (Mapping,))
         rows = []
@@ -365,12 +361,7 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
 
 
 def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequence[str]) -> Array:
-    """Read targets, or places where throws ended, shape ``(n, n_names)``.
-
-    Raises:
-        ConfigError: If a place has not one number for each name, or a number is not finite, or so large that its powers
-            are not finite.
-    """
+    """Read targets, or places where throws ended, shape ``(n, n_names)``."""
     rows = []
     for place in read_list(argument, given, f"{argument}, each with {', '.join(names)}", (Iterable,)):
         numbers = read_list(argument, place, "numbers", (object,))
@@ -383,11 +374,7 @@ def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequenc
 
 
 def _check_scatter(scatter: float) -> None:
-    """Refuse a number that is no standard deviation.
-
-    Raises:
-        ConfigError: If it is negative, no number, or too large for a target.
-    """
+    """Refuse a number that is no standard deviation."""
     if not 0.0 <= as_float(scatter) <= LARGEST_TARGET:
         expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"
         raise refuse_argument("scatter", f"got {show_value(scatter)}", expected=expected)

@@ -29,13 +29,7 @@ _MOST_BYTES = 10_000_000
 
 
 def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: NDArray[np.int64], config: str) -> None:
-    """Write a model, given in the parts that `read_model` returns, into a directory that is new or empty.
-
-    Raises:
-        ConfigError: If the directory is not empty.
-        DatasetError: If it cannot be written.
-        MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
-    """
+    """Write a model, given in the parts that `read_model` returns, into a directory that is new or empty."""
     columns: dict[str, NDArray[Any]] = {"trial": trials}
     columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
     columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
@@ -55,9 +49,6 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
     Returns:
         The model without its throws; the map with the throws; numbers of their trials, shape ``(n,)``; YAML of the
         dataset's configuration.
-
-    Raises:
-        DatasetError: If there is none, or it is damaged.
     """
     file = read_model_file(directory)
     path = directory / POINTS
@@ -87,22 +78,14 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
 
 
 def write_score(directory: Path, score: Score) -> None:
-    """Write a score into the directory of a model, in place of an earlier one, and into the model's card.
-
-    Raises:
-        DatasetError: If there is no model, or the score cannot be written.
-    """
+    """Write a score into the directory of a model, in place of an earlier one, and into the model's card."""
     file = read_model_file(directory)
     write_file(directory / SCORE, (score.model_dump_json(indent=1) + "\n").encode())
     write_file(directory / CARD, describe_model(file, score).encode())
 
 
 def read_score(directory: Path) -> Score | None:
-    """Read the score of a model from its directory; None if it has none.
-
-    Raises:
-        DatasetError: If it cannot be read, or is no score.
-    """
+    """Read the score of a model from its directory; None if it has none."""
     path = directory / SCORE
     if not path.exists():
         return None

@@ -132,11 +132,7 @@ class ModelFile(ModelEntry):
 
 
 def read_model_file(directory: Path) -> ModelFile:
-    """Read ``model.json`` from the directory of a model.
-
-    Raises:
-        DatasetError: If the file is missing, cannot be read, or has other content.
-    """
+    """Read ``model.json`` from the directory of a model."""
     path = directory / MODEL
     try:
         text = read_text(path, most_bytes=_MOST_BYTES)

@@ -22,9 +22,6 @@ def encode_onnx(learned: LearnedMap, distilled: DistilledMap) -> bytes:
     Its input ``target`` has the shape ``(n, n_targets + n_context)``, its output ``parameters``
     ``(n, n_parameters)``, both in the order and the units that ``model.json`` has.
     Parameters stay inside of their ranges.
-
-    Raises:
-        MissingExtraError: If the package ``onnx`` is not installed.
     """
     chosen, given = learned.axes_of(KeyRole.PARAMETER), learned.axes_of(KeyRole.CONTEXT)
     low = np.array([*distilled.low.tolist(), *(axis.minimum for axis in given)])

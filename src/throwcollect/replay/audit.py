@@ -20,11 +20,7 @@ _Found = TypeVar("_Found")
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
-    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice.
-
-    Raises:
-        DatasetError: If no trial has an episode.
-    """
+    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice."""
     trials: list[int] = dataset.recorded.throws["trial"].to_pylist()
     if not trials:
         raise DatasetError(f"{dataset.directory}: no trial has an episode")
@@ -32,25 +28,14 @@ def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
 
 
 def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
-    """Simulate stored throws of a dataset again, and compare them, in the given order.
-
-    Raises:
-        DatasetError: If the dataset or an episode is damaged.
-        MissingExtraError: If a library for simulating is not installed.
-        WorkerError: If the physics engine does not start.
-    """
+    """Simulate stored throws of a dataset again, and compare them, in the given order."""
     return simulate_side_by_side(Dataset.open(directory).config.sim.engine, trials, _begin, (directory,))
 
 
 def simulate_side_by_side(
     engine: str, trials: Sequence[int], begin: Callable[..., Callable[[int], _Found]], arguments: tuple[object, ...]
 ) -> Iterator[_Found]:
-    """Simulate trials by an engine on all cores; `begin` and its arguments are those of `work_side_by_side`.
-
-    Raises:
-        MissingExtraError: If a library for simulating is not installed.
-        WorkerError: If the physics engine does not start.
-    """
+    """Simulate trials by an engine on all cores; `begin` and its arguments are those of `work_side_by_side`."""
     require_simulating(engine)
     processes = limit_processes(count_cores(), len(trials))
     simulated = work_side_by_side(trials, begin, arguments, processes=processes, doing="simulates")
@@ -58,11 +43,7 @@ def simulate_side_by_side(
 
 
 def require_simulating(engine: str) -> None:
-    """Check that the libraries for simulating by an engine are installed, before anything begins.
-
-    Raises:
-        MissingExtraError: If one is not installed.
-    """
+    """Check that the libraries for simulating by an engine are installed, before anything begins."""
     require_engine(engine)
     require("pinocchio")
 

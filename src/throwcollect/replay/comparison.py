@@ -25,11 +25,7 @@ class Comparison:
 
 
 def compare(stored: Episode, again: Episode) -> Comparison:
-    """Compare two episodes of one trial.
-
-    Raises:
-        DatasetError: If the stored episode is damaged, or belongs to another robot.
-    """
+    """Compare two episodes of one trial."""
     stored.check_records()
     differences: tuple[str, ...] = ()
     # This compares contents and not chunks, as the same messages may be compressed in different ways.

@@ -55,14 +55,7 @@ class Distribution:
 
 
 def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
-    """Simulate stored throws of a dataset with another engine; deviations come in the given order.
-
-    Raises:
-        ConfigError: If there is no such engine, or the dataset was computed by it.
-        DatasetError: If the dataset cannot be read.
-        MissingExtraError: If a library for simulating is not installed.
-        WorkerError: If the physics engine does not start.
-    """
+    """Simulate stored throws of a dataset with another engine; deviations come in the given order."""
     own = Dataset.open(directory).config.sim.engine
     others = [name for name in names_of("engines") if name != own]
     if engine == own:

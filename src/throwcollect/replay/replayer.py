@@ -38,10 +38,6 @@ class Replayer:
         """Simulate a trial with the collection's configuration, and return its episode, result and conditions.
 
         The trial need not be in the plan.
-
-        Raises:
-            ThrowcollectError: If a controller refuses its goal, or the samples are not finite, as in a collection.
-            MemberError: If the engine or the task comes from another package and fails.
         """
         self._runner.begin(trial.number, trial.values)
         while (delivery := self._runner.hand_over()) is None:

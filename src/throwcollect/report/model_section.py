@@ -26,12 +26,7 @@ _NOUNS = {"m": "distance", "rad": "angle"}
 
 
 def show_model(directory: Path, dataset: Dataset) -> ReportSection:
-    """Show how a model of a dataset hits targets, from the directory of the model.
-
-    Raises:
-        ConfigError: If the model was learned from another dataset.
-        DatasetError: If there is no model, or it is damaged.
-    """
+    """Show how a model of a dataset hits targets, from the directory of the model."""
     model, score = load_model(directory), read_score(directory)
     trained = model.file.trained_on
     if trained.digest != dataset.digest:

@@ -81,11 +81,7 @@ _STYLE: dict[Any, Any] = {
 
 
 def write_pictures(sections: Iterable[ReportSection], directory: Path) -> tuple[Path, ...]:
-    """Paint the panels that belong to a picture; each picture becomes a PNG file in the directory.
-
-    Raises:
-        OSError: If a file cannot be written.
-    """
+    """Paint the panels that belong to a picture; each picture becomes a PNG file in the directory."""
     pictures: dict[Path, list[Panel]] = {}
     for section in sections:
         for panel in section.panels:
@@ -97,11 +93,7 @@ def write_pictures(sections: Iterable[ReportSection], directory: Path) -> tuple[
 
 
 def paint(panels: Sequence[Panel], path: Path) -> None:
-    """Paint one panel, or small ones with one pair of axes each below one another, into a PNG file.
-
-    Raises:
-        OSError: If the file cannot be written.
-    """
+    """Paint one panel, or small ones with one pair of axes each below one another, into a PNG file."""
     with mpl.rc_context(_STYLE):
         heights = [panel.figure.layout.height - _FRAME_PX for panel in panels]
         width_in = _BOTH_COLUMNS_IN if panels[0].width_px > _MOST_PX_IN_COLUMN else _COLUMN_IN

@@ -56,13 +56,7 @@ class Report:
 
 
 def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
-    """Make the report on a dataset, and on a model that was learned from it, if its directory is given.
-
-    Raises:
-        ConfigError: If the model was learned from another dataset.
-        DatasetError: If a table or an episode is damaged, or the model.
-        MemberError: If the task comes from another package, and its part of the report fails.
-    """
+    """Make the report on a dataset, and on a model that was learned from it, if its directory is given."""
     throws, info = dataset.throws, summary(dataset)
     outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
     parameters = read_parameters(dataset.config, throws, outcomes)
@@ -107,12 +101,7 @@ def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
 
 
 def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded.
-
-    Raises:
-        ConfigError: If the task comes from another package, and its function cannot be imported.
-        MemberError: If the task comes from another package, and its function fails or returns something wrong.
-    """
+    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded."""
     name = dataset.config.task.name
     if path := task_of(dataset.config).report:
         report = load_part("tasks", name, path)

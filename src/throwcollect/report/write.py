@@ -25,11 +25,6 @@ def write_report(directory: Path, page: Path, *, pictures: Path | None = None, m
 
     The page is an HTML file, which must not exist yet. `pictures` is a directory for pictures, which must not exist or
     must be empty; None for no pictures.
-
-    Raises:
-        MissingExtraError: If a library that draws is not installed.
-        ConfigError: If a file is there already, or the model was learned from another dataset.
-        DatasetError: If the directory holds no finished dataset, it is damaged, or the report cannot be written.
     """
     require("jinja2", "plotly", *(("matplotlib",) if pictures else ()))
     from throwcollect.report.page import render_page

@@ -12,12 +12,7 @@ _NAME = "robot_description"
 
 
 def check_appearance(description: str, drawn: str) -> None:
-    """Refuse a URDF for viewers that changes more of the simulated robot's description than its appearance.
-
-    Raises:
-        ConfigError: If the text for viewers is no URDF.
-        ConflictError: If it has other joints, masses or collision shapes.
-    """
+    """Refuse a URDF for viewers that changes more of the simulated robot's description than its appearance."""
     own, other = _read_physics(description), _read_physics(drawn)
     if differing := sorted(name for name in own.keys() | other.keys() if own.get(name) != other.get(name)):
         raise ConflictError(
@@ -27,11 +22,7 @@ def check_appearance(description: str, drawn: str) -> None:
 
 
 def read_urdf_text(path: Path) -> str:
-    """Read the URDF text of a file.
-
-    Raises:
-        ConfigError: If it cannot be read, or is no URDF.
-    """
+    """Read the URDF text of a file."""
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

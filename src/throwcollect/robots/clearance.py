@@ -144,9 +144,6 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
     """Read the shapes of a robot's links, and the pairs that must stay apart; callers must not change the result.
 
     The result is cached, because reading meshes takes a third of a second, and some programs check several datasets.
-
-    Raises:
-        ConfigError: If the robot's meshes cannot be read.
     """
     model, geometry = joint_model(robot), pinocchio.GeometryModel()
     frames = {model.getFrameId(link.name, pinocchio.BODY): link for link in robot.description.model.links}
@@ -163,11 +160,7 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
 
 
 def _make_solid(where: str, shape: LinkShape) -> pinocchio.coal.CollisionGeometry:
-    """Make a shape for computing distances; that of a mesh is its convex hull, as in the physics.
-
-    Raises:
-        ConfigError: If a mesh cannot be read, or has no hull.
-    """
+    """Make a shape for computing distances; that of a mesh is its convex hull, as in the physics."""
     coal = pinocchio.coal
     if shape.mesh is None:
         kinds = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "capsule": coal.Capsule}

@@ -73,9 +73,6 @@ def start_posture(config: Config) -> Mapping[str, float]:
     """Find the angle [rad] of each joint at the start of a trial, in the order of `Robot.joints`.
 
     The angle of a joint is taken from ``task.start``, or else ``robot.posture``, or else the robot's posture at rest.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
     """
     return MappingProxyType({**robot_of(config).rest_posture, **config.robot.posture, **config.task.start})
 
@@ -90,9 +87,6 @@ def find_locked_joints(config: Config) -> Mapping[str, float]:
     """Find the joints that are simulated as rigid and their angles [rad], in the order of `Robot.joints`.
 
     For ``robot.locked: auto``, these are all joints that the task does not move.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
     """
     choice = config.robot.locked
     posture = start_posture(config)
@@ -105,9 +99,6 @@ def full_description(config: Config) -> str:
     """Write the URDF text of the robot with its tool: all joints, visual and collision shapes, ``package://`` paths.
 
     The hand has no collision shapes, because its fingers reach into the tool's handle.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
     """
     robot = robot_of(config)
     key = robot, config.tool.model_dump_json()
@@ -135,11 +126,7 @@ def _write_full(robot: Robot, tool: Tool) -> str:
 
 
 def touchable_bodies(config: Config) -> frozenset[str]:
-    """List the names under which contacts of the ball are recorded: the tool, ``ground``, and the robot's links.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
-    """
+    """List the names under which contacts of the ball are recorded: the tool, ``ground``, and the robot's links."""
     return frozenset({tool_of(config).name, "ground", *robot_of(config).description.links})
 
 
@@ -148,9 +135,6 @@ def joint_model(robot: Robot) -> pinocchio.Model:
     """Build a model of all joints of a robot, without a tool; callers must not change it.
 
     It is cached, because each trial with other locked joints or another tool needs it.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read, lack something, or describe bodies that there cannot be.
     """
     source = robot.description.model
     _ = robot.rest_posture
@@ -166,11 +150,7 @@ def joint_model(robot: Robot) -> pinocchio.Model:
 
 
 def _check_inertias(robot: Robot, model: pinocchio.Model) -> None:
-    """Make sure that there can be the bodies that joints move: engines would change others, or drop them.
-
-    Raises:
-        ConfigError: If one has no mass, or moments of inertia that no body has.
-    """
+    """Make sure that there can be the bodies that joints move: engines would change others, or drop them."""
     # Pinocchio's first joint is the universe.
     for joint, body in zip(model.names[1:], model.inertias[1:], strict=True):
         where = f"{robot.urdf_path}: link {robot.description.joints[joint].child}, which {joint} moves,"
@@ -194,9 +174,6 @@ def physics_description(config: Config) -> Description:
 
     Links that such a joint connects become one link. It has the name of the link that the moving joint before it moves
     in the robot's URDF, and mass, inertia and collision shapes of all of these links.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
     """
     robot, tool = robot_of(config), tool_of(config)
     check_name_of_tool(robot, tool)
@@ -221,11 +198,7 @@ def physics_description(config: Config) -> Description:
 
 
 def check_name_of_tool(robot: Robot, tool: Tool) -> None:
-    """Make sure that a contact with the tool is not taken for one with the ground or a part of the robot.
-
-    Raises:
-        ConfigError: If one of these has the name of the tool or of its link.
-    """
+    """Make sure that a contact with the tool is not taken for one with the ground or a part of the robot."""
     if taken := {tool.name, tool.link} & {"ground", *robot.description.links}:
         raise ConfigError(
             f"tool.name: the tool is recorded as {tool.name}, with the link {tool.link}; the ground or a link of "

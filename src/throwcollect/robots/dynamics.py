@@ -45,9 +45,6 @@ class Dynamics:
 
         Returns:
             [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`; 0 for locked joints.
-
-        Raises:
-            ConfigError: If the ball does not fit the tool.
         """
         seat = np.array(tool.ball_seat(config.ball.radius_m))
         ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)

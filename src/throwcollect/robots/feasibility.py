@@ -79,9 +79,6 @@ class Feasibility:
             None if the trial is feasible. Otherwise one sentence with joint or links, instant, value and limit, about
             the first of these checks that fails: position, velocity, effort, collision, a tool that has to move, a ball
             that has to stay. For limits, it tells the worst violation; for collisions, the first one.
-
-        Raises:
-            ConfigError: If the ball does not fit the tool.
         """
         posture = np.array(list(start_posture(config).values())) + joint_offsets(config)
         joints, tool = self._robot.joints, self._tool_of(config)

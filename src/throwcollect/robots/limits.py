@@ -32,11 +32,7 @@ class JointLimits:
 
 @cache
 def joint_limits(robot: Robot) -> JointLimits:
-    """Read the limits of the joints of a robot.
-
-    Raises:
-        ConfigError: If the URDF cannot be read.
-    """
+    """Read the limits of the joints of a robot."""
     joints = [robot.description.joints[name] for name in robot.joints]
     table = np.array([(*joint.limits, joint.damping) for joint in joints if joint.limits is not None])
     # The result is cached, so all callers have the same arrays, and none may write to them.

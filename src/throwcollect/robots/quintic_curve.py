@@ -24,9 +24,6 @@ def sample_quintic(
 
     Returns:
         Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, n_joints)``.
-
-    Raises:
-        ValueError: If the trajectory has fewer than two points.
     """
     coefficients, u, spans = _find_polynomials(trajectory, times)
     first = coefficients[1:] * _ORDERS[1:, np.newaxis, np.newaxis]
@@ -35,11 +32,7 @@ def sample_quintic(
 
 
 def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Compute the positions of `sample_quintic` alone, at a fraction of its cost.
-
-    Raises:
-        ValueError: If the trajectory has fewer than two points.
-    """
+    """Compute the positions of `sample_quintic` alone, at a fraction of its cost."""
     coefficients, u, _ = _find_polynomials(trajectory, times)
     return _evaluate(coefficients, u).T
 
@@ -52,9 +45,6 @@ def _find_polynomials(
     Returns:
         Coefficients of the segment's polynomials ``(6, n_joints, n)``, the place u in the segment from 0 to 1, and the
         length of the segment [s], both of shape ``(n,)``.
-
-    Raises:
-        ValueError: If the trajectory has fewer than two points.
     """
     knots = trajectory.times
     if len(knots) < 2:

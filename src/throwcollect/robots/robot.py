@@ -21,11 +21,7 @@ from throwcollect.robots.urdf import Urdf, locate_mesh, read_urdf, read_xml
 
 
 def _refuse_repeated(controllers: Mapping[str, tuple[str, ...]]) -> Mapping[str, tuple[str, ...]]:
-    """Make sure that no joint has two controllers.
-
-    Raises:
-        ValueError: If a joint is there twice.
-    """
+    """Make sure that no joint has two controllers."""
     counts = Counter(joint for joints in controllers.values() for joint in joints)
     if repeated := [joint for joint, count in counts.items() if count > 1]:
         raise ValueError(f"should name each joint once, not {repeated[0]} twice")

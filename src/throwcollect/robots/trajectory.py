@@ -31,12 +31,7 @@ class JointTrajectory:
     accelerations: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        """Refuse numbers that are no motion.
-
-        Raises:
-            ValueError: If there is no point, an array has another shape or a number that is not finite, or times do not
-                increase.
-        """
+        """Refuse numbers that are no motion."""
         points, of_joints = len(self.times), (len(self.times), len(self.joints))
         shapes = {"times": (points,), "positions": of_joints, "velocities": of_joints, "accelerations": of_joints}
         for name, shape in shapes.items():

@@ -88,11 +88,7 @@ class _NoDoctype(ElementTree.TreeBuilder):
         self._name = name
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        """Reject a document type declaration.
-
-        Raises:
-            ConfigError: Always.
-        """
+        """Reject a document type declaration."""
         del pubid, system
         raise ConfigError(f"{self._name}: document type {name!r:.40} is declared; descriptions have none")
 

@@ -29,10 +29,6 @@ def __getattr__(name: str) -> Any:
 
 
 def find_class(kind: Kind, full_name: str) -> Any:
-    """Class of an interface of the backend.
-
-    Raises:
-        ValueError: If there is no such interface.
-    """
+    """Class of an interface of the backend."""
     get = {"msg": "get_message", "srv": "get_service", "action": "get_action"}[kind]
     return getattr(sys.modules[_EDGE], get)(full_name)

@@ -35,11 +35,7 @@ class Connection:
     middleware: Middleware = _EMBEDDED
 
     def environment(self) -> Mapping[str, str]:
-        """Environment variables by which a process of ours joins the run; they name the key's files and hold no secret.
-
-        Raises:
-            ConfigError: If the key lies where Zenoh cannot find it.
-        """
+        """Environment variables by which our processes join the run; they name the key's files and hold no secret."""
         return {
             **self.middleware.environment(),
             OVERRIDE_VARIABLE: client_override(self.endpoint, session_key(self.endpoint, self.key)),
@@ -48,11 +44,7 @@ class Connection:
         }
 
     def check(self, rmw: str) -> None:
-        """Refuse to join the run by an RMW that its nodes do not understand.
-
-        Raises:
-            ConfigError: If this process has another RMW than the run.
-        """
+        """Refuse to join the run by an RMW that its nodes do not understand."""
         if self.middleware.rmw != rmw:
             raise ConfigError(
                 f"the run at {self.endpoint} is on {self.middleware.rmw}, and this process on {rmw}",
@@ -61,11 +53,7 @@ class Connection:
 
 
 def session_key(endpoint: str, key: RunKey) -> Key | None:
-    """The key of a run as a Zenoh session takes it; None if the router at the endpoint lets anybody in.
-
-    Raises:
-        ConfigError: If it lies where Zenoh cannot find it.
-    """
+    """The key of a run as a Zenoh session takes it; None if the router at the endpoint lets anybody in."""
     if not endpoint.startswith(PROTECTED):
         return None
     if forbidden := sorted(set(NOT_IN_PATHS) & set(str(key.directory))):

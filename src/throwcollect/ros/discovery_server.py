@@ -34,10 +34,6 @@ def discovery_server(endpoint: str) -> Iterator[None]:
     """Run a discovery server as a child process; the block begins when it listens, such as at ``udp/127.0.0.1:7447``.
 
     Meanwhile, this process accepts TCP connections at the same port, by which others find out that the server runs.
-
-    Raises:
-        ConfigError: If there is no such program, or it cannot listen there.
-        WorkerError: If it ends at once.
     """
     command = [_find_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
     with (
@@ -65,11 +61,7 @@ def discovery_server(endpoint: str) -> Iterator[None]:
 
 @contextmanager
 def _accept_connections(endpoint: str) -> Iterator[None]:
-    """Accept TCP connections and close them, because a UDP port does not show whether somebody listens.
-
-    Raises:
-        ConfigError: If the port is taken, or the address is not this machine's.
-    """
+    """Accept TCP connections and close them, because a UDP port does not show whether somebody listens."""
     try:
         server = socket.create_server(split_address(endpoint))
     except OSError as error:

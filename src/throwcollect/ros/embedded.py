@@ -18,11 +18,6 @@ def init(*, context: Context | None = None, connection: Connection | None = None
     Args:
         context: The context; None for the default one, for which a SIGTERM ends all spinning from now on.
         connection: The way into the graph; None for the one that the environment describes.
-
-    Raises:
-        RuntimeError: If the context is in use already.
-        ConfigError: If the environment or the connection cannot be used, or the connection needs other middleware.
-        ThrowcollectError: If there is no router.
     """
     domain_id = config = None
     with zenoh_errors():
@@ -34,11 +29,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
 
 
 def joins_protected() -> bool:
-    """Whether nodes of this process join a graph that lets nobody in without a key.
-
-    Raises:
-        ConfigError: If an environment variable has a wrong value.
-    """
+    """Whether nodes of this process join a graph that lets nobody in without a key."""
     with zenoh_errors():
         return is_protected()
 

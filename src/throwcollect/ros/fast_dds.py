@@ -37,11 +37,7 @@ would take it for the old server: they would not announce themselves to it, and 
 
 
 def client_profile(endpoint: str) -> str:
-    """The profile of a node that uses the discovery server at an endpoint like ``udp/127.0.0.1:7447``.
-
-    Raises:
-        ConfigError: If the endpoint has no address.
-    """
+    """The profile of a node that uses the discovery server at an endpoint like ``udp/127.0.0.1:7447``."""
     address, port = _resolve_address(endpoint)
     # A plain client would only hear of nodes with which it has topics in common, so its ROS graph would be incomplete.
     discovery = f"""<discoveryProtocol>SUPER_CLIENT</discoveryProtocol>
@@ -70,11 +66,7 @@ def write_temporarily(profile: str) -> Path:
 
 
 def _resolve_address(endpoint: str) -> tuple[str, int]:
-    """IPv4 address and port of an endpoint; its name is resolved here, as nodes pass the address on to others.
-
-    Raises:
-        ConfigError: If it is no address, or a name that nobody knows.
-    """
+    """IPv4 address and port of an endpoint; its name is resolved here, as nodes pass the address on to others."""
     try:
         host, port = split_address(endpoint)
         return socket.gethostbyname(host), port

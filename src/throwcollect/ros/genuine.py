@@ -67,12 +67,6 @@ def init(*, context: Context | None = None, connection: Connection | None = None
     Args:
         context: The context; None for the default one.
         connection: The way into the graph; None for the one that the environment describes.
-
-    Raises:
-        RuntimeError: If the context is in use already.
-        ConfigError: If an environment variable has a wrong value, or the connection needs other middleware.
-        ThrowcollectError: If the RMW does not start (rmw_zenoh_cpp needs a router), or this process is in another run
-            on Fast DDS.
     """
     # rclpy loads its RMW when it is first used, and gets the name of the RMW only from the environment.
     os.environ[RMW_VARIABLE] = Middleware.of_process().rmw
@@ -105,10 +99,6 @@ def _use_discovery_server(endpoint: str) -> None:
 
     Fast DDS reads its profile when the first node is made, and never again. So the variable stays set, and a process
     can use one discovery server only.
-
-    Raises:
-        ConfigError: If the endpoint has no address.
-        WorkerError: If this process uses another discovery server.
     """
     if _discovery_server and _discovery_server != [endpoint]:
         raise WorkerError(
@@ -140,11 +130,7 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def _find_interface(kind: str, name: str) -> Any:
-    """Class of an interface, such as ``sensor_msgs/msg/JointState``.
-
-    Raises:
-        ValueError: If no such interface is installed, or the name is not one of this kind.
-    """
+    """Class of an interface, such as ``sensor_msgs/msg/JointState``."""
     package, separator, short = name.partition(f"/{kind}/")
     if not (separator and package.isidentifier() and short.isidentifier()):
         raise ValueError(f"expected a name of the form package/{kind}/Name, got {name!r}")
@@ -171,11 +157,7 @@ def let_callbacks_wait(node: Node) -> None:
 
 
 def joins_protected() -> bool:
-    """Whether nodes of this process join a graph that lets nobody in without a key: other RMWs know of no key.
-
-    Raises:
-        ConfigError: If an environment variable has a wrong value.
-    """
+    """Whether nodes of this process join a graph that lets nobody in without a key: other RMWs know of no key."""
     if not Middleware("rclpy", rclpy.get_rmw_implementation_identifier()).keeps_others_out:
         return False
     with zenoh_errors():

@@ -15,11 +15,7 @@ _numbers = itertools.count()
 
 
 def absolute_name(name: str) -> str:
-    """Absolute name of a node, topic, service or action that a user names with or without its leading slash.
-
-    Raises:
-        ConfigError: If ROS does not allow such names.
-    """
+    """Absolute name of a node, topic, service or action that a user names with or without its leading slash."""
     try:
         return resolve(name, "/", "")
     except NameValidationException as error:
@@ -43,11 +39,7 @@ def full_name(kind: Kind, name: str) -> str:
 
 
 def find_interface(kind: Kind, name: str) -> Any:
-    """Class of a message, service or action that a user names in full, or without its ``kind``.
-
-    Raises:
-        ConfigError: If there is no such type.
-    """
+    """Class of a message, service or action that a user names in full, or without its ``kind``."""
     try:
         return find_class(kind, full_name(kind, name))
     except ValueError as error:

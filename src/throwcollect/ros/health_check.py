@@ -33,10 +33,6 @@ def check(node: str | None = None) -> None:
     Args:
         node: ``router``, ``coordinator``, or the name of a simulation; None for the one that ``THROWCOLLECT_NODE``
             names.
-
-    Raises:
-        ConfigError: If no node is named, or an environment variable has a wrong value.
-        ThrowcollectError: If it does not answer.
     """
     name = node or os.environ.get(NODE_VARIABLE)
     if not name or not _NAME.fullmatch(name):
@@ -72,11 +68,7 @@ def check(node: str | None = None) -> None:
 
 
 def _check_discovery_server(endpoint: str) -> None:
-    """Check that the router of a private run on Fast DDS takes a connection.
-
-    Raises:
-        ThrowcollectError: If it does not.
-    """
+    """Check that the router of a private run on Fast DDS takes a connection."""
     try:
         with socket.create_connection(split_address(endpoint), TIMEOUT_S) as connection:
             # The router closes the connection at once; if it is stuck, it does not, and this times out.

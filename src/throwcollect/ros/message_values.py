@@ -42,9 +42,6 @@ def fill(message: Any, values: object, where: str = "") -> None:
         values: Mapping of field names to values; nested messages are mappings, too. Null is the number NaN, octets may
             be bytes or Base64, arrays may be NumPy's, and fields of times may have the names that they have in ROS 1.
         where: Path of this message inside the whole message, with a dot at its end.
-
-    Raises:
-        ConfigError: If there is no such field, or it cannot take the value.
     """
     types = _field_types(message.__class__)
     if not isinstance(values, Mapping):
@@ -171,12 +168,7 @@ def _numbers(element: str, value: object, current: Any) -> Any:
 
 
 def _check_numbers(kind: str, values: list[Any]) -> list[Any]:
-    """Numbers or truth values that a type can hold.
-
-    Raises:
-        TypeError: If one is something else.
-        ValueError: If one is too large or too small.
-    """
+    """Numbers or truth values that a type can hold."""
     # Types are compared exactly, because `isinstance` would take truth values for whole numbers.
     kinds = set(map(type, values))
     allowed: set[type] = {bool} if kind == "boolean" else {int}

@@ -43,11 +43,7 @@ class Middleware:
 
     @classmethod
     def of_process(cls) -> Middleware:
-        """The middleware of this process: the one that was settled on, or else the one that its environment chooses.
-
-        Raises:
-            ConfigError: If the environment asks for a backend that is not there.
-        """
+        """The middleware of this process: the one that was settled on, or else the one that its environment chooses."""
         if _settled:
             return _settled[0]
         return _choose_installed(os.environ.get(VARIABLE) or "auto", os.environ.get(RMW_VARIABLE) or None)
@@ -77,9 +73,6 @@ class Middleware:
         """Make this the middleware of the process, whatever its environment says.
 
         Call it before the first name is taken from `throwcollect.ros`, as a process has one backend.
-
-        Raises:
-            ConfigError: If the backend or its RMW is not installed.
         """
         _settled[:] = [_choose_installed(self.backend, self.rmw if self.backend == "rclpy" else None)]
 
@@ -94,9 +87,6 @@ def choose_middleware(backend: Literal["auto", "embedded", "rclpy"]) -> Middlewa
     Args:
         backend: The one that the configuration asks for; ``auto`` leaves it to the environment, and to the packages
             that are installed.
-
-    Raises:
-        ConfigError: If the backend is not installed.
     """
     if backend == "auto":
         return Middleware.of_process()
@@ -104,11 +94,7 @@ def choose_middleware(backend: Literal["auto", "embedded", "rclpy"]) -> Middlewa
 
 
 def uses_rclpy() -> bool:
-    """Whether nodes of this process run on genuine rclpy.
-
-    Raises:
-        ConfigError: If the environment asks for a backend that is not there.
-    """
+    """Whether nodes of this process run on genuine rclpy."""
     return Middleware.of_process().backend == "rclpy"
 
 
@@ -119,10 +105,6 @@ def _choose_installed(backend: str, rmw: str | None) -> Middleware:
 
     With ``auto``, the embedded backend is chosen if rmw_zenoh_cpp is requested but not installed, because it speaks the
     same protocol.
-
-    Raises:
-        ConfigError: If the backend is unknown, or rclpy is requested but not installed or without all interfaces, or
-            the RMW is not installed.
     """
     if backend not in ("auto", "rclpy", "embedded"):
         raise ConfigError(f"{VARIABLE}: got {backend!r}", expected="auto, rclpy or embedded")

@@ -36,11 +36,7 @@ _PORT_ATTEMPTS = 5
 
 @contextmanager
 def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[str]:
-    """Run a router in this process; yields the endpoint that nodes connect to. Port 0 takes a free one.
-
-    Raises:
-        ConfigError: If the endpoint is malformed, the router cannot listen on it, or its key cannot be read.
-    """
+    """Run a router in this process; yields the endpoint that nodes connect to. Port 0 takes a free one."""
     session, endpoint = _open(listen, key)
     try:
         yield endpoint
@@ -50,12 +46,7 @@ def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[
 
 @contextmanager
 def _discovery_server(listen: str) -> Iterator[str]:
-    """Run a discovery server of Fast DDS; yields the endpoint that nodes use. Port 0 takes a free one.
-
-    Raises:
-        ConfigError: If it cannot listen there, or there is no such program.
-        WorkerError: If it ends at once.
-    """
+    """Run a discovery server of Fast DDS; yields the endpoint that nodes use. Port 0 takes a free one."""
     address, _, port = listen.rpartition(":")
     endpoint = f"{address}:{_find_free_port(address)}" if port == "0" else listen
     with discovery_server(endpoint):
@@ -106,10 +97,6 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
         listen: Endpoint to listen on; port 0 takes a free one.
         key_directory: Directory of the key; at an endpoint ``tls/...``, the router lets nobody in without this key. If
             the directory holds no key, one is made. None for the key that the environment names.
-
-    Raises:
-        ConfigError: If the endpoint is malformed or does not use a key, the router cannot listen on it, or its key
-            cannot be read.
     """
     if key_directory is None:
         key = RunKey.of_environment()

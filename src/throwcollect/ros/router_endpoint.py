@@ -10,11 +10,7 @@ _POLL_S = 0.05
 
 
 def split_address(endpoint: str) -> tuple[str, int]:
-    """Host and port of an endpoint, such as ``tcp/0.0.0.0:7447``.
-
-    Raises:
-        ValueError: If the port is no number.
-    """
+    """Host and port of an endpoint, such as ``tcp/0.0.0.0:7447``."""
     # The last colon comes before the port: IPv6 addresses contain colons, too, and are therefore in brackets.
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     return host.strip("[]"), int(port)

@@ -24,9 +24,6 @@ def begin_to_serve(*nodes: ros.Node) -> tuple[ros.Executor, Callable[[], int]]:
 
     Returns:
         The executor, and a function that tells the number of the last signal that asked to stop; 0 if none has.
-
-    Raises:
-        WorkerError: If the first node does not answer itself within ten seconds.
     """
     executor = ros.SingleThreadedExecutor()
     for node in nodes:
@@ -52,9 +49,6 @@ def check_answers(node: ros.Node, executor: ros.Executor) -> None:
     """Let a node call one of its own services, while its executor spins as it will in this process.
 
     Without this check, a backend that does not answer would show only as a collection that does not begin.
-
-    Raises:
-        WorkerError: If no answer comes within ten seconds.
     """
     service: Any = ros.get_service("rcl_interfaces/srv/GetParameters")
     client = node.create_client(service, f"{node.get_fully_qualified_name()}/get_parameters")

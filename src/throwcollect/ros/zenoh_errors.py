@@ -13,12 +13,7 @@ from throwcollect.run_key import unreadable_key
 
 @contextmanager
 def zenoh_errors() -> Iterator[None]:
-    """Raise errors about a session as errors of throwcollect.
-
-    Raises:
-        ConfigError: If the session cannot be opened as it is asked for.
-        UnreachableError: If there is no router.
-    """
+    """Raise errors about a session as errors of throwcollect."""
     try:
         yield
     # This error is handled before `ConfigurationError`, because it is derived from that.

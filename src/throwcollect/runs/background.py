@@ -81,11 +81,6 @@ def begin_run(
         origin: The request of a client; None if no client asks.
         kind: Kind of the run.
         resumed: Whether the run continues the dataset that the directory holds.
-
-    Raises:
-        ConflictError: If there is a run of that id.
-        ConfigError: If the configuration cannot be used.
-        WorkerError: If the process cannot be started.
     """
     read = load(config, overrides)
     if kind == "session":
@@ -105,11 +100,6 @@ def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Pa
     """Begin a run that is a container of the catalogue, in a process of its own, as `begin_run` does.
 
     `urdf` is a file with a description of the robot for viewers; None if the component has none.
-
-    Raises:
-        ConflictError: If there is a run of that id, or the run that the container is to join has ended.
-        ConfigError: If the container needs something that is not there, or cannot join that run.
-        WorkerError: If no engine answers, it does not have the image, or the process cannot be started.
     """
     check_order(order)
     opened = Records().new(order.component, run=run)
@@ -144,12 +134,7 @@ def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin
 
 
 def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
-    """Start the process of a run, write the record with its id, and send it the order; `lay_out` makes further files.
-
-    Raises:
-        ConfigError: If the record cannot be written.
-        WorkerError: If the process cannot be started.
-    """
+    """Start the process of a run, write the record with its id, send it the order; `lay_out` makes further files."""
     process: subprocess.Popen[bytes] | None = None
     try:
         logs = Path(record.logs)
@@ -183,9 +168,6 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
 
     This process has inherited the locked file and received the order. Signals that ask it to stop were blocked until
     it called this function; from now on, `interruptions` counts them.
-
-    Raises:
-        ThrowcollectError: If the run fails; the error is written into the record, too.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
     records = Records()
@@ -241,11 +223,7 @@ class _Planner(Onlooker):
         self._onlooker.warn(line)
 
     def update_plan(self, checked: int, trials: int) -> None:
-        """Take in how many of a plan's trials have been checked.
-
-        Raises:
-            Interrupted: If somebody has asked to stop.
-        """
+        """Take in how many of a plan's trials have been checked."""
         self.end_if_asked()
         if trials >= MANY_TRIALS and time.monotonic() >= self._write_at:
             self._write_at = time.monotonic() + _WRITE_PLANNING_S
@@ -254,21 +232,13 @@ class _Planner(Onlooker):
                 self._run.update(planning=Planning(checked, trials))
 
     def end_if_asked(self) -> None:
-        """End the preparation if somebody has asked to stop.
-
-        Raises:
-            Interrupted: If somebody has.
-        """
+        """End the preparation if somebody has asked to stop."""
         if self._interruptions():
             raise Interrupted("stopped before any node was started")
 
 
 def _move_log(before: Path, after: Path) -> None:
-    """Move the launcher's log to the logs of the nodes, whose directory exists by now, and print into it from then on.
-
-    Raises:
-        WorkerError: If the new log cannot be written.
-    """
+    """Move the launcher's log to the logs of the nodes, whose directory exists by now, and print into it."""
     try:
         # If this process prints somewhere else, such as into a terminal, there is no log to move.
         if before == after or not os.path.samestat(os.fstat(1), before.stat()):
@@ -325,11 +295,7 @@ def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onl
 
 
 def _check_session(config: Config) -> None:
-    """Check that a session has nodes to which its clients can talk.
-
-    Raises:
-        ConfigError: If the run is to be one process without nodes.
-    """
+    """Check that a session has nodes to which its clients can talk."""
     if config.run.runtime != "auto" and not get_runtime(config.run.runtime).can_be_scaled:
         raise ConfigError(
             [Problem(f"should have nodes for clients to talk to, got {config.run.runtime}", key="run.runtime")]

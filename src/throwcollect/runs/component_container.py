@@ -41,15 +41,7 @@ CONTAINER_ORDERS = TypeAdapter(ContainerOrder)
 
 
 def check_order(order: ContainerOrder) -> None:
-    """Refuse an order that would fail at once.
-
-    Raises:
-        NotFoundError: If the run that the container is to join does not exist.
-        ConflictError: If that run has ended, or has no router to join.
-        ConfigError: If a mount or a network does not exist or must not be used, or the container cannot join that run.
-        WorkerError: If no engine answers, or it does not have the image.
-        MissingExtraError: If the package that asks the engine is not installed.
-    """
+    """Refuse an order that would fail at once."""
     with explain_missing():
         from throwcollect.runtimes.docker.checks import check_container
         from throwcollect.runtimes.docker.docker_engine import connect
@@ -62,14 +54,7 @@ def check_order(order: ContainerOrder) -> None:
 def launch_container(
     run: OpenRun, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]
 ) -> None:
-    """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run.
-
-    Raises:
-        ConfigError: If the container needs something that is not there, or cannot join that run.
-        ConflictError: If the run that the container is to join has ended.
-        WorkerError: If the engine or the container fails.
-        Interrupted: If somebody asked to stop before there was a container.
-    """
+    """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run."""
     # `serve` imports this module for `check_order`, and should not wait for the launcher's imports.
     from throwcollect.runs.launcher import launch_host
 
@@ -90,14 +75,7 @@ def _goes_on(run: str) -> bool:
 
 
 def _wait_for_router(run: str, spec: ContainerSpec, interruptions: Callable[[], int]) -> JoinOptions:
-    """Wait until a container can join a run, which may just be starting, and return the options for that.
-
-    Raises:
-        ConfigError: If the container cannot join the run.
-        ConflictError: If the run has ended, or has no router to join.
-        WorkerError: If the launcher of the run died.
-        Interrupted: If somebody asked to stop.
-    """
+    """Wait until a container can join a run, which may just be starting, and return the options for that."""
     while (joining := _find_join_options(Records().get(run), spec)) is None:
         if interruptions():
             raise Interrupted("stopped before the container was started")
@@ -106,13 +84,7 @@ def _wait_for_router(run: str, spec: ContainerSpec, interruptions: Callable[[], 
 
 
 def _find_join_options(run: Run, spec: ContainerSpec) -> JoinOptions | None:
-    """Find the options with which a container joins a run; None while the run has no router yet.
-
-    Raises:
-        ConfigError: If the container cannot join the run.
-        ConflictError: If the run has ended, or has no router to join.
-        WorkerError: If the launcher of the run died.
-    """
+    """Find the options with which a container joins a run; None while the run has no router yet."""
     from throwcollect.runtimes.docker.component import find_join_options
     from throwcollect.runtimes.registry import get_runtime
 

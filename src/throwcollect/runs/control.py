@@ -42,10 +42,6 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
     """Drain a run: running trials are finished and written, no further trial is started, and all nodes end.
 
     This function waits until the run ends or `keep_on` returns false, and returns the run as it is then.
-
-    Raises:
-        ConfigError: If the run has ended, its record cannot be read, or it is no `Run`.
-        WorkerError: If the launcher died, or does not end.
     """
     check_run(run)
     _signal(run.records, require_living(run), signal.SIGTERM)
@@ -68,10 +64,6 @@ def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]
 
     Returns:
         Id of the run, and names of the containers, networks and volumes that were removed.
-
-    Raises:
-        ConfigError: If there is no such run, or more than one.
-        WorkerError: If something cannot be ended or removed.
     """
     records, held = Records(), find_held_runs()
     if isinstance(named, Run):
@@ -104,13 +96,7 @@ def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]
 
 
 def scale(run: Run, simulations: int) -> None:
-    """Ask the launcher of a run for another number of simulations.
-
-    Raises:
-        ConflictError: If the run has ended, is still starting, or is a container, which has no simulations.
-        ConfigError: If it cannot be scaled, the launcher refuses that number, or an argument is of another kind.
-        WorkerError: If the launcher died, or does not answer.
-    """
+    """Ask the launcher of a run for another number of simulations."""
     check_run(run)
     check_whole_number("simulations", simulations, least=0)
     # The run may have ended since it was found.
@@ -133,9 +119,6 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
     """Set a parameter of several nodes of a run at the same time, and return the answer of each node.
 
     `nodes` are full names, with their namespaces.
-
-    Raises:
-        WorkerError: If the router or a node does not answer.
     """
     connection = run.connection
     if connection is None or not answers(connection.endpoint, patience_s=_ANSWER_S):

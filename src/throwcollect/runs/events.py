@@ -71,19 +71,11 @@ class EventLog:
         simulations: int | None = None,
         exit_code: int | None = None,
     ) -> None:
-        """Append an event of the run.
-
-        Raises:
-            OSError: If the file cannot be written.
-        """
+        """Append an event of the run."""
         self._append([Event(_now(), self._run, event, reason=reason, simulations=simulations, exit_code=exit_code)])
 
     def node_events(self, before: Sequence[NodeState], after: Sequence[NodeState]) -> None:
-        """Append an event for each difference between two lists of states of the nodes.
-
-        Raises:
-            OSError: If the file cannot be written.
-        """
+        """Append an event for each difference between two lists of states of the nodes."""
         now = _now()
         known = {state.name: state for state in before}
         happened = [

@@ -41,9 +41,6 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
 
     Yields:
         A look; the last one shows a run that has ended or died, unless `keep_on` returned false.
-
-    Raises:
-        ConfigError: If the record of the run vanishes or cannot be read, or `run` is no `Run`.
     """
     check_run(run)
     run.record.middleware.joining.settle()
@@ -68,11 +65,6 @@ def wait(run: Run) -> Summary:
 
     Returns:
         The summary of the dataset; its outcomes tell whether trials are lost.
-
-    Raises:
-        WorkerError: If the launcher of the run died.
-        ThrowcollectError: The error with which the run ended, if its dataset is not complete.
-        ConfigError: If the record of the run vanishes or cannot be read, or `run` is no `Run`.
     """
     check_run(run)
     while run.status == "running":
@@ -94,9 +86,6 @@ def read_logs(
 
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.
-
-    Raises:
-        ConfigError: If there is no such node, or the record vanishes.
     """
     files = NodeLogs(Path(run.record.logs)).files()
     known = {*files, *(state.name for state in run.record.nodes)}
@@ -119,9 +108,6 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
 
     Yields:
         An event, and the line of JSON in which it is written.
-
-    Raises:
-        ConfigError: If the record vanishes.
     """
     tail = Tail(_locate_events(run))
     for now, _ in _look_repeatedly(run, follow=True, keep_on=keep_on):

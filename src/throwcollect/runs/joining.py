@@ -45,10 +45,6 @@ def join_run(
     """Simulate trials of a run that another machine has begun, until the run is over; `word` is the token of the run.
 
     If somebody asks to stop, which `interruptions` counts, simulations of other machines do the running trials again.
-
-    Raises:
-        ConfigError: If the word is no token, or this machine would compute other throws.
-        WorkerError: If the run cannot be reached, or the simulations cannot be kept alive.
     """
     token = JoinToken.decode(word)
     token.check_build()
@@ -66,11 +62,7 @@ def join_run(
 def _simulate(
     host: LocalNodes, connection: Connection, config: Config, onlooker: Onlooker, interruptions: Callable[[], int]
 ) -> None:
-    """Keep the simulations alive until the run is over.
-
-    Raises:
-        WorkerError: If that is impossible.
-    """
+    """Keep the simulations alive until the run is over."""
     from throwcollect.runtimes.run_listener import RunListener
 
     reports = _Reports(onlooker)
@@ -114,11 +106,7 @@ class _Reports:
 
 
 def _read_configuration(connection: Connection, token: JoinToken) -> str:
-    """Ask the launcher of the run for the configuration.
-
-    Raises:
-        WorkerError: If the router or the launcher does not answer.
-    """
+    """Ask the launcher of the run for the configuration."""
     if not answers(connection.endpoint, patience_s=_ANSWER_S):
         raise WorkerError(
             f"run {token.run}: no router answers at {connection.endpoint}",

@@ -47,12 +47,6 @@ def launch(
 
     Returns:
         The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
-
-    Raises:
-        ConfigError: If the configuration cannot be used after all.
-        WorkerError: If nodes cannot be started or kept alive.
-        DatasetError: If another process changes the dataset, or it cannot be written.
-        Interrupted: If the user stopped the collection.
     """
 
     def host(place: Place) -> Host:
@@ -75,9 +69,6 @@ def launch_host(
     """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
 
     With `is_open`, anybody can join the run. `end` is called when the host is closed.
-
-    Raises:
-        ThrowcollectError: As `launch`.
     """
     session = _Session(run, onlooker, interruptions)
     place = run.place
@@ -186,11 +177,7 @@ class _Session:
 
 
 def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
-    """Launch a prepared run in this process, which `start_launcher` has started, and which inherited the locked file.
-
-    Raises:
-        ThrowcollectError: As `launch`, or if the record or the configuration cannot be read.
-    """
+    """Launch a prepared run in this process, which `start_launcher` started, and which inherited the lock."""
     inherited = Records().inherit(run, lock)
     config = load(config_path(Path(inherited.record.directory)))
     launch(inherited, config, onlooker=onlooker, interruptions=interruptions)
@@ -200,12 +187,6 @@ def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable
     """Launch a prepared run in a process of its own, and return when its nodes are started.
 
     If the user asks to stop, this function asks the launcher to stop, and waits until it has ended.
-
-    Raises:
-        ConfigError: If the record cannot be read.
-        ThrowcollectError: The error with which the run ended, if it did.
-        WorkerError: If the launcher cannot be started, or ended and left no reason.
-        Interrupted: If the user stopped it.
     """
     try:
         process = opened.start_process("launch", Path(opened.record.logs), stdin=subprocess.DEVNULL)

@@ -85,11 +85,6 @@ def prepare(
         ahead: Whether processes that nodes need start while the plan is made, which saves time if `collect` follows;
             they end with the run, or when the block of the prepared run is left.
         onlooker: Is told what goes on.
-
-    Raises:
-        ConfigError: If the configuration, the sweep, the output directory or the number of processes cannot be used.
-        WorkerError: If the runtime that is asked for cannot be used.
-        DatasetError: If the dataset cannot be written.
     """
     check_whole_number("processes", processes, least=1)
     started = datetime.now(timezone.utc)
@@ -135,11 +130,6 @@ def resume(
 
     Returns:
         The run; None if every trial has ended, so that nothing is left to do.
-
-    Raises:
-        ConfigError: If there is no such dataset, or the configuration is another one.
-        WorkerError: If the runtime that is asked for cannot be used.
-        DatasetError: If its configuration is lost or damaged, or it cannot be written.
     """
     started = datetime.now(timezone.utc)
     directory = read_path("directory", directory)
@@ -170,12 +160,7 @@ def resume(
 
 
 def _read_stored(places: ExitStack, config: Path | None, directory: Path, overrides: Sequence[str]) -> Config:
-    """Read the configuration of a dataset to continue; until `places` is closed, errors name places of its file.
-
-    Raises:
-        ConfigError: If the configuration cannot be used.
-        DatasetError: If the configuration in the dataset is damaged.
-    """
+    """Read the configuration of a dataset to continue; until `places` is closed, errors name places of its file."""
     try:
         return places.enter_context(load_locating_errors(config or config_path(directory), overrides))
     except ConfigError as error:
@@ -188,13 +173,7 @@ def _read_stored(places: ExitStack, config: Path | None, directory: Path, overri
 
 
 def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunRequest | None:
-    """Make the plan of a dataset to continue, and choose the runtime; None if every trial has ended.
-
-    Raises:
-        ConfigError: If the configuration is another one than that of the dataset, or cannot be used.
-        WorkerError: If the runtime that is asked for cannot be used.
-        DatasetError: If the dataset cannot be written.
-    """
+    """Make the plan of a dataset to continue, and choose the runtime; None if every trial has ended."""
     from throwcollect.coordinator.resume import has_all_trials, resume
 
     with ExitStack() as undo:
@@ -222,12 +201,7 @@ def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunR
 
 
 def _choose_runtime(request: RunRequest, undo: ExitStack, onlooker: Onlooker) -> RunRequest:
-    """Choose the runtime of a run that continues a dataset; `undo` gets what ends the work that the runtime begins.
-
-    Raises:
-        ConfigError: If the dataset would be in a volume, where a collection cannot be continued.
-        WorkerError: If the runtime that is asked for cannot be used.
-    """
+    """Choose the runtime of a run that continues a dataset; `undo` gets what ends the work that the runtime begins."""
     config = request.config
     if (begun := begin(config) if request.ahead else None) is not None:
         undo.callback(begun.runtime.close)
@@ -246,9 +220,6 @@ def _take_over(
     """Take over the run whose containers collect into a directory without a launcher; None if there is no such run.
 
     The run keeps its own configuration.
-
-    Raises:
-        ConfigError: If the configuration of the run is another one, or another process takes the run over.
     """
     if (left := find_left_in(records, directory, own=own)) is None:
         return None
@@ -274,13 +245,7 @@ def _take_over(
 def prepare_run(
     records: Records, request: RunRequest, onlooker: Onlooker, *, run: OpenRun | None = None
 ) -> PreparedRun:
-    """Prepare a run, a new one if `run` is None; if that fails, all files that this function made are removed.
-
-    Raises:
-        ConfigError: If the sweep, the directory or the port cannot be used.
-        WorkerError: If the runtime that is asked for cannot be used.
-        DatasetError: If another process changes the dataset, or it cannot be written.
-    """
+    """Prepare a run, a new one if `run` is None; if that fails, all files that this function made are removed."""
     config, plan = request.config, request.plan
     with ExitStack() as held, ExitStack() as undo:
         begun = request.begun or (begin(config) if request.ahead else None)

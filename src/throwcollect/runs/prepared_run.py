@@ -81,11 +81,7 @@ class PreparedRun:
 
     @property
     def token(self) -> str:
-        """The token with which simulations of other machines join the run; keep it secret.
-
-        Raises:
-            ConfigError: If the router listens to this machine alone, or the key of the run cannot be read.
-        """
+        """The token with which simulations of other machines join the run; keep it secret."""
         from throwcollect.trial.conditions import build_of
 
         if self.config.run.listen is None:
@@ -114,10 +110,6 @@ class PreparedRun:
 
         Returns:
             The summary of the dataset; its outcomes tell whether trials are lost.
-
-        Raises:
-            ConflictError: If the run was launched already, or given up.
-            ThrowcollectError: As `launcher.launch`.
         """
         from throwcollect.runs.launcher import launch
 
@@ -137,11 +129,6 @@ class PreparedRun:
         """Launch the run in a process of its own, which outlives this one, and return when its nodes are started.
 
         If the user asks to stop, which `interruptions` counts, this method asks the launcher to stop, and waits for it.
-
-        Raises:
-            ConflictError: If the run was launched already, or given up.
-            WorkerError: If the launcher cannot be started.
-            ThrowcollectError: The error with which the run has ended, if it did so already.
         """
         from throwcollect.runs.launcher import start_launcher
 
@@ -152,11 +139,7 @@ class PreparedRun:
         return start_launcher(self._records, self._run, interruptions=interruptions)
 
     def _hand_over(self) -> None:
-        """Hand the run over to its launcher, which writes its end; from then on, this object removes no files.
-
-        Raises:
-            ConflictError: If the run was launched already, or given up.
-        """
+        """Hand the run over to its launcher, which writes its end; from then on, this object removes no files."""
         if self._fate is not None:
             raise ConflictError(
                 f"run {self._run.run}: {self._fate}", expected="a run that is prepared and not launched"

@@ -70,11 +70,7 @@ class Run:
         return self.record.run
 
     def now(self) -> Run:
-        """Read the record of the run again.
-
-        Raises:
-            ConfigError: If the record has vanished, or cannot be read.
-        """
+        """Read the record of the run again."""
         return self.records.get(self.id)
 
     @property
@@ -129,21 +125,13 @@ class OpenRun:
 
     @property
     def record(self) -> RunRecord:
-        """The record of the run.
-
-        Raises:
-            ConfigError: If there is no record yet, or it is damaged.
-        """
+        """The record of the run."""
         if self._record is None:
             self._record = _read(self._runs / f"{self.run}.json")
         return self._record
 
     def write(self, record: RunRecord) -> None:
-        """Write the record.
-
-        Raises:
-            ConfigError: If it cannot be written.
-        """
+        """Write the record."""
         self._record = record
         path = self._runs / f"{self.run}.json"
         try:
@@ -153,11 +141,7 @@ class OpenRun:
             raise unusable(path, error) from error
 
     def update(self, **changes: Any) -> None:
-        """Change fields of the record, and write it if that makes a difference.
-
-        Raises:
-            ConfigError: If it cannot be written.
-        """
+        """Change fields of the record, and write it if that makes a difference."""
         changed = replace(self.record, **changes)
         if changed != self.record:
             self.write(changed)
@@ -167,9 +151,6 @@ class OpenRun:
 
         The process has a session of its own, so that it outlives the terminal. It holds the lock from its first moment,
         so that the run never looks dead.
-
-        Raises:
-            OSError: If the process cannot be started.
         """
         words = [*make_command(), command, self.run, "--lock", str(self.lock)]
         with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
@@ -213,10 +194,6 @@ class Records:
         """Make a new run, with a key but without a record yet; forget runs that ended a week ago.
 
         If no id is given, this makes one that begins with `name`, the name of the collection.
-
-        Raises:
-            ConflictError: If there is a run of that id.
-            ConfigError: If the files of the run cannot be written.
         """
         self._forget_old()
         while True:
@@ -247,11 +224,7 @@ class Records:
         return OpenRun(self._runs, run, lock)
 
     def take(self, run: str) -> OpenRun | None:
-        """Open a run whose launcher is dead, so that this process can launch or forget it; None if the launcher lives.
-
-        Raises:
-            ConfigError: If the lock of the run cannot be opened.
-        """
+        """Open a run whose launcher is dead, so that this process can launch or forget it; None if it lives."""
         path = self._runs / f"{run}.lock"
         deadline = time.monotonic() + _LOCK_PATIENCE_S
         while True:
@@ -278,12 +251,7 @@ class Records:
         return sorted(path.stem for path in self._runs.glob("*.json"))
 
     def get(self, run: str) -> Run:
-        """Read a run.
-
-        Raises:
-            NotFoundError: If it has no record.
-            ConfigError: If the record is damaged or of another version.
-        """
+        """Read a run."""
         # A launcher writes the end of the run before it releases the lock. So the lock is checked before the record
         # is read; otherwise a run that ends in between would look dead.
         lives = self.lives(run)

@@ -25,9 +25,6 @@ def find_run_to_change(records: Records, named: str | None, *, command: str, die
 
     The user names the run as for `id_of`. None takes the only run that lives (with `died`, also one whose launcher
     died) and that belongs to the current directory, because it was begun there or its dataset lies below.
-
-    Raises:
-        ConfigError: If there is no such run, or more than one, or the only one belongs to another directory.
     """
     if named is not None:
         return records.get(id_of(records, named))
@@ -44,21 +41,13 @@ def find_run_to_change(records: Records, named: str | None, *, command: str, die
 
 
 def find(named: StrPath) -> Run:
-    """Find a run of this machine by its id, the beginning of its id, or the directory of its dataset; see `id_of`.
-
-    Raises:
-        ConfigError: If there is no such run, or more than one, or it is no name.
-    """
+    """Find a run of this machine by its id, the beginning of its id, or the directory of its dataset; see `id_of`."""
     records = Records()
     return records.get(id_of(records, named))
 
 
 def check_run(run: object) -> None:
-    """Refuse a value that is no `Run`, such as the name of one.
-
-    Raises:
-        ConfigError: If it is none.
-    """
+    """Refuse a value that is no `Run`, such as the name of one."""
     if not isinstance(run, Run):
         raise refuse_argument("run", f"got {show_value(run)}", expected="a Run, as runs.find(NAME) gives it")
 
@@ -68,9 +57,6 @@ def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str
 
     The user names the run as for `id_of`. None takes the only run of the current directory that lives, or else the
     latest run of that directory. If no run belongs to the current directory, those of all directories are considered.
-
-    Raises:
-        ConfigError: If there is no such run, or more than one.
     """
     if named is not None:
         return records.get(id_of(records, named))
@@ -110,9 +96,6 @@ def id_of(records: Records, named: StrPath) -> str:
 
     If several ids begin alike, the user means the only run of them that lives. If none of them lives, or more than one,
     this raises an error, because choosing one would be a guess.
-
-    Raises:
-        ConfigError: If there is no such run, or more than one, or the name is empty or no name at all.
     """
     directory, named = read_path("named", named), os.fspath(named)
     # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
@@ -139,11 +122,7 @@ def id_of(records: Records, named: StrPath) -> str:
 
 
 def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
-    """Find the only one of several runs that lives; all of their ids begin with `named`.
-
-    Raises:
-        ConfigError: If none lives, or more than one.
-    """
+    """Find the only one of several runs that lives; all of their ids begin with `named`."""
     runs = records.read(ids)
     living = [run for run in runs if run.status == "running"]
     if len(living) == 1:
@@ -165,10 +144,6 @@ def find_left_in(records: Records, directory: Path, *, own: str | None = None) -
     """Find a run that collects, or has collected, into a directory, and whose nodes still exist without a launcher.
 
     The run that this process prepares, whose id is `own`, is left out.
-
-    Raises:
-        ConfigError: If a run whose launcher lives collects into the directory.
-        WorkerError: If the runtime does not tell in time whether nodes are left.
     """
     for run in reversed(records.into(directory)):
         if run.id == own:
@@ -229,12 +204,7 @@ def has_complete_dataset(run: Run) -> bool:
 
 
 def require_living(run: Run) -> RunRecord:
-    """Check that a run lives, and return its record.
-
-    Raises:
-        ConflictError: If the run has ended.
-        WorkerError: If the launcher of the run died.
-    """
+    """Check that a run lives, and return its record."""
     if run.status == "died":
         raise describe_death(run)
     if run.status != "running":
@@ -243,11 +213,7 @@ def require_living(run: Run) -> RunRecord:
 
 
 def require_simulations(run: Run) -> None:
-    """Refuse a run that is a container of the catalogue, as it has no simulations.
-
-    Raises:
-        ConflictError: If the run is one.
-    """
+    """Refuse a run that is a container of the catalogue, as it has no simulations."""
     if run.record.kind == "container":
         raise ConflictError(f"run {run.id}: is a container, and has no simulations")
 

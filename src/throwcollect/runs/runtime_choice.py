@@ -27,10 +27,6 @@ def begin(config: Config) -> RuntimeChoice | None:
 
     Returns:
         The runtime, for `choose`, which the caller has to close in any case; None if no runtime seems to be available.
-
-    Raises:
-        ConfigError: If the configuration asks for rclpy, which is not installed, or for an unknown runtime.
-        MissingExtraError: If the runtime needs a package that is not installed.
     """
     middleware = choose_middleware(config.run.ros)
     for name in _list_candidates(config):
@@ -49,11 +45,6 @@ def choose(
     With ``auto``, nodes are containers if an engine for them is available. rclpy is used where it is installed. `say`
     gets a line for each step that takes long, such as pulling an image, and then the choice. `warn` gets a line for
     everything that may be wrong, such as an image that was made from other sources. `begun` is what `begin` returned.
-
-    Raises:
-        ConfigError: If the configuration asks for rclpy, which is not installed, or for an unknown runtime.
-        MissingExtraError: If the runtime needs a package that is not installed.
-        WorkerError: If the runtime that is asked for cannot be used.
     """
     launcher = choose_middleware(config.run.ros)
 

@@ -55,13 +55,6 @@ def collect_slice(
 
     Returns:
         Whether there was anything to do.
-
-    Raises:
-        ConfigError: If there is no such dataset or slice, or it cannot be collected in slices.
-        WorkerError: If nodes cannot be started or kept alive.
-        DatasetError: If something cannot be read or written.
-        LossError: If trials of the slice are lost, so that it is not finished.
-        Interrupted: If somebody stopped the collection.
     """
     started = datetime.now(timezone.utc)
     directory = Path(directory)
@@ -117,12 +110,7 @@ def _keep_recordings(attempt: Path, earlier: Sequence[Path], directory: Path, sl
 
 
 def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
-    """Read the configuration of a dataset that is to be collected in slices, with overrides as `collect_slice` has.
-
-    Raises:
-        ConfigError: If there is no such dataset, its plan grows, or the overrides change what is collected.
-        DatasetError: If its configuration is lost or damaged.
-    """
+    """Read the configuration of a dataset that is to be collected in slices, with overrides as `collect_slice` has."""
     read_changed_config(directory, overrides)
     with load_locating_errors(config_path(directory), overrides) as config:
         check_sliceable(config)
@@ -131,12 +119,7 @@ def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config
 
 
 def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
-    """Read the configuration of a dataset whose plan is frozen, with overrides as `collect_slice` has.
-
-    Raises:
-        ConfigError: If there is no such dataset, or the overrides change what is collected.
-        DatasetError: If its configuration is lost or damaged.
-    """
+    """Read the configuration of a dataset whose plan is frozen, with overrides as `collect_slice` has."""
     if not (directory / PLAN).is_file():
         raise ConfigError(
             f"{directory}: holds no plan", hint=command("plan", "CONFIG", "--output", directory) + " makes one"
@@ -154,11 +137,7 @@ def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Confi
 
 
 def _find_scratch(config: Config) -> Path | None:
-    """The directory on this machine's own disk that `cluster.scratch` names; None if it names none.
-
-    Raises:
-        ConfigError: If a variable in the name is not set, or it is no absolute path.
-    """
+    """The directory on this machine's own disk that `cluster.scratch` names; None if it names none."""
     if (named := config.cluster.scratch) is None:
         return None
     path = Path(os.path.expandvars(named))
@@ -168,11 +147,7 @@ def _find_scratch(config: Config) -> Path | None:
 
 
 def check_sliceable(config: Config) -> None:
-    """Check that a configuration can be collected in slices.
-
-    Raises:
-        ConfigError: If its plan grows with its results.
-    """
+    """Check that a configuration can be collected in slices."""
     if config.grows:
         key = "until" if config.until is not None else "sweep.target"
         raise ConfigError(
@@ -183,10 +158,6 @@ def check_sliceable(config: Config) -> None:
 
 
 def check_closed(config: Config) -> None:
-    """Check that others cannot join a run on a cluster, whose nodes many users share.
-
-    Raises:
-        ConfigError: If the run would be open.
-    """
+    """Check that others cannot join a run on a cluster, whose nodes many users share."""
     if config.run.open:
         raise ConfigError([Problem("should be false, as many users share the nodes of a cluster", key="run.open")])

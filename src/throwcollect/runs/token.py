@@ -45,11 +45,7 @@ class JoinToken:
 
     @classmethod
     def decode(cls, word: str) -> JoinToken:
-        """Read a token.
-
-        Raises:
-            ConfigError: If the word is no token, or only a part of one.
-        """
+        """Read a token."""
         data = word.strip().removeprefix(_START)
         try:
             if data == word.strip():
@@ -64,11 +60,7 @@ class JoinToken:
         return token
 
     def check_build(self) -> None:
-        """Check that this machine would compute the same throws as the run's own machine.
-
-        Raises:
-            ConfigError: If sources, engine, or packages of robot, tool and task differ.
-        """
+        """Check that this machine would compute the same throws as the run's own machine."""
         if self.build != build_digest(self.engine, self.robot, self.tool, self.task):
             raise ConfigError(
                 f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "

@@ -37,11 +37,7 @@ _SSH_ADDRESS = re.compile(r"(?:[^@:/]+@)?([^@:/]{2,}):(?!//)/?(.+)")
 
 
 def source_root() -> Path:
-    """Find the directory of the clone from which this package runs.
-
-    Raises:
-        ConfigError: If the package was not installed from a clone in editable mode.
-    """
+    """Find the directory of the clone from which this package runs."""
     root = _PACKAGE.parents[1]
     if not all((root / name).exists() for name in (DOCKERFILE, *_SOURCES)):
         raise ConfigError(
@@ -79,9 +75,6 @@ def check_wheelhouse(root: Path, wheelhouse: Path | None, *, ros: bool) -> None:
     """Make sure that a directory holds wheels; None takes them from the package index.
 
     With `ros`, it also has to hold the wheels of genuine ROS 2, some of which no package index has.
-
-    Raises:
-        ConfigError: If the directory lacks wheels.
     """
     if wheelhouse is None:
         return

@@ -59,11 +59,7 @@ class InProcess:
         """Do nothing: `collect` leaves nothing behind."""
 
     def collect(self, session: Session) -> Info:
-        """See `runtime.Host.collect`; an interruption takes effect when the running trial has ended.
-
-        Raises:
-            Interrupted: If somebody stopped the run before every trial had ended.
-        """
+        """See `runtime.Host.collect`; an interruption takes effect when the running trial has ended."""
         # These import messages of ROS, so they have to wait until the backend is chosen.
         from throwcollect.coordinator.collection import TrialCollection
         from throwcollect.dataset.inspect import info
@@ -82,11 +78,7 @@ class InProcess:
                 raise make_interruption_error(self._place)
 
             def wait() -> None:
-                """Wait for a moment for the process that simulates some trials again.
-
-                Raises:
-                    Interrupted: If somebody has asked twice to stop.
-                """
+                """Wait for a moment for the process that simulates some trials again."""
                 if session.interruptions() > 1:
                     message = f"interrupted; the throws are in {directory}, the dataset is not finished"
                     raise Interrupted(message, hint=self._place.way_on)

@@ -120,11 +120,7 @@ class LocalNodes(NodeHost):
         return self._endpoint
 
     def start(self, node: NodeSpec) -> None:
-        """Start a node.
-
-        Raises:
-            WorkerError: If the process cannot be started or its log cannot be written.
-        """
+        """Start a node."""
         # Until now, this process has reserved the port, so that no other process takes it. The router needs it now.
         if node.name == ROUTER and self._reserved is not None:
             self._reserved.close()
@@ -190,11 +186,7 @@ def _make_server(middleware: Middleware) -> NodeServer:
 
 
 def _check_limits(simulations: int) -> None:
-    """Check limits within which libraries of nodes neither work nor end with a reason.
-
-    Raises:
-        WorkerError: If a limit is too low.
-    """
+    """Check limits within which libraries of nodes neither work nor end with a reason."""
     # The router was measured to open 20 files and one for each simulation, and all nodes to start within 0.9 GB.
     for limit, least, what in (
         (resource.RLIMIT_NOFILE, 32 + simulations, "files may be open (ulimit -n)"),

@@ -164,11 +164,7 @@ class NodeCollection:
             self._session.warn(f"{name} gets no more trials, because {progress.set_aside[name]}")
 
     def _check_that_nodes_meet(self, progress: Progress) -> None:
-        """Start all nodes again if they do not see each other, which at times happens on DDS.
-
-        Raises:
-            WorkerError: If they still do not see each other after that, because the run would never end.
-        """
+        """Start all nodes again if they do not see each other, which at times happens on DDS."""
         states = self._supervisor.states()
         ready = any(state.status == "running" for state in states if is_simulation(state.name))
         if progress.simulations or progress.ended or not ready:

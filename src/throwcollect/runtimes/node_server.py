@@ -113,9 +113,6 @@ class NodeServer:
         """Start a node: a `throwcollect` command with these arguments and these further environment variables.
 
         The node prints to `log`, and is bound to the processor core `core` unless that is None.
-
-        Raises:
-            OSError: If the node cannot be started.
         """
         request = json.dumps({"arguments": list(arguments), "core": core, "environment": dict(environment)}).encode()
         if self._silent:
@@ -183,11 +180,7 @@ class NodeServer:
         return ForkedProcess(partial(_run, connection), environment=self._environment, kept=connection.fileno())
 
     def _await_pid(self) -> int:
-        """Wait for the process id of a node that was asked for.
-
-        Raises:
-            OSError: If the answer does not come in time.
-        """
+        """Wait for the process id of a node that was asked for."""
         deadline = time.monotonic() + self._answer_s
         while time.monotonic() < deadline:
             for message in self._read(_LOOK_S):

@@ -146,18 +146,11 @@ class NodeHost(ABC):
 
         Returns:
             Names of the nodes of a launcher that died, which run on as nodes of this launcher.
-
-        Raises:
-            WorkerError: If that is impossible.
         """
         return ()
 
     def info(self) -> Info:
-        """Read the summary of the finished dataset.
-
-        Raises:
-            DatasetError: If it is not finished.
-        """
+        """Read the summary of the finished dataset."""
         from throwcollect.dataset.inspect import info
 
         return info(self.place.directory)
@@ -169,11 +162,7 @@ class NodeHost(ABC):
 
     @abstractmethod
     def start(self, node: NodeSpec) -> None:
-        """Start a node, or begin to start it, if no node of its name runs; a start that fails later appears in `exits`.
-
-        Raises:
-            WorkerError: If the node cannot be started.
-        """
+        """Start a node, or begin to, if no node of its name runs; a start that fails later appears in `exits`."""
 
     @abstractmethod
     def handle(self, name: str) -> str | None:
@@ -185,11 +174,7 @@ class NodeHost(ABC):
 
     @abstractmethod
     def exits(self) -> list[NodeExit]:
-        """The nodes that ended since the last call.
-
-        Raises:
-            WorkerError: If the host cannot tell the state of the nodes any more.
-        """
+        """The nodes that ended since the last call."""
 
     @abstractmethod
     def frozen(self) -> frozenset[str]:

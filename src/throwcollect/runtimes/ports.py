@@ -15,11 +15,7 @@ _ELSEWHERE = ("192.0.2.1", 9)
 
 
 def reserve_port(run: RunConfig) -> socket.socket:
-    """Reserve the port of a run's router until the socket is closed: `run.listen`, or one of the loopback interface.
-
-    Raises:
-        ConfigError: If the port is taken, this machine does not have the address, or its loopback interface is down.
-    """
+    """Reserve the port of a run's router until the socket is closed: `run.listen`, or one of the loopback interface."""
     if run.listen is None:
         check_loopback()
         return _bind(LOOPBACK, run.router_port, "run.router_port", hint="--set run.router_port=0 takes a free one")
@@ -33,11 +29,7 @@ def format_endpoint(protocol: str, host: str, port: int) -> str:
 
 
 def check_loopback() -> None:
-    """Refuse a machine whose processes do not reach each other; in a new network namespace, the interface is down.
-
-    Raises:
-        ConfigError: If the address cannot be reached.
-    """
+    """Refuse a machine whose processes do not reach each other; in a new network namespace, the interface is down."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             # For a datagram socket this sends nothing. It has to be tried, as a router may listen there even so.

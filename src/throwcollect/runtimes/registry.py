@@ -13,12 +13,7 @@ AUTOMATIC = ("docker", "local")
 
 
 def get_runtime(name: str) -> Runtime:
-    """Make the runtime of this name.
-
-    Raises:
-        ConfigError: If there is none, for example because the package that added it was removed.
-        MissingExtraError: If the runtime needs a package that is not installed.
-    """
+    """Make the runtime of this name."""
     if name not in names_of("runtimes"):
         meant = suggest(name, names_of("runtimes"))
         raise ConfigError([Problem(f"there is no runtime {name}{meant}", key="run.runtime")])

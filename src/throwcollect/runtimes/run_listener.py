@@ -25,10 +25,6 @@ def take_part(connection: Connection, name: str | None = None) -> Iterator[tuple
     """Take part in the ROS graph of a run with a node and the executor that it spins in, in a context of their own.
 
     By default, the node has a unique and hidden name.
-
-    Raises:
-        ConfigError: If the connection cannot be used.
-        ThrowcollectError: If there is no router.
     """
     context = ros.Context()
     ros.init(context=context, connection=connection)
@@ -81,9 +77,6 @@ class RunListener:
         """Wait for a report, or for the router, for at most this number of seconds.
 
         `connection` is the present way into the run; None while its router has no address.
-
-        Raises:
-            ConfigError: If the key of the run cannot be read.
         """
         elsewhere = connection != self._connection or time.monotonic() > self._heard_at + self._silent_s
         if connection is not None and elsewhere and answers(connection.endpoint):

@@ -54,22 +54,14 @@ class Supervisor:
         self.host.close()
 
     def start(self, *, found: Collection[str] = ()) -> None:
-        """Start all nodes, except those (`found`) that a launcher that died has left running.
-
-        Raises:
-            WorkerError: If a node cannot be started.
-        """
+        """Start all nodes, except those (`found`) that a launcher that died has left running."""
         self._start_deadline = time.monotonic() + self._run.start_timeout_s
         for name in self._roster:
             if name not in found:
                 self._start(name)
 
     def change(self, roster: Sequence[NodeSpec]) -> None:
-        """Change the roster: start the nodes that are new, and end those that are not in it any more.
-
-        Raises:
-            WorkerError: If a node cannot be started.
-        """
+        """Change the roster: start the nodes that are new, and end those that are not in it any more."""
         before, self._roster = self._roster, {node.name: node for node in roster}
         removed = [name for name in before if name not in self._roster]
         for name in removed:
@@ -93,10 +85,6 @@ class Supervisor:
 
         Returns:
             How the main node ended (None while it runs), and a line for each event of other nodes since the last call.
-
-        Raises:
-            WorkerError: If no expendable node was ready in time, or a vital one or all expendable ones are lost for
-                good.
         """
         end = None
         news = self._end_frozen()
@@ -214,11 +202,7 @@ class Supervisor:
         return True
 
     def _check_that_run_can_go_on(self) -> None:
-        """Check that the run can go on.
-
-        Raises:
-            WorkerError: If it cannot, for one of the reasons that `poll` lists.
-        """
+        """Check that the run can go on."""
         hint = "throwcollect logs shows what the nodes said"
         names = self._expendables
         vital = next(

@@ -132,11 +132,7 @@ class Catalogue:
     components: Mapping[str, Component]
 
     def get(self, name: str) -> Component:
-        """The component of a name.
-
-        Raises:
-            NotFoundError: If there is none.
-        """
+        """The component of a name."""
         try:
             return self.components[name]
         except KeyError:
@@ -145,11 +141,7 @@ class Catalogue:
 
     @classmethod
     def find(cls, path: Path) -> Catalogue:
-        """Read a catalogue if the file exists; otherwise the catalogue is empty, so that no run can be begun.
-
-        Raises:
-            ConfigError: As `read`.
-        """
+        """Read a catalogue if the file exists; otherwise the catalogue is empty, so that no run can be begun."""
         return cls.read(path) if path.exists() else cls({})
 
     @classmethod
@@ -158,9 +150,6 @@ class Catalogue:
 
         Args:
             path: YAML file with the key ``components``, or a configuration.
-
-        Raises:
-            ConfigError: If the file, or one that it names, cannot be read or has errors.
         """
         document = Document(path)
         if "components" not in document.values:
@@ -177,11 +166,7 @@ class Catalogue:
 
 
 def _read_component(name: str, section: ComponentSection, document: Document, directory: Path) -> Component:
-    """Make a component from its section, and read the file that the section names.
-
-    Raises:
-        ConfigError: If that file has errors.
-    """
+    """Make a component from its section, and read the file that the section names."""
     pretty_name = section.pretty_name or name
     if section.image is not None:
         urdf = None if section.urdf is None else directory / section.urdf

@@ -123,12 +123,7 @@ def _get_collection(instances: Instances, instance: str) -> Run:
 
 
 def _find_file(directory: Path, path: str) -> Path:
-    """A file of a dataset.
-
-    Raises:
-        NotFoundError: If the dataset has no file of that name.
-        DatasetError: If the file is a link, or no regular file.
-    """
+    """A file of a dataset."""
     if path not in _list_names(directory) or not (directory / path).exists():
         raise NotFoundError(f"{directory}: the dataset has no file {path!r}")
     check_regular(directory / path)
@@ -156,12 +151,7 @@ def _is_finished(directory: Path) -> bool:
 
 
 def _find_finished(instances: Instances, instance: str) -> Path:
-    """Directory of the finished dataset of a run.
-
-    Raises:
-        NotFoundError: If the run does not exist, or has no dataset.
-        ConflictError: If the dataset is not finished yet.
-    """
+    """Directory of the finished dataset of a run."""
     run = _get_collection(instances, instance)
     directory = run.place.directory
     if not _is_finished(directory):

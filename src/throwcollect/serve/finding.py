@@ -66,11 +66,6 @@ def publish(address: Address) -> Iterator[None]:
     """Let programs of this user find this server as long as the block lasts.
 
     If there is another server already, programs find this one only after the other one has ended.
-
-    Raises:
-        DatasetError: If the file with the address cannot be written.
-        WorkerError: If the lock of that file cannot be opened.
-        ConfigError: If runs cannot be remembered.
     """
     path = _find_path()
     try:
@@ -109,30 +104,18 @@ def publish(address: Address) -> Iterator[None]:
 
 
 def log_path() -> Path:
-    """Log of a server that was started in the background.
-
-    Raises:
-        ConfigError: If runs cannot be remembered.
-    """
+    """Log of a server that was started in the background."""
     return state_directory() / _LOG
 
 
 def find_living() -> Address | None:
-    """Find the server of this user, even one that does not answer; returns None if none lives.
-
-    Raises:
-        ConfigError: If runs cannot be remembered.
-    """
+    """Find the server of this user, even one that does not answer; returns None if none lives."""
     # If a server was killed, another process may have got its port or pid. Only the lock proves that a server lives.
     return _read() if is_locked(_find_path().with_name(_LOCK)) else None
 
 
 def end_server() -> Address | None:
-    """End the server of this user, by force if it does not end on its own; returns None if none lives.
-
-    Raises:
-        ConfigError: If runs cannot be remembered.
-    """
+    """End the server of this user, by force if it does not end on its own; returns None if none lives."""
     if (address := find_living()) is None:
         return None
     with suppress(ProcessLookupError):
@@ -149,11 +132,7 @@ def end_server() -> Address | None:
 
 
 def find_server() -> Address | None:
-    """Find the server of this user; returns None if none answers.
-
-    Raises:
-        ConfigError: If runs cannot be remembered.
-    """
+    """Find the server of this user; returns None if none answers."""
     if (address := find_living()) is None:
         return None
     try:
@@ -164,12 +143,7 @@ def find_server() -> Address | None:
 
 
 def ensure_server() -> Address:
-    """Find the server of this user; if there is none, start one, which outlives this process.
-
-    Raises:
-        WorkerError: If no server starts.
-        ConfigError: If runs cannot be remembered.
-    """
+    """Find the server of this user; if there is none, start one, which outlives this process."""
     if (address := find_server()) is not None:
         return address
     log = log_path()
@@ -195,11 +169,7 @@ def ensure_server() -> Address:
 
 
 def make_page_address(address: Address, run: str | None = None) -> str:
-    """Make an address of the page, on one run or all, that can be opened once, within ten minutes.
-
-    Raises:
-        WorkerError: If the server does not answer.
-    """
+    """Make an address of the page, on one run or all, that can be opened once, within ten minutes."""
     try:
         return address.page(_ask(address, "POST", "/api/v1/codes")["code"], run)
     except (OSError, ValueError, KeyError, http.client.HTTPException) as error:

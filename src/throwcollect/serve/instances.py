@@ -54,12 +54,7 @@ class Instances:
     datasets: Path
 
     def get(self, instance: str) -> Run:
-        """The run of an id.
-
-        Raises:
-            NotFoundError: If there is none.
-            ConflictError: If its record cannot be read.
-        """
+        """The run of an id."""
         # Ids become names of files, so they must not hold a slash, for example.
         if not re.fullmatch(ENTRY, instance):
             raise NotFoundError(f"no run {instance!r}", expected="at most 80 of letters, digits, -, _ and .")
@@ -71,15 +66,7 @@ class Instances:
             raise ConflictError(error.problems, hint=error.hint) from error
 
     def put(self, instance: str, origin: Origin) -> tuple[Run, bool]:
-        """Begin an instance, unless the same request has begun it already; returns the run, and whether it is new.
-
-        Raises:
-            NotFoundError: If there is no such component.
-            ConflictError: If another run has that id, or there is a dataset of a forgotten run with that id, or no more
-                instances of the component may live, or a container cannot join the run that the request names.
-            ConfigError: If the configuration cannot be used, or the request does not fit this kind of component.
-            WorkerError: If the instance cannot be begun.
-        """
+        """Begin an instance, unless the same request has begun it already; returns the run, and whether it is new."""
         component = self.catalogue.get(origin.component)
         if not re.fullmatch(NAME, instance):
             raise ConfigError(f"no instance can have the id {instance!r}", expected="at most 63 of a-z, 0-9, - and _")
@@ -109,16 +96,7 @@ class Instances:
         return run, True
 
     def resume(self, instance: str) -> Run:
-        """Begin a new run, which continues the dataset of a run that has ended.
-
-        Raises:
-            NotFoundError: If there is no such run.
-            ConflictError: If the run lives, its dataset is complete or cannot be continued, or no more instances of the
-                component may live.
-            ConfigError: If the configuration cannot be used.
-            DatasetError: If the configuration is no file.
-            WorkerError: If the new run cannot be begun.
-        """
+        """Begin a new run, which continues the dataset of a run that has ended."""
         run = self.get(instance)
         origin = run.record.origin
         with _one_at_a_time():
@@ -136,11 +114,6 @@ class Instances:
 
         Asking again does not hurry the instance. If its launcher died, nobody can be asked, so this ends all nodes that
         are left, and forgets the instance.
-
-        Raises:
-            NotFoundError: If there is no such run.
-            ConflictError: If it has ended.
-            WorkerError: If its launcher dies meanwhile, or something cannot be ended.
         """
         run = self.get(instance)
         if force or run.status == "died":
@@ -150,11 +123,7 @@ class Instances:
                 _stop_once(run)
 
     def stop_all(self) -> list[str]:
-        """Ask all living runs that clients have begun to finish their running trials and end; returns their ids.
-
-        Raises:
-            WorkerError: If the launcher of one of them died, or does not answer.
-        """
+        """Ask all living runs that clients have begun to finish their running trials and end; returns their ids."""
         living = [run.id for run in Records().all() if run.record.origin is not None and run.status == "running"]
         for run in living:
             # A run may have ended since its record was read.
@@ -163,29 +132,14 @@ class Instances:
         return living
 
     def scale(self, instance: str, simulations: int) -> Run:
-        """Ask an instance for another number of simulations.
-
-        Raises:
-            NotFoundError: If there is no such run.
-            ConflictError: If it has ended, its launcher died, or it is a container.
-            ConfigError: If it cannot be scaled.
-            WorkerError: If its launcher does not answer.
-        """
+        """Ask an instance for another number of simulations."""
         run = self.get(instance)
         _require_living(run)
         control.scale(run, simulations)
         return run.now()
 
     def show(self, instance: str, urdf: str | None) -> None:
-        """Set the description of the robot that viewers of an instance draw; None for that of the configuration.
-
-        Raises:
-            NotFoundError: If there is no such run.
-            ConflictError: If it has ended, died or has no running simulation, or if the description differs from that
-                of the configuration in more than its appearance.
-            ConfigError: If the text is no URDF.
-            WorkerError: If a simulation does not answer.
-        """
+        """Set the description of the robot that viewers of an instance draw; None for that of the configuration."""
         run = self.get(instance)
         require_simulations(run)
         own = description_of(run)
@@ -205,9 +159,6 @@ def _require_living(run: Run) -> RunRecord:
     """Check that a run lives, and return its record.
 
     A run that died is a `ConflictError` here, too, because it is no failure of the server.
-
-    Raises:
-        ConflictError: If the run has ended, or its launcher died.
     """
     try:
         return require_living(run)
@@ -219,10 +170,6 @@ def _stop_once(run: Run) -> None:
     """Ask a run to stop, unless somebody has just done so: a second signal would hurry it.
 
     The launcher writes into its record that it is stopping when it sees the signal; this waits for that, for a while.
-
-    Raises:
-        ConflictError: If it has ended.
-        WorkerError: If its launcher died.
     """
     now = run.now()
     if not (now.lives and now.record.stopping):
@@ -234,11 +181,7 @@ def _stop_once(run: Run) -> None:
 
 
 def _refuse_taken(directory: Path) -> None:
-    """Refuse a directory that is not empty. The run would refuse it, too, but only after the client got its answer.
-
-    Raises:
-        ConflictError: If the directory is not empty.
-    """
+    """Refuse a directory that is not empty. The run would refuse it, too, but only after the client got its answer."""
     try:
         refuse_taken(directory)
     except ConfigError as error:
@@ -246,11 +189,7 @@ def _refuse_taken(directory: Path) -> None:
 
 
 def _check_request(origin: Origin, component: Component) -> None:
-    """Refuse a request with fields that do not fit the kind of component.
-
-    Raises:
-        ConfigError: If the request has such fields.
-    """
+    """Refuse a request with fields that do not fit the kind of component."""
     problems = []
     if component.kind != "container" and origin.joins is not None:
         problems.append(Problem(f"{component.name} is a {component.kind}; containers join runs", key="joins"))
@@ -263,11 +202,7 @@ def _check_request(origin: Origin, component: Component) -> None:
 
 
 def _check_room(component: Component) -> None:
-    """Refuse one more instance if as many instances live as `max_instances` allows.
-
-    Raises:
-        ConflictError: If that many live.
-    """
+    """Refuse one more instance if as many instances live as `max_instances` allows."""
     runs = (run for run in Records().all() if run.record.origin and run.record.origin.component == component.name)
     living = [run.id for run in runs if run.status == "running"]
     if len(living) >= component.max_instances:
@@ -280,12 +215,7 @@ def _check_room(component: Component) -> None:
 
 @contextmanager
 def _one_at_a_time() -> Iterator[None]:
-    """Hold a lock of the machine, so that several requests or servers together do not begin one instance too many.
-
-    Raises:
-        ConfigError: If runs cannot be remembered.
-        WorkerError: If the lock cannot be opened.
-    """
+    """Hold a lock of the machine, so that several requests or servers together do not begin one instance too many."""
     path = state_directory() / _LOCK
     try:
         lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
@@ -299,11 +229,7 @@ def _one_at_a_time() -> Iterator[None]:
 
 
 def _write_overrides(origin: Origin) -> list[str]:
-    """Write the keys that a request sets as ``--set`` takes them.
-
-    Raises:
-        ConfigError: If only the operator sets one of them.
-    """
+    """Write the keys that a request sets as ``--set`` takes them."""
     problems = [
         *(
             Problem("should be a dotted key, of letters, digits, - and _", key=key)

@@ -67,13 +67,7 @@ class Hold:
 
 
 def slow_down(run: Run, simulation: str) -> Hold:
-    """Slow a simulation down to real time.
-
-    Raises:
-        NotFoundError: If the run has no such simulation, or it does not run.
-        WorkerError: If the simulation does not answer, or refuses.
-        ConfigError: If the configuration or the key of the run cannot be read.
-    """
+    """Slow a simulation down to real time."""
     if not _runs(run, simulation):
         raise NotFoundError(f"run {run.id}: no simulation {simulation!r} runs")
     try:
@@ -129,12 +123,7 @@ def _runs(run: Run, simulation: str) -> bool:
 
 
 def _set_speed(run: Run, simulation: str, factor: float | None) -> None:
-    """Set the real-time factor of a simulation; None for that of its configuration.
-
-    Raises:
-        ConfigError: If the configuration or the key of the run cannot be read.
-        WorkerError: If the simulation does not answer, or refuses.
-    """
+    """Set the real-time factor of a simulation; None for that of its configuration."""
     config = load(config_path(run.place.directory))
     value = (config.sim.real_time_factor or _FULL_SPEED) if factor is None else factor
     (result,) = set_parameter(run, [name_node(config, simulation)], _PARAMETER, value)

@@ -81,12 +81,7 @@ class Models:
         return list(islice(found, _MOST_MODELS))
 
     def view(self, name: str) -> ModelView:
-        """Describe a model.
-
-        Raises:
-            NotFoundError: If there is none of that name.
-            DatasetError: If it is damaged.
-        """
+        """Describe a model."""
         model = self._load(name)
         trained, ends = model.file.trained_on, model.learned.outputs
         return ModelView(
@@ -104,13 +99,7 @@ class Models:
         )
 
     def aim(self, name: str, target: Sequence[float]) -> AimView:
-        """Find parameters for a target: values of the model's targets, then of the keys that are given with them.
-
-        Raises:
-            NotFoundError: If there is no such model.
-            ConfigError: If it takes another number of values.
-            DatasetError: If it is damaged.
-        """
+        """Find parameters for a target: values of the model's targets, then of the keys that are given with them."""
         (aim,) = self._load(name).aim([target])
         return AimView(**aim.as_dict())
 

@@ -20,9 +20,6 @@ def check_resumption(run: Run, *, is_complete: Callable[[Path], bool] = is_compl
     Args:
         run: The run, as it is now.
         is_complete: Returns whether nothing is left to collect into a directory.
-
-    Raises:
-        ConflictError: If the run lives, or has no dataset that can be continued, or a complete one.
     """
     directory = run.place.directory
     if run.status == "running":

@@ -25,12 +25,7 @@ _MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
 
 
 def description_of(run: Run) -> str:
-    """URDF of the robot of a run, with its tool; meshes are ``package://`` URLs.
-
-    Raises:
-        NotFoundError: If the run has no configuration yet, or is a container without a description.
-        ConfigError: If the robot's files cannot be read.
-    """
+    """URDF of the robot of a run, with its tool; meshes are ``package://`` URLs."""
     if run.record.kind == "container":
         path = run.place.directory / DESCRIPTION
         if not path.is_file():
@@ -57,12 +52,7 @@ class SceneFacts:
 
 
 def scene_of(run: Run) -> SceneFacts:
-    """Read the scene of a run.
-
-    Raises:
-        NotFoundError: If the run has no configuration yet.
-        ConfigError: If it cannot be read.
-    """
+    """Read the scene of a run."""
     config = load(_find_config(run))
     varies = "scene.landing_height_m" in config.sweep.parameters
     distance = None if config.sweep.target is None else config.sweep.target.distance_m
@@ -74,11 +64,7 @@ def scene_of(run: Run) -> SceneFacts:
 
 
 def _find_config(run: Run) -> Path:
-    """File of the configuration of a run.
-
-    Raises:
-        NotFoundError: If there is none yet.
-    """
+    """File of the configuration of a run."""
     path = config_path(run.place.directory)
     if not path.is_file():
         raise NotFoundError(f"run {run.id} has no configuration yet")
@@ -92,12 +78,7 @@ def _describe(path: Path, _changed_ns: int) -> str:
 
 
 def find_mesh(package: str, path: str) -> Path:
-    """Find the file of a mesh of one of the robots, whose URL is ``package://PACKAGE/PATH``.
-
-    Raises:
-        NotFoundError: If no robot's description names such a package, or it has no such file.
-        ConfigError: If the description of a robot cannot be read.
-    """
+    """Find the file of a mesh of one of the robots, whose URL is ``package://PACKAGE/PATH``."""
     root = _find_packages().get(package)
     # Neither dots nor links may lead out of the package. A path that no file can have raises an error.
     with suppress(OSError, ValueError):
@@ -124,11 +105,7 @@ class MeshFile:
 
 
 def list_meshes(description: str) -> list[MeshFile]:
-    """List the files of meshes that a description (URDF text) names, without those of packages that no robot has.
-
-    Raises:
-        ConfigError: If the description of a robot cannot be read.
-    """
+    """List the files of meshes that a description (URDF text) names, without those of packages that no robot has."""
     return [
         MeshFile(f"package://{package}/{path}", _digest(file, stat.st_mtime_ns), stat.st_size)
         for package, path, file in _find_files(description)
@@ -137,12 +114,7 @@ def list_meshes(description: str) -> list[MeshFile]:
 
 
 def find_mesh_by_content(sha256: str) -> Path:
-    """Find the file of a mesh of one of the robots by the SHA-256 of its content, in hexadecimal.
-
-    Raises:
-        NotFoundError: If no robot has such a mesh.
-        ConfigError: If the description of a robot cannot be read.
-    """
+    """Find the file of a mesh of one of the robots by the SHA-256 of its content, in hexadecimal."""
     for text, _ in _read_descriptions():
         for _, _, file in _find_files(text):
             if _digest(file, file.stat().st_mtime_ns) == sha256:
@@ -164,11 +136,7 @@ def _digest(file: Path, _changed_ns: int) -> str:
 
 @lru_cache(maxsize=1)
 def _find_packages() -> Mapping[str, Path]:
-    """Directories of the packages that the descriptions of all robots name, by their names.
-
-    Raises:
-        ConfigError: If the description of a robot cannot be read.
-    """
+    """Directories of the packages that the descriptions of all robots name, by their names."""
     return {
         package: robot.directory / package for text, robot in _read_descriptions() for package, _ in _MESH.findall(text)
     }
@@ -176,11 +144,7 @@ def _find_packages() -> Mapping[str, Path]:
 
 @lru_cache(maxsize=1)
 def _read_descriptions() -> Sequence[tuple[str, Robot]]:
-    """Read the descriptions of all robots that can be loaded; robots of other packages may lack theirs.
-
-    Raises:
-        ConfigError: If that of a robot of our own cannot be read.
-    """
+    """Read the descriptions of all robots that can be loaded; robots of other packages may lack theirs."""
     descriptions = []
     for name in usable_names("robots"):
         robot: Robot = load_member("robots", name)

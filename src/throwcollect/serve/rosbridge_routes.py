@@ -55,22 +55,14 @@ async def _close_at_end(socket: WebSocket, run: Run) -> None:
 
 
 def _find(instances: Instances, instance: str) -> Run:
-    """The run of an id.
-
-    Raises:
-        NotFoundError: If there is none, or it has ended.
-    """
+    """The run of an id."""
     run = instances.get(instance)
     refuse_ended(run)
     return run
 
 
 def _find_only_run() -> Run:
-    """The only run that lives.
-
-    Raises:
-        ConflictError: If there is none, or more than one.
-    """
+    """The only run that lives."""
     living = [run for run in Records().all() if run.status == "running"]
     if len(living) != 1:
         number = f"{len(living)} runs live" if living else "no run lives"

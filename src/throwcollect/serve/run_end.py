@@ -11,11 +11,7 @@ _LOOK_S = 1.0
 
 
 def refuse_ended(run: Run) -> None:
-    """Refuse a run that has ended, so that nobody would ever answer.
-
-    Raises:
-        NotFoundError: If it has.
-    """
+    """Refuse a run that has ended, so that nobody would ever answer."""
     if run.status == "ended":
         raise NotFoundError(f"run {run.id} has ended")
 

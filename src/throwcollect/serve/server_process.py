@@ -71,9 +71,6 @@ def serve(
         origins: Further origins of pages that may connect.
         names: Host names by which clients know this machine, besides the address.
         tell: Called once, when the server can be reached, with the server's address and a one-time code.
-
-    Raises:
-        ConfigError: If the port is taken, or the certificate or its key cannot be used.
     """
     keys = Keys()
     with _listen(host, port) as listener:
@@ -151,11 +148,7 @@ class _Server(uvicorn.Server):
 
 
 def _load(config: uvicorn.Config) -> None:
-    """Load the configuration of uvicorn.
-
-    Raises:
-        ConfigError: If the certificate or its key cannot be used.
-    """
+    """Load the configuration of uvicorn."""
     for option, path in (("--tls-cert", config.ssl_certfile), ("--tls-key", config.ssl_keyfile)):
         if path is not None and not Path(path).is_file():
             raise ConfigError(f"{option} {path}: no such file", expected=_PEM)

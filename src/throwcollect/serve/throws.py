@@ -39,9 +39,6 @@ def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float
         joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
         all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``,
         ``landing`` and ``values``.
-
-    Raises:
-        DatasetError: If the episode is damaged.
     """
     episode = delivery.episode
     samples = episode.samples()

@@ -29,14 +29,7 @@ _UNIT_TOLERANCE = 1e-3
 
 
 def make_engine(name: str) -> Engine:
-    """Make a physics engine.
-
-    Raises:
-        ConfigError: If the engine comes from another package, and cannot be imported or lacks something.
-        MemberError: If the engine comes from another package and fails; its methods raise this, too.
-        MissingExtraError: If its package is not installed.
-        WorkerError: If it does not start.
-    """
+    """Make a physics engine."""
     require_engine(name)
     kind = load_member("engines", name)
     if is_own("engines", name):
@@ -72,11 +65,7 @@ class _Checked:
         return self._ask(method, lambda: getattr(self._checked, method)(*arguments), getattr(self._kind, method))
 
     def _ask(self, what: str, ask: Callable[[], Any], declared: Any) -> Any:
-        """Call a function that asks for something, and check the answer against what a function of ours declares.
-
-        Raises:
-            MemberError: If the function fails, or the answer is of another type.
-        """
+        """Call a function that asks for something, and check the answer against what a function of ours declares."""
         with explain_failure("engines", self._name, f"carry out {what}"):
             answer = ask()
             if (wanted := _find_returned(declared)) is not NoneType:
@@ -130,11 +119,7 @@ class _CheckedEngine(_Checked):
         return taken
 
     def check_sample(self, sample: Sample) -> None:
-        """Make sure that a sample fits the scene.
-
-        Raises:
-            ValueError: If it has another number of numbers, or an orientation that is none.
-        """
+        """Make sure that a sample fits the scene."""
         if len(sample) != self._numbers:
             raise ValueError(f"a sample should have {self._numbers} numbers, has {len(sample)}")
         length = math.hypot(*ball_of(sample).orientation_xyzw)
@@ -142,11 +127,7 @@ class _CheckedEngine(_Checked):
             raise ValueError(f"the orientation of the ball in a sample should have the length 1, has {length:g}")
 
     def check_names(self, bodies: frozenset[str]) -> None:
-        """Make sure that bodies which touch the ball are in the world.
-
-        Raises:
-            ValueError: If one is not.
-        """
+        """Make sure that bodies which touch the ball are in the world."""
         for name in bodies - self._known:
             body, slash, _ = name.partition("/")
             if not (slash and (added := self.bodies) is not None and body in added):
@@ -172,12 +153,7 @@ class _StepChecker(Observer):
         """The last step to take: the last of all, or the one at which the observer stops the engine."""
 
     def on_touch(self, step: int, bodies: frozenset[str]) -> None:
-        """Check and pass on that other bodies touch the ball.
-
-        Raises:
-            TypeError: If an argument is of another type.
-            ValueError: If the step is not the next one of which this can be told, or there is no such body.
-        """
+        """Check and pass on that other bodies touch the ball."""
         check_type("on_touch: step", step, int)
         check_type("on_touch: bodies", bodies, frozenset[str])
         self._engine.check_names(bodies)
@@ -187,12 +163,7 @@ class _StepChecker(Observer):
         self._observer.on_touch(step, bodies)
 
     def on_sample(self, step: int, sample: Sample) -> bool:
-        """Check and pass on a sample.
-
-        Raises:
-            TypeError: If an argument is of another type.
-            ValueError: If the step is not the one of which a sample is due, or the sample does not fit the scene.
-        """
+        """Check and pass on a sample."""
         check_type("on_sample: step", step, int)
         check_type("on_sample: sample", sample, Sample)
         self._engine.check_sample(sample)
@@ -206,11 +177,7 @@ class _StepChecker(Observer):
         return stops
 
     def check_end(self, taken: int) -> None:
-        """Make sure that all steps were taken, and all samples made.
-
-        Raises:
-            ValueError: If they were not.
-        """
+        """Make sure that all steps were taken, and all samples made."""
         if self._due <= self._last:
             raise ValueError(f"on_sample should be called for step {self._due} of {self._last}, is not")
         if taken != self._last:

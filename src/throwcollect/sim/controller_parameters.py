@@ -72,11 +72,7 @@ class ControllerParameterServer:
         self._limb.controller.parameters = self._change(parameters)
 
     def _change(self, changes: list[Parameter]) -> ControllerParameters:
-        """Make the controller's parameters anew, with new values for some of the declared ROS parameters.
-
-        Raises:
-            ConfigError: If the values are not valid.
-        """
+        """Make the controller's parameters anew, with new values for some of the declared ROS parameters."""
         parameters = self._limb.controller.parameters
         constraints = parameters.constraints
         joints = dict(constraints.joints)

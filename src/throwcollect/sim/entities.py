@@ -67,21 +67,12 @@ class Entities:
             del self._infos[name]
 
     def info(self, name: str) -> EntityInfo:
-        """Return the description of an entity.
-
-        Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
-        """
+        """Return the description of an entity."""
         self._require(name)
         return self._infos.get(name) or self._first_infos[name]
 
     def set_info(self, name: str, info: EntityInfo) -> None:
-        """Replace the description of an entity.
-
-        Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``RESULT_OPERATION_FAILED`` if there is no
-                such category or the text is too long.
-        """
+        """Replace the description of an entity."""
         self._require(name)
         if info.category not in list(Category):
             known = ", ".join(f"{category} {category.name}" for category in Category)
@@ -93,11 +84,7 @@ class Entities:
         self._infos[name] = info
 
     def state(self, name: str) -> BodyState:
-        """Tell where an entity is and how it moves, in the world.
-
-        Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
-        """
+        """Tell where an entity is and how it moves, in the world."""
         self._require(name)
         if name == BALL:
             return self._world.ball
@@ -109,10 +96,6 @@ class Entities:
         """Put an entity into a state that is given in some frame, as `in_world` takes it.
 
         `accelerates` tells whether the client asked for an acceleration as well.
-
-        Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name, ``INVALID_POSE`` if the pose makes no
-                sense, ``RESULT_OPERATION_FAILED`` if the entity is fixed, or the twist is not possible.
         """
         self._require(name)
         if name == self._robot:
@@ -133,9 +116,6 @@ class Entities:
         """Convert a state from some frame to the world; a frame is an entity, or the world, which may be left empty.
 
         Velocities are along the axes of the frame, as seen from the world.
-
-        Raises:
-            RequestError: ``INVALID_POSE`` if the frame is not known or the pose makes no sense.
         """
         norm = math.hypot(*state.orientation_xyzw)
         # The conditions here and below are written as `not ... <=`, so that they refuse NaN, too, for which no
@@ -161,11 +141,7 @@ class Entities:
         return state
 
     def boxes(self, name: str) -> list[Box]:
-        """Find the boxes along the axes of the world that enclose an entity, one for each of its links.
-
-        Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
-        """
+        """Find the boxes along the axes of the world that enclose an entity, one for each of its links."""
         self._require(name)
         if name == BALL:
             return self._world.engine.ball_boxes()
@@ -174,11 +150,7 @@ class Entities:
         return self._world.spawned.engine_bodies(name).boxes(name)
 
     def bounds(self, name: str) -> Box | None:
-        """Find the box along the axes of an entity's own frame that encloses it; None if it has no shape.
-
-        Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
-        """
+        """Find the box along the axes of an entity's own frame that encloses it; None if it has no shape."""
         if name in self._world.spawned:
             return _unite(self._world.spawned.engine_bodies(name).bounds(name))
         # The robot's axes are those of the world, and a ball has the same box along any axes.
@@ -186,12 +158,7 @@ class Entities:
         return _unite([tuple(np.subtract(box, origin).tolist()) for box in self.boxes(name)])
 
     def add(self, name: str, model: BodyModel, start: BodyState, description: str) -> None:
-        """Put a new entity into the world, under a name that is free.
-
-        Raises:
-            RequestError: ``RESULT_OPERATION_FAILED`` if the world is full, ``RESOURCE_PARSE_ERROR`` if the engine does
-                not take the model.
-        """
+        """Put a new entity into the world, under a name that is free."""
         if len(self._world.spawned) >= _MOST_SPAWNED:
             raise RequestError("RESULT_OPERATION_FAILED", f"{_MOST_SPAWNED} entities were spawned; there is no room")
         self._world.spawned.add(name, model, start)
@@ -199,12 +166,7 @@ class Entities:
         self._infos[name] = EntityInfo(kind, description)
 
     def remove(self, name: str) -> None:
-        """Take an entity out of the world.
-
-        Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name, ``RESULT_OPERATION_FAILED`` if it
-                was not spawned.
-        """
+        """Take an entity out of the world."""
         self._require(name)
         if name not in self._world.spawned:
             raise RequestError("RESULT_OPERATION_FAILED", f"{name} is part of every trial and cannot be deleted")

@@ -21,12 +21,7 @@ _MOST_WANTED = 1000
 
 
 def select(entities: Entities, filters: EntityFilters) -> list[str]:
-    """List the entities that meet every condition of a filter, in order; a condition that is empty always holds.
-
-    Raises:
-        RequestError: ``RESULT_FEATURE_UNSUPPORTED`` for a kind of bounds that is not known here,
-            ``RESULT_OPERATION_FAILED`` for conditions that make no sense.
-    """
+    """List the entities that meet every condition of a filter, in order; a condition that is empty always holds."""
     tags = filters.tags
     if len(tags.tags) > _MOST_WANTED or len(filters.categories) > _MOST_WANTED:
         raise _senseless(f"more than {_MOST_WANTED} tags or categories")
@@ -50,11 +45,7 @@ def select(entities: Entities, filters: EntityFilters) -> list[str]:
 
 
 def _make_region_test(bounds: Bounds) -> Callable[[Box], bool] | None:
-    """Make a test of whether a box along the axes of the world reaches into a region; None if there are no bounds.
-
-    Raises:
-        RequestError: As `select` does.
-    """
+    """Make a test of whether a box along the axes of the world reaches into a region; None if there are no bounds."""
     if bounds.type == Bounds.TYPE_EMPTY:
         return None
     if bounds.type not in (Bounds.TYPE_BOX, Bounds.TYPE_SPHERE):
@@ -78,11 +69,7 @@ def _make_region_test(bounds: Bounds) -> Callable[[Box], bool] | None:
 
 
 def _compile(expression: str) -> Any:
-    """Compile a POSIX extended regular expression of a client; searching takes time in proportion to the name.
-
-    Raises:
-        RequestError: ``RESULT_OPERATION_FAILED`` if it is malformed.
-    """
+    """Compile a POSIX extended regular expression of a client; searching takes time in proportion to the name."""
     options = re2.Options()
     options.posix_syntax = True
     options.log_errors = False

@@ -61,11 +61,7 @@ class PresentTrial:
         return all(name in self._goals for name in self.begun.controllers)
 
     def require_free(self) -> None:
-        """Refuse a request that would change a leased trial.
-
-        Raises:
-            RequestError: ``RESULT_INCORRECT_STATE`` while the simulation is leased.
-        """
+        """Refuse a request that would change a leased trial."""
         if self.leased:
             raise RequestError("RESULT_INCORRECT_STATE", self.lease_in_words)
 

@@ -25,10 +25,6 @@ def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
         uri: ``file://`` or ``package://`` URI of a URDF file.
         text: URDF text, which is used if there is no URI.
         robot: The robot; packages of ``package://`` are looked for where its description is installed.
-
-    Raises:
-        RequestError: ``NO_RESOURCE`` if URI and text are empty, ``RESULT_NOT_FOUND`` if there is no such file,
-            ``UNSUPPORTED_FORMAT`` if it is not URDF; otherwise as `read_model` does.
     """
     if not uri:
         if not text:
@@ -90,11 +86,7 @@ def _package_of(robot: Robot) -> str:
 
 
 def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dict[str, str]:
-    """Find the descriptions below a directory that can be spawned; return their names by their URIs.
-
-    Raises:
-        RequestError: ``RESULT_NOT_FOUND`` if there are too many files to search.
-    """
+    """Find the descriptions below a directory that can be spawned; return their names by their URIs."""
     names = {}
     seen = 0
     for parent, directories, files in os.walk(directory):
@@ -113,23 +105,13 @@ def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dic
 
 
 def _read_name(path: Path, robot: Robot) -> str:
-    """Read the name of a description, and check that it can be spawned.
-
-    Raises:
-        RequestError: If it cannot be spawned.
-        OSError: If it cannot be read.
-    """
+    """Read the name of a description, and check that it can be spawned."""
     model = read_model(path.read_bytes(), lambda name: _locate(name, path.parent, robot), load_meshes=False)
     return model.name or path.stem
 
 
 def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
-    """Find the file of a mesh, whose name may be a path relative to the directory of its description.
-
-    Raises:
-        RequestError: ``MISSING_ASSETS`` if the path is relative, but the description lies in no directory; otherwise as
-            `_resolve` does.
-    """
+    """Find the file of a mesh, whose name may be a path relative to the directory of its description."""
     if directory is None and "://" not in filename and not filename.startswith("/"):
         message = f"mesh {filename!r:.255}: a relative path means nothing in a description without a file"
         raise RequestError("MISSING_ASSETS", message, expected="package:// or file://")
@@ -148,12 +130,7 @@ def _is_file(path: Path) -> bool:
 
 
 def _resolve(uri: str, robot: Robot, *, missing: str) -> Path:
-    """Find the file that a URI means; packages are looked for in the share of the robot.
-
-    Raises:
-        RequestError: ``UNSUPPORTED_FORMAT`` if the scheme is neither ``file`` nor ``package``, the reason `missing` if
-            it is no URI or there is no such package.
-    """
+    """Find the file that a URI means; packages are looked for in the share of the robot."""
     try:
         path = locate_file(uri, robot.share())
     except ConfigError as error:

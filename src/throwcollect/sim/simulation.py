@@ -111,10 +111,6 @@ class Simulation:
         """Begin a trial for a coordinator, which no other client may touch, with controllers as they are configured.
 
         The configuration has the values of the trial; there is a goal for each controller that moves.
-
-        Raises:
-            ConfigError: If the start state of this configuration is not possible.
-            ThrowcollectError: If a controller refuses its goal.
         """
         # Controllers refuse goals during a lease, so this trial counts as leased only when they have their goals.
         self.trial.leased = False
@@ -134,12 +130,7 @@ class Simulation:
         self.reset()
 
     def set_state(self, state: StateCode) -> None:
-        """Play, pause, stop or quit; stopping resets everything.
-
-        Raises:
-            ConfigError: If there is no start state to go back to; the state is set all the same.
-            RequestError: ``RESULT_INCORRECT_STATE`` if the simulation is to be stopped while it is leased.
-        """
+        """Play, pause, stop or quit; stopping resets everything."""
         if state == StateCode.STOPPED:
             self.trial.require_free()
         self.state = state
@@ -154,9 +145,6 @@ class Simulation:
             scope: ``STATE`` puts world and controllers into the start state of the trial that is set up, and spawned
                 entities back to where they were spawned. ``TIME`` puts the clock to the trial's start. Either aborts
                 all goals; only both together begin a trial. ``SPAWNED`` takes spawned entities out of the world.
-
-        Raises:
-            ConfigError: If the start state is not possible; the clock stands still until another reset succeeds.
         """
         of_time, of_state, of_spawned = Scope.TIME in scope, Scope.STATE in scope, Scope.SPAWNED in scope
         if of_spawned:
@@ -262,10 +250,6 @@ class Simulation:
         """Have `advance` take physics steps while the clock stands still; trials may end on the way.
 
         The request that is returned is kept up to date.
-
-        Raises:
-            RequestError: ``RESULT_OPERATION_FAILED`` if the simulation is not paused, ``RESULT_INCORRECT_STATE`` if the
-                steps of another request are still being taken, or the last reset has failed.
         """
         if self.state != StateCode.PAUSED:
             message = f"steps are taken while the simulation is paused only; it is {self.state.name}"

@@ -135,11 +135,7 @@ class SimulationNode(Node):
         return bool(self._listened) or any(controller.watched for controller in self._subscribed)
 
     def advance(self) -> None:
-        """Run for a stretch of time; see `TrialRunner.advance`.
-
-        Raises:
-            MemberError: If the engine comes from another package, and fails while no trial runs, or again in the reset.
-        """
+        """Run for a stretch of time; see `TrialRunner.advance`."""
         self._runner.advance(watched=self.watched)
 
     def follow_up(self) -> None:
@@ -161,11 +157,7 @@ class SimulationNode(Node):
         self._stepping.follow_up()
 
     def _require_own_namespace(self) -> None:
-        """Refuse the namespace of another simulation, because clients could not tell the two apart.
-
-        Raises:
-            ConfigError: If there is another simulation.
-        """
+        """Refuse the namespace of another simulation, because clients could not tell the two apart."""
         others = {info.node_name for info in self.get_publishers_info_by_topic(_EPISODE)} - {self.get_name()}
         if others:
             # The names are read before the node is destroyed, because in rclpy it has none afterwards.
@@ -288,12 +280,7 @@ class SimulationNode(Node):
         return SetParametersResult(successful=True)
 
     def _read_leases(self, values: Mapping[str, Any]) -> tuple[Lease, ...]:
-        """Read and check the leases that a coordinator sends.
-
-        Raises:
-            ConfigError: If a lease is for another simulation, or is not signed with the key of this run.
-            DatasetError: If the leases cannot be read.
-        """
+        """Read and check the leases that a coordinator sends."""
         if len(values) > 1:
             raise ConfigError(f"{LEASES}: is set alone, not with {next(name for name in values if name != LEASES)}")
         leases = leases_from_json(values[LEASES])
@@ -315,11 +302,7 @@ class SimulationNode(Node):
             self._episodes.publish(pack(refusal, self._signer))
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
-        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease.
-
-        Raises:
-            ConfigError: If the simulation is leased, so that only its coordinator may change it.
-        """
+        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease."""
         trial = self._simulation.trial
         changed = [name for name in values if name not in _NOT_RECORDED]
         if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:

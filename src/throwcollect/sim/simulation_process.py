@@ -20,23 +20,13 @@ _made: list[Simulation] = []
 
 
 def make_ahead(config: Config) -> None:
-    """Make a simulation, if its engine can be forked; processes that are forked off this one then `run` it.
-
-    Raises:
-        ConfigError: As `Simulation`.
-        WorkerError: As `Simulation`.
-    """
+    """Make a simulation, if its engine can be forked; processes that are forked off this one then `run` it."""
     if load_member("engines", config.sim.engine).can_be_forked:
         _made.append(Simulation(config))
 
 
 def _take(config: Config) -> Simulation:
-    """Take the simulation that was made ahead if it has this configuration, or else make one.
-
-    Raises:
-        ConfigError: As `Simulation`.
-        WorkerError: As `Simulation`.
-    """
+    """Take the simulation that was made ahead if it has this configuration, or else make one."""
     while _made:
         simulation = _made.pop()
         if simulation.config == config:
@@ -54,10 +44,6 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
         config: YAML file of the collection.
         name: Name of the node.
         namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
-
-    Raises:
-        ConfigError: If the configuration or the namespace cannot be used.
-        WorkerError: If the physics engine does not start, or the ROS 2 backend does not answer.
     """
     simulation = _take(load(config))
     if namespace is None and simulation.config.run.root_namespace:

@@ -61,12 +61,7 @@ class SpawnServices:
             response.result.error_message = f"{failed} of {len(results)} entities were not spawned; see their results"
 
     def _spawn(self, wish: SpawnWish | SpawnEntity.Request, resource: Resource | SpawnEntity.Request) -> str:
-        """Put a new entity into the world and return its name; a request that cannot be met changes nothing.
-
-        Raises:
-            RequestError: ``NAME_INVALID``, ``NAME_NOT_UNIQUE``, ``NAMESPACE_INVALID``, ``INVALID_POSE``, the reasons of
-                `load_model`, and those of `Entities.add`.
-        """
+        """Put a new entity into the world and return its name; a request that cannot be met changes nothing."""
         if wish.name or not wish.allow_renaming:
             self._check_name(wish.name, allow_renaming=wish.allow_renaming)
         if len(wish.entity_namespace) > _LONGEST_NAMESPACE or not _NAMESPACE.fullmatch(wish.entity_namespace):

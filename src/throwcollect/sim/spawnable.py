@@ -35,10 +35,6 @@ def read_model(content: str | bytes, find_mesh: Callable[[str], Path], *, load_m
         content: URDF text, or the bytes of a file.
         find_mesh: Finds the file of a mesh by its ``filename``; may raise a `RequestError`.
         load_meshes: Whether meshes are read, too; otherwise they are only looked for.
-
-    Raises:
-        RequestError: ``RESOURCE_PARSE_ERROR`` if the description is malformed, ``UNSUPPORTED_FORMAT`` if it is no URDF,
-            ``UNSUPPORTED_ASSETS`` if its meshes cannot be read or are too large; whatever `find_mesh` raises.
     """
     reason = "RESOURCE_PARSE_ERROR"
     try:
@@ -92,11 +88,7 @@ def _complete(link: BodyLink, *, exact: bool) -> BodyLink:
 
 
 def _correct(link: str, moments: tuple[float, ...], mass: float) -> tuple[float, ...]:
-    """Find the nearest inertia that a body of this mass can have.
-
-    Raises:
-        RequestError: ``RESOURCE_PARSE_ERROR`` if a principal moment is far below 0.
-    """
+    """Find the nearest inertia that a body of this mass can have."""
     least = mass * _LEAST_RADIUS_OF_GYRATION_M**2
     matrix: NDArray[np.float64] = np.zeros((3, 3))
     for value, (row, column) in zip(moments, INERTIA.values(), strict=True):

@@ -26,12 +26,7 @@ class SpawnedBodies:
         return tuple(self._spawned)
 
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world, under a name that no other body has; only the pose of `start` matters.
-
-        Raises:
-            RequestError: ``RESULT_FEATURE_UNSUPPORTED`` if the engine takes no bodies, ``RESOURCE_PARSE_ERROR`` if it
-                does not take this one.
-        """
+        """Put a body into the world, under a name that no other body has; only the pose of `start` matters."""
         self._bodies.add(name, model, start)
         self._spawned[name] = model, start
 
@@ -58,11 +53,7 @@ class SpawnedBodies:
         return self._spawned[name][0]
 
     def engine_bodies(self, name: str) -> Bodies:
-        """Return the bodies of the engine, which include the one of this name.
-
-        Raises:
-            RequestError: ``RESULT_INCORRECT_STATE`` if no world is loaded.
-        """
+        """Return the bodies of the engine, which include the one of this name."""
         if name not in self._bodies:
             raise RequestError("RESULT_INCORRECT_STATE", f"{name}: there is no world until a reset succeeds")
         return self._bodies

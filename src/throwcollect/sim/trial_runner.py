@@ -44,10 +44,6 @@ class TrialRunner:
         Args:
             trial: Number of the trial.
             values: Values by dotted key, which replace the values of the configuration.
-
-        Raises:
-            ConfigError: If no motion or no start state follows from the values.
-            ThrowcollectError: If a controller refuses its goal.
         """
         # If this trial cannot begin, the next episode must not be judged by what is left of an earlier trial.
         self._begun = None
@@ -70,9 +66,6 @@ class TrialRunner:
 
         Args:
             watched: Whether a client listens, so that the stretch has to be short.
-
-        Raises:
-            MemberError: If the engine comes from another package, and fails while no trial runs, or again in the reset.
         """
         try:
             self._simulation.advance(watched=watched)
@@ -86,10 +79,6 @@ class TrialRunner:
         """Return the episode of a trial that has ended, only once; None if there is none.
 
         The episode is judged if `begin` began the trial.
-
-        Raises:
-            ThrowcollectError: If the episode has numbers that are not finite, which no dataset may have.
-            MemberError: If the task comes from another package and fails, or the engine has failed in this trial.
         """
         failure, self._failure = self._failure, None
         if failure is not None:
@@ -116,12 +105,7 @@ class TrialRunner:
         return Delivery(Episode(header, state), result, conditions.to_json())
 
     def _judge(self, config: Config, trajectory: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:
-        """Judge a trial; return its result in JSON.
-
-        Raises:
-            ThrowcollectError: If the samples hold numbers that are not finite.
-            MemberError: If the task comes from another package and fails.
-        """
+        """Judge a trial; return its result in JSON."""
         if (infinite := next(find_infinite_columns(samples), None)) is not None:
             raise ThrowcollectError(f"trial {header.trial}: {infinite}")
         # Writing finds results of a wrong kind. They are a fault of the task, too, so writing stands in this block.

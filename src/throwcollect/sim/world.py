@@ -118,9 +118,6 @@ class World(Observer):
         Args:
             trial: Configuration of the trial.
             start_ns: Simulated time of the start state [ns].
-
-        Raises:
-            ConfigError: If the ball falls through the tool, or the robot's files cannot be read.
         """
         # Of `task.end`, only the names of joints count, because they say which joints are locked.
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))

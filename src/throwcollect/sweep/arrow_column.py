@@ -28,10 +28,6 @@ def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.A
         values: Numbers or texts; None for null. If it is an array, its elements must be exactly of that kind, without
             nulls; its texts are bytes of one length.
         kind: ``int64``, ``uint64``, ``float64`` or ``string``.
-
-    Raises:
-        TypeError: If a value is of another kind.
-        OverflowError: If a number is too large, or the texts are longer than 2 GiB in all.
     """
     if isinstance(values, np.ndarray):
         return _make_array_column(values, kind)

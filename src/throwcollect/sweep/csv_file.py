@@ -37,9 +37,6 @@ def read_csv(
     Returns:
         The columns; the rows that hold only numbers, shape ``(n_rows, n_columns)``, NaN where a cell may be empty and
         is; the lines of these rows; and the problems of all others, or the first 20.
-
-    Raises:
-        ConfigError: If the file cannot be read, or has no such columns.
     """
     problems: list[Problem] = []
     rows: list[list[float]] = []

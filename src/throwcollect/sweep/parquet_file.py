@@ -51,11 +51,7 @@ class _Sink(io.RawIOBase):
 
 
 def read_parquet(path: Path, columns: Sequence[str] | None = None) -> Any:
-    """Read the Arrow table of a Parquet file, or those of some columns that it has, and check every value of it.
-
-    Raises:
-        DatasetError: If the file is missing or damaged, or announces more than any table of a dataset holds.
-    """
+    """Read the Arrow table of a Parquet file, or those of some columns that it has, and check every value of it."""
     with open_parquet(path) as file:
         table = file.read(columns)
         table.validate(full=True)
@@ -68,9 +64,6 @@ def open_parquet(path: Path) -> Iterator[Any]:
 
     Yields:
         A `pyarrow.parquet.ParquetFile`, whose values are not validated yet.
-
-    Raises:
-        DatasetError: As for `read_parquet`.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -61,22 +61,14 @@ class Plan:
         return self.trials.keys
 
     def trial(self, number: int) -> Trial:
-        """Return the trial of a number.
-
-        Raises:
-            IndexError: If the plan has no such trial.
-        """
+        """Return the trial of a number."""
         index = number - self.trials.first
         if index < 0:
             raise IndexError(number)
         return self.trials[index]
 
     def slice_of(self, wanted: Slice) -> Plan:
-        """Cut a slice out of the plan.
-
-        Raises:
-            ConfigError: If the plan has fewer shards than there are slices.
-        """
+        """Cut a slice out of the plan."""
         numbers = wanted.trials_of(len(self.trials), trials_per_shard=self.config.record.trials_per_shard)
         return Plan(self.config, self.trials[numbers.start : numbers.stop], wanted)
 
@@ -85,20 +77,12 @@ class Plan:
         return with_values(self.config, trial.values)
 
     def write(self, path: Path) -> None:
-        """Write the plan as a Parquet file, whole or not at all, and remove the rounds beside it, which it contains.
-
-        Raises:
-            DatasetError: If the file cannot be written.
-        """
+        """Write the plan as a Parquet file, whole or not at all, and remove the rounds beside it, which it contains."""
         write_file(path, self.encode())
         remove(rounds_path(path))
 
     def take_in_rounds(self, path: Path) -> None:
-        """Write the plan as a whole if rounds lie beside its file; this plan contains them.
-
-        Raises:
-            DatasetError: If the file cannot be written.
-        """
+        """Write the plan as a whole if rounds lie beside its file; this plan contains them."""
         if is_there(rounds_path(path)):
             self.write(path)
 
@@ -133,10 +117,6 @@ class Plan:
         Args:
             path: File that `write` wrote; rounds that were added later lie beside it.
             config: The configuration; its section `run` may differ.
-
-        Raises:
-            DatasetError: If the file is missing, damaged, or no plan.
-            ForeignPlanError: If it is the plan of another configuration.
         """
         with open_parquet(path) as file:
             metadata = file.schema_arrow.metadata or {}
@@ -182,10 +162,6 @@ def draw_first_points(config: Config, *, directory: Path) -> Points:
     """Draw the points of all trials that are known before anything runs; for a plan that grows, its first two rounds.
 
     A relative `sweep.file` starts at `directory`.
-
-    Raises:
-        PlanError: If the sweep has no point.
-        ConfigError: If the file of the sampler `list` cannot be used.
     """
     points = draw_points(config, directory=directory)
     return points[:FIRST_TRIALS] if config.grows else points
@@ -213,11 +189,7 @@ def refusal(config: Config, check: Check) -> str | None:
 
 
 def check_some_left(trials: Trials) -> None:
-    """Make sure that a plan has something to run.
-
-    Raises:
-        PlanError: If every trial is refused.
-    """
+    """Make sure that a plan has something to run."""
     reasons = list(trials.refused.values())
     if len(reasons) < len(trials):
         return
@@ -235,11 +207,7 @@ def check_some_left(trials: Trials) -> None:
 
 
 def _read_trials(file: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
-    """Read the trials of an open plan in batches, because all rows at once take Arrow several times as much memory.
-
-    Raises:
-        DatasetError: If the numbers of the trials have gaps, or a digest is no SHA-256.
-    """
+    """Read the trials of an open plan in batches, because all rows at once take Arrow several times as much memory."""
     trials: Trials | None = None
     for rows in file.iter_batches(_ROWS_AT_ONCE):
         rows.validate(full=True)

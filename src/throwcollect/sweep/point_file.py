@@ -41,10 +41,6 @@ def read_points(path: Path, config: Config, *, key: str = "sweep.file") -> Point
         path: File that ends in ``.csv`` (UTF-8, comma, a header line) or ``.parquet``.
         config: Configuration with the keys that the columns name; its task declares the columns of targets.
         key: Key or option that names the file.
-
-    Raises:
-        ConfigError: If the file cannot be read, or its columns or values cannot be used; the error holds all problems,
-            or the first 20.
     """
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
     if path.suffix not in readers:

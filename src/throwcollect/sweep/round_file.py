@@ -25,11 +25,7 @@ def rounds_path(plan: Path) -> Path:
 
 
 def append_round(plan: Path, trials: Trials) -> None:
-    """Add a round, which follows the trials on disk, to a plan, whole or not at all; it then survives a power cut.
-
-    Raises:
-        DatasetError: If the round cannot be written.
-    """
+    """Add a round, which follows the trials on disk, to a plan, whole or not at all; it then survives a power cut."""
     path = rounds_path(plan)
     line = {
         "first": trials.first,
@@ -59,9 +55,6 @@ def read_rounds(plan: Path, trials: Trials) -> None:
     """Append the rounds that lie beside the file of a plan to `trials`, which were read from the file.
 
     Rounds that are in the file already are skipped.
-
-    Raises:
-        DatasetError: If a round is damaged, or does not begin where the previous one ends.
     """
     path = rounds_path(plan)
     if not is_there(path):
@@ -86,11 +79,7 @@ def _append_line(line: bytes, trials: Trials, path: Path, number: int) -> None:
 
 
 def _parse(line: bytes, keys: tuple[str, ...]) -> Trials:
-    """Read the trials of a line.
-
-    Raises:
-        ValueError: If `append_round` did not write the line; or another error that `_append_line` catches.
-    """
+    """Read the trials of a line."""
     entry = json.loads(line)
     count = len(entry["seeds"])
     if not all(map(is_digest, entry["digests"])):

@@ -30,10 +30,6 @@ def draw_points(config: Config, *, directory: Path) -> Points:
 
     The first points of `uniform` and `sobol` do not depend on the number of points, so trials stay the same when their
     number is raised. In a `grid`, the last key varies fastest. A relative `sweep.file` starts at `directory`.
-
-    Raises:
-        PlanError: If nothing is swept, or `trials` does not fit the sampler.
-        ConfigError: If the file of the sampler `list` cannot be used.
     """
     sweep = config.sweep
     if sweep.file is not None:

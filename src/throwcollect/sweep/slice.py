@@ -26,11 +26,7 @@ class Slice:
 
     @classmethod
     def parse(cls, text: str) -> Slice:
-        """Read the text of a slice.
-
-        Raises:
-            ConfigError: If the text is not INDEX/COUNT, or the index is not below the count.
-        """
+        """Read the text of a slice."""
         match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
         if match is None:
             raise ConfigError(f"a slice is INDEX/COUNT, got {text!r}", expected="such as 0/8, the first of eight")
@@ -46,11 +42,7 @@ class Slice:
         return tuple(cls(index, count) for index in range(count))
 
     def trials_of(self, trials: int, *, trials_per_shard: int) -> range:
-        """Find the numbers of the slice's trials in a plan of `trials`; slices of a plan differ by at most one shard.
-
-        Raises:
-            ConfigError: If there are fewer shards than slices.
-        """
+        """Find the numbers of the slice's trials in a plan of `trials`; slices differ by at most one shard."""
         shards = -(-trials // trials_per_shard)
         if self.count > shards:
             smaller = f", or shards of at most {trials // self.count}" if self.count <= trials else ""

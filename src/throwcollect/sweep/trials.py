@@ -118,12 +118,7 @@ class Trials(Sequence[Trial]):
     @overload
     def __getitem__(self, which: slice) -> Trials: ...
     def __getitem__(self, which: int | slice) -> Trial | Trials:
-        """Return the trial at a position, or the trials of a Python slice without gaps.
-
-        Raises:
-            IndexError: If there is no trial at that position.
-            ValueError: If the slice has gaps.
-        """
+        """Return the trial at a position, or the trials of a Python slice without gaps."""
         # A range takes negative positions and slices, and raises the IndexError.
         chosen = self.numbers[which]
         if isinstance(chosen, int):
@@ -154,12 +149,7 @@ class Trials(Sequence[Trial]):
         return f"Trials({len(self)} from {self.first}, {len(self._refused)} refused; swept: {', '.join(self.keys)})"
 
     def extend(self, others: Trials) -> None:
-        """Append trials.
-
-        Raises:
-            ValueError: If the others do not begin where these trials end, vary other keys, or have other columns of
-                targets.
-        """
+        """Append trials."""
         names = (others.keys, others.target_names)
         if others.first != self.numbers.stop or names != (self.keys, self.target_names):
             raise ValueError(f"{others} cannot follow {self}")

@@ -54,9 +54,6 @@ def dmp_trajectory(
         duration_s: Time constant tau [s]. The motion lasts longer than that until it has settled.
         family: Weights and constants of the DMP.
         points_hz: Points per second.
-
-    Raises:
-        ConfigError: If the motion has not settled after 5 tau, or leads to numbers that are not finite.
     """
     zero = [0.0] * family.basis_functions
     weights = np.array([family.weights.get(joint, zero) for joint in end])

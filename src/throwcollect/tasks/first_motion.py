@@ -37,9 +37,6 @@ def find_first_motion(robot: str, task: str) -> Motion:
 
     The short motion keeps the limits of positions and velocities, even if a joint goes half as far again; neither
     torques nor collisions are looked at. Robot and task are given by their names.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read, or none of its joints may move.
     """
     try:
         found = _describe_motion(robot, task).task
@@ -55,11 +52,7 @@ def _describe_motion(robot: str, task: str, **motion: Mapping[str, float]) -> Co
 
 
 def _find_short_motion(name: str, task: str) -> TaskConfig:
-    """Find a motion of all joints that may move, each by `_STROKE_RAD`, or as far as its limits allow.
-
-    Raises:
-        ConfigError: If no joint may move, or the robot's files cannot be read.
-    """
+    """Find a motion of all joints that may move, each by `_STROKE_RAD`, or as far as its limits allow."""
     robot: Robot = load_member("robots", name)
     limits = joint_limits(robot)
     margin = np.minimum(_MARGIN_RAD, _MARGIN_SHARE * (limits.upper - limits.lower))

@@ -86,11 +86,7 @@ class ResultColumns(Generic[AnyResult]):
         return json.dumps({**self.write(result), "outcome": result.outcome.value, "reason": result.reason})
 
     def from_json(self, outcomes: type[Outcome], text: str) -> AnyResult:
-        """Read the text that `to_json` writes.
-
-        Raises:
-            DatasetError: If `to_json` did not write the text.
-        """
+        """Read the text that `to_json` writes."""
         try:
             row = json.loads(text)
             return self.read(outcomes(row["outcome"]), row["reason"], row)

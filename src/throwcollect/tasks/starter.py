@@ -31,9 +31,6 @@ def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
 
     Returns:
         The text of the configuration as ``throwcollect.yaml``, and of `POINTS` if the sampler reads it.
-
-    Raises:
-        ConfigError: If there is no robot, task or sampler of that name, or the robot's files cannot be read.
     """
     for option, name, known in (
         ("--robot", robot, names_of("robots")),

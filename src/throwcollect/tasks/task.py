@@ -141,11 +141,7 @@ class Task(ABC, Generic[AnyResult]):
         """
 
     def _check_assessed(self, assessed: object) -> None:
-        """Make sure that `assess` of another package returned what it should.
-
-        Raises:
-            TypeError: If it did not.
-        """
+        """Make sure that `assess` of another package returned what it should."""
         check_type("what assess returns", assessed, tuple[Result, Failure | None])
         result, failure = cast(tuple[Result, Failure | None], assessed)
         check_type("its result", result, self.results)
@@ -159,12 +155,7 @@ class Task(ABC, Generic[AnyResult]):
 
 
 def _check_storable(columns: ResultColumns[Any], result: Result) -> None:
-    """Make sure that the table of throws can hold the values and the reason of a result.
-
-    Raises:
-        TypeError: If a value is of another kind than its column.
-        ValueError: If a whole number is too large, or the reason is no text that can be encoded.
-    """
+    """Make sure that the table of throws can hold the values and the reason of a result."""
     # Texts with surrogates cannot be encoded; type checkers let them pass.
     (result.reason or "").encode()
     values = columns.write(result)
@@ -193,11 +184,7 @@ def task_of(config: Config) -> Task[Any]:
 
 
 def _check_declared(task: Task[Any]) -> None:
-    """Make sure that a task of another package declares what it should.
-
-    Raises:
-        TypeError: If it does not.
-    """
+    """Make sure that a task of another package declares what it should."""
     check_type("results", getattr(task, "results", None), type[Result])
     check_properties(task.config.task, TaskConfig)
     if REFUSED in {each.value for each in task.outcomes}:
@@ -220,12 +207,7 @@ def trajectory_of(config: Config) -> JointTrajectory:
 
 
 def _check_trajectory(trajectory: JointTrajectory, joints: tuple[str, ...]) -> None:
-    """Make sure that a task of another package has planned a motion of these joints from the start of the trial on.
-
-    Raises:
-        TypeError: If it is no trajectory.
-        ValueError: If it is one of other joints, or begins at another time.
-    """
+    """Make sure that a task of another package has planned a motion of these joints from the start of the trial on."""
     check_type("what trajectory returns", trajectory, JointTrajectory)
     if trajectory.joints != joints or trajectory.times[0] != 0:
         raise ValueError(f"the trajectory should begin at time 0, and have the joints {', '.join(joints)}")

@@ -119,11 +119,7 @@ def tool_of(config: Config) -> Tool:
 
 
 def _check(tool: Tool, radius: float) -> None:
-    """Make sure that a tool has all that is declared for tools, for a ball of this radius [m].
-
-    Raises:
-        TypeError: If something is missing or wrong.
-    """
+    """Make sure that a tool has all that is declared for tools, for a ball of this radius [m]."""
     check_properties(tool, Tool)
     check_type("inertia.mass", tool.inertia.mass, Positive)
     check_type("inertia.lever", tuple(tool.inertia.lever.tolist()), _Numbers)

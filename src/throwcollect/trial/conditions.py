@@ -70,11 +70,7 @@ _CONDITIONS = TypeAdapter(Conditions)
 
 
 def conditions_from_json(text: str) -> Conditions:
-    """Read what `Conditions.to_json` writes.
-
-    Raises:
-        DatasetError: If `Conditions.to_json` did not write the text.
-    """
+    """Read what `Conditions.to_json` writes."""
     try:
         return _CONDITIONS.validate_json(text, strict=True)
     except ValidationError as error:

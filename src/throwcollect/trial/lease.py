@@ -70,11 +70,7 @@ def leases_to_json(leases: Iterable[Lease]) -> str:
 
 
 def leases_from_json(text: str) -> tuple[Lease, ...]:
-    """Read what `leases_to_json` writes.
-
-    Raises:
-        DatasetError: If `leases_to_json` did not write the text.
-    """
+    """Read what `leases_to_json` writes."""
     try:
         return _LEASES.validate_json(text, strict=True)
     except ValidationError as error:

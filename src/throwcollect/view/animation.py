@@ -57,12 +57,6 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
     """Draw a throw of a dataset, by default the first one that has an episode, `slow` times slower than real time.
 
     `output` is a ``.webp`` or ``.gif`` file, which replaces an existing one.
-
-    Raises:
-        ConfigError: If there is no such format or trial, or the robot's files cannot be read.
-        DatasetError: If the dataset is damaged or not finished, the trial has no episode, or `output` cannot be
-            written.
-        MissingExtraError: If Pillow is not installed.
     """
     kind = _FORMATS.get(output.suffix.lower())
     if kind is None:

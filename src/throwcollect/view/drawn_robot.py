@@ -68,11 +68,7 @@ class DrawnRobot:
         return sorted({shape.mesh for shape in self.shapes if shape.mesh})
 
     def copy_package(self, directory: Path) -> None:
-        """Put the meshes into a directory, with a ``package.xml`` by which viewers find them.
-
-        Raises:
-            OSError: If a file cannot be copied.
-        """
+        """Put the meshes into a directory, with a ``package.xml`` by which viewers find them."""
         for mesh in self.meshes:
             target = directory / mesh
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -87,21 +83,12 @@ class DrawnRobot:
 
 
 def draw_robot_of(config: Config) -> DrawnRobot:
-    """Read the robot with its tool as viewers draw it.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read.
-        DatasetError: If its description cannot be drawn.
-    """
+    """Read the robot with its tool as viewers draw it."""
     return read_drawn_robot(full_description(config), tool_of(config).link, robot_of(config).directory)
 
 
 def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
-    """Read a URDF text as viewers draw it; the link of the tool has a colour of its own.
-
-    Raises:
-        DatasetError: If the text is not a URDF that can be drawn.
-    """
+    """Read a URDF text as viewers draw it; the link of the tool has a colour of its own."""
     try:
         robot = parse_xml(description, "robot description")
         for link in robot.iter("link"):

@@ -41,9 +41,6 @@ def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns
         shapes: The shapes.
         share: Directory that the paths of meshes are relative to.
         stamp_ns: Stamp of the markers [ns].
-
-    Raises:
-        ConfigError: If a mesh cannot be read.
     """
     array, marker = (get_message(f"visualization_msgs/msg/{kind}") for kind in ("MarkerArray", "Marker"))
     kinds = {"mesh": marker.MESH_RESOURCE, "box": marker.CUBE, "cylinder": marker.CYLINDER, "sphere": marker.SPHERE}

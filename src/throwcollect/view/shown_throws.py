@@ -30,12 +30,7 @@ class ShownThrow:
 
 
 def choose_throws(dataset: Dataset, trials: Iterable[int] | None) -> Dataset:
-    """Choose the throws that are shown: some trials in their order, or all that have an episode.
-
-    Raises:
-        ConfigError: If there is no such trial.
-        DatasetError: If a trial has no episode, or none has one.
-    """
+    """Choose the throws that are shown: some trials in their order, or all that have an episode."""
     if trials is None:
         if not len(recorded := dataset.recorded):
             raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)

@@ -50,10 +50,6 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     """Make throws of a dataset ready for viewers: trials in the given order, or else all that have an episode.
 
     The directory to write must not exist, or be empty.
-
-    Raises:
-        ConfigError: If `output` exists and is not an empty directory, or the robot's files cannot be read.
-        DatasetError: If the dataset is damaged or not finished, a trial has no episode, or `output` cannot be written.
     """
     dataset = Dataset.open(directory)
     throws = choose_throws(dataset, trials)

@@ -99,10 +99,6 @@ class ViewRecording:
         """Write throws in order of time, at least one, with their samples and everything else that viewers draw.
 
         The paths of all of `paths`, the first of which is the first throw, are drawn behind each throw.
-
-        Raises:
-            DatasetError: If an episode cannot be read.
-            ConfigError: If the robot's files cannot be read.
         """
         self._put_looks(paths[0])
         self._put("/view/throws", paths[0].start_ns, all_markers(paths))

@@ -39,12 +39,7 @@ def show_digest(directory: DatasetArgument) -> None:
 
 
 def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint: str | None = None) -> None:
-    """Print the summary of a collection that has ended as `print_summary` does, and fail if it has lost trials.
-
-    Raises:
-        OutputError: If the summary cannot be printed.
-        LossError: If trials are lost; its hint says how to go on.
-    """
+    """Print the summary of a collection that has ended as `print_summary` does, and fail if it has lost trials."""
     from throwcollect.dataset.summary import explain_loss
 
     print_summary(found, directory, as_json=as_json)
@@ -53,11 +48,7 @@ def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint:
 
 
 def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None:
-    """Print the summary of a collection, and how to look into its dataset, unless that is in a volume.
-
-    Raises:
-        OutputError: If it cannot be printed.
-    """
+    """Print the summary of a collection, and how to look into its dataset, unless that is in a volume."""
     print_result(asdict(found), describe(found), json=as_json)
     look = command("dataset", "info", directory) if directory is not None else None
     if look is not None and not as_json:

@@ -74,11 +74,7 @@ def replay_dataset(
 
 
 def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: Path | None, *, json: bool) -> None:
-    """Simulate throws with another engine, and print by how much the results differ.
-
-    Raises:
-        ConfigError: If there is no such engine, the dataset was computed by it, or nothing can be drawn.
-    """
+    """Simulate throws with another engine, and print by how much the results differ."""
     from throwcollect.replay.other_engine import LANDING, simulate_with
 
     if plot is not None:

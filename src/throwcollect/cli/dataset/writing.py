@@ -92,11 +92,7 @@ def view_dataset(
 
 
 def read_trials(text: str) -> list[int]:
-    """Read numbers of trials such as ``3,5,7-9``, and keep their order.
-
-    Raises:
-        ConfigError: If the text is something else, or names a trial twice.
-    """
+    """Read numbers of trials such as ``3,5,7-9``, and keep their order."""
     chosen: list[int] = []
     for part in text.split(","):
         match = re.fullmatch(r"\s*([0-9]{1,7})\s*(?:-\s*([0-9]{1,7})\s*)?", part)

@@ -51,11 +51,7 @@ class GraphSession:
                 return
 
     def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
-        """Wait for the answer to a request to a node or service; `alive` tells whether that one still exists.
-
-        Raises:
-            WorkerError: If the node has vanished.
-        """
+        """Wait for the answer to a request to a node or service; `alive` tells whether that one still exists."""
         self.spin_until(lambda: future.done() or not alive())
         if not future.done():
             raise WorkerError(f"{who} is gone and has not answered")
@@ -75,13 +71,7 @@ class GraphSession:
 
 @contextmanager
 def join_graph(run: str | None) -> Iterator[GraphSession]:
-    """Join the graph of a run, or without a run, the graph of the router that the environment names.
-
-    Raises:
-        ConfigError: If there is no such run or no router.
-        WorkerError: If the run has no router (any more).
-        Interrupted: If the user presses Ctrl-C; the message is empty, because that is the normal way to leave.
-    """
+    """Join the graph of a run, or without a run, the graph of the router that the environment names."""
     # These load Zenoh, and every command of throwcollect loads this module.
     from throwcollect.ros.middleware import Middleware
 
@@ -116,9 +106,6 @@ def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") ->
     """Refuse the name of a thing, such as a ``topic``, that does not exist, and propose those that are like it.
 
     `of` is the node that would have it; empty if the graph would.
-
-    Raises:
-        ConfigError: If it is none of them.
     """
     existing = sorted(set(names))
     if name in existing:

@@ -139,11 +139,7 @@ def _describe_rate(arrivals: deque[int]) -> str:
 
 
 def _find_message_type(session: GraphSession, topic: str, kind: str | None) -> tuple[str, Any]:
-    """Find the absolute name of a topic and the class of its messages.
-
-    Raises:
-        ConfigError: If the topic has several types and none is named, or does not have the one that is.
-    """
+    """Find the absolute name of a topic and the class of its messages."""
     name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
     kinds = topics.get(name, [])
     if kind is None:

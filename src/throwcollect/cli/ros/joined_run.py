@@ -11,12 +11,7 @@ from throwcollect.wording import join_names
 
 
 def find_run_and_connection(run: str | None) -> tuple[Run, Connection]:
-    """Find a run, or the only one that lives, and the connection by which our own processes join it.
-
-    Raises:
-        ConfigError: If there is no such run, or it has ended.
-        WorkerError: If the run has no router (any more).
-    """
+    """Find a run, or the only one that lives, and the connection by which our own processes join it."""
     found = find_run_to_change(Records(), run, command="ros env")
     record = require_living(found)
     if record.endpoint is None:
@@ -25,11 +20,7 @@ def find_run_and_connection(run: str | None) -> tuple[Run, Connection]:
 
 
 def require_rmw_of_shell(run: Run) -> None:
-    """Refuse a run whose RMW the ROS 2 of this shell does not have; nodes would end with an error of rcl.
-
-    Raises:
-        ConfigError: If it does not.
-    """
+    """Refuse a run whose RMW the ROS 2 of this shell does not have; nodes would end with an error of rcl."""
     rmw, there = run.record.middleware.rmw, shell_rmws()
     if there and rmw not in there:
         raise ConfigError(

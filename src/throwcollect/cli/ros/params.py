@@ -90,11 +90,7 @@ def set_parameter(
 
 
 def _make_parameter(name: str, text: str) -> Any:
-    """Make the message of a parameter of the type that its value has in YAML; a value of another type becomes a text.
-
-    Raises:
-        ConfigError: If a whole number has more than 64 bits.
-    """
+    """Make the message of a parameter of the type that its value has in YAML; other types become strings."""
     from throwcollect.cli.ros.yaml_values import parse
 
     try:

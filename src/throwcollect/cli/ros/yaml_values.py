@@ -15,11 +15,7 @@ _SHORT = 128
 
 
 def parse(text: str, what: str) -> Any:
-    """Read a value from YAML, which is the argument `what` of a command.
-
-    Raises:
-        ConfigError: If it is no YAML.
-    """
+    """Read a value from YAML, which is the argument `what` of a command."""
     try:
         return YAML(typ="safe", pure=True).load(text)
     except (YAMLError, ValueError) as error:

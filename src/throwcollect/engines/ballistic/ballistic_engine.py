@@ -65,11 +65,7 @@ class BallisticEngine(Engine):
         return True
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene.
-
-        Raises:
-            ConfigError: If the robot has joints between base and tool that do not turn.
-        """
+        """Make the world of a scene."""
         self._tool_path = ToolPath(scene)
         self._opening = np.array(scene.tool.opening).reshape(3, 1)
         self._carried_by = frozenset({scene.tool.name})

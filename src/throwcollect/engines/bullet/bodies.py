@@ -42,11 +42,7 @@ class BulletBodies(Bodies):
         self.leave_traces = False
 
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world; see `Bodies.add`.
-
-        Raises:
-            RequestError: ``RESOURCE_PARSE_ERROR`` if Bullet does not take it.
-        """
+        """Put a body into the world; see `Bodies.add`."""
         client = self._client
         # This is set before the body is loaded, because a body that Bullet refuses may leave traces, too.
         self.leave_traces = True

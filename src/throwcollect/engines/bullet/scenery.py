@@ -48,11 +48,7 @@ class Scenery:
 
 
 def connect() -> int:
-    """Start an empty world in this process, and return the number of its physics client.
-
-    Raises:
-        WorkerError: If Bullet refuses, as it does when one process has very many worlds.
-    """
+    """Start an empty world in this process, and return the number of its physics client."""
     client = int(pybullet.connect(pybullet.DIRECT))
     if client < 0:
         raise WorkerError("Bullet could not start a physics world", hint="close other worlds of this process")
@@ -60,11 +56,7 @@ def connect() -> int:
 
 
 def load_scenery(client: int, scene: Scene) -> Scenery:
-    """Empty the world and load ground and robot into it.
-
-    Raises:
-        ConfigError: If Bullet cannot load the description.
-    """
+    """Empty the world and load ground and robot into it."""
     pybullet.resetSimulation(physicsClientId=client)
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
@@ -96,11 +88,7 @@ def load_body(
     *,
     flags: int = pybullet.URDF_USE_INERTIA_FROM_FILE,
 ) -> int:
-    """Load a body into a world at a pose in it, and return its number.
-
-    Raises:
-        ConfigError: If Bullet cannot load it, or only a part of it.
-    """
+    """Load a body into a world at a pose in it, and return its number."""
     # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         for name, content in model.encode_meshes().items():
@@ -111,11 +99,7 @@ def load_body(
 def load_urdf(
     client: int, urdf: str, directory: Path, position: Vector, turn: Quaternion, *, fixed: bool = True, flags: int = 0
 ) -> int:
-    """Load URDF text, whose paths are relative to a directory, and return the number of the body.
-
-    Raises:
-        ConfigError: If Bullet cannot load it, or only a part of it.
-    """
+    """Load URDF text, whose paths are relative to a directory, and return the number of the body."""
     path = directory / "body.urdf"
     path.write_text(urdf, encoding="utf-8")
     with reading_natively("Bullet cannot load the description"):

@@ -61,11 +61,7 @@ class MujocoBodies(Bodies):
         self.leave_traces = False
 
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world; see `Bodies.add`.
-
-        Raises:
-            RequestError: ``RESOURCE_PARSE_ERROR`` if MuJoCo does not take it, or would fill in its meshes.
-        """
+        """Put a body into the world; see `Bodies.add`."""
         if any(shape.is_concave for link in model.links for shape in link.shapes):
             raise RequestError(
                 "RESOURCE_PARSE_ERROR",
@@ -91,9 +87,6 @@ class MujocoBodies(Bodies):
 
         Yields:
             The surfaces of these bodies, which can press on the ball.
-
-        Raises:
-            ValueError: If MuJoCo cannot read a description.
         """
         for name, body in self._bodies.items():
             # MuJoCo gives names such as `world` a meaning, so links have their numbers for names.

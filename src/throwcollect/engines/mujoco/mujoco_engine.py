@@ -79,11 +79,7 @@ class MujocoEngine(Engine):
         return not self.bodies.leave_traces
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes.
-
-        Raises:
-            ConfigError: If MuJoCo does not take the robot's description.
-        """
+        """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
         can_keep = self._is_loaded and self.is_as_loaded
         if can_keep and dataclasses.replace(self._scene, ball_radius_m=scene.ball_radius_m) == scene:
             resize_ball(self._model, scene.ball_radius_m)
@@ -102,11 +98,7 @@ class MujocoEngine(Engine):
         self._is_loaded = True
 
     def _compile(self) -> None:
-        """Compile the world of the scene with all bodies.
-
-        Raises:
-            ValueError: If MuJoCo does not take a description.
-        """
+        """Compile the world of the scene with all bodies."""
         spec, surfaces = make_spec(self._scene)
         surfaces += self.bodies.attach(spec)
         self._model = spec.compile()
@@ -114,11 +106,7 @@ class MujocoEngine(Engine):
         self._surfaces = surfaces
 
     def _compile_anew(self) -> None:
-        """Compile the world with other bodies; robot, ball and bodies that stay keep their motion.
-
-        Raises:
-            ValueError: If MuJoCo does not take the description of a body.
-        """
+        """Compile the world with other bodies; robot, ball and bodies that stay keep their motion."""
         model, data = self._model, self._data
         self._compile()
         self.configure(self._physics)

@@ -56,11 +56,7 @@ class Surface:
 
 
 def read_body(model: BodyModel) -> mujoco.MjSpec:
-    """Read a body, whose links all become bodies of MuJoCo.
-
-    Raises:
-        ValueError: If MuJoCo does not take it.
-    """
+    """Read a body, whose links all become bodies of MuJoCo."""
     text = model.write_urdf()
     begin = text.index("<robot")
     at = text.index(_ROOT_TAG_END, begin) + 1
@@ -76,9 +72,6 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
 
     Returns:
         The world, and its surfaces that can press on the ball.
-
-    Raises:
-        ConfigError: If MuJoCo cannot read the robot's description.
     """
     try:
         spec = read_body(scene.robot.rename_links({_WORLD_LINK: _STAND_IN}))

@@ -20,11 +20,7 @@ _CORNERS = 73
 
 
 def check_picture(path: Path) -> None:
-    """Check that a picture can be written to a new file of this name, before throws are simulated for it.
-
-    Raises:
-        ConfigError: If the name does not end with ``.png``, or is not new, or has no directory.
-    """
+    """Check that a picture can be written to a new file of this name, before throws are simulated for it."""
     if path.suffix.lower() != ".png":
         raise ConfigError(f"{path}: should end with .png, as that is what is written")
     if path.exists():
@@ -40,9 +36,6 @@ def write_deviations(deviations: Sequence[Sequence[float]], engine: str, path: P
         deviations: Differences of each throw's landings along x and along y [m], shape ``(2, n_throws)``.
         engine: Name of the engine.
         path: The file.
-
-    Raises:
-        DatasetError: If the file cannot be written.
     """
     x, y = 1e3 * np.array(deviations)
     rms = float(np.sqrt((x**2 + y**2).mean()))

@@ -92,11 +92,7 @@ class JointMotion:
 
 
 def measure_residuals(dataset: Dataset) -> Residuals:
-    """Compare flights with ballistic motion, at most `MOST_RESIDUALS` of them.
-
-    Raises:
-        DatasetError: If an episode is not where the table says, or is damaged.
-    """
+    """Compare flights with ballistic motion, at most `MOST_RESIDUALS` of them."""
     trials = dataset.recorded.throws["trial"].to_numpy()
     # Episodes are chosen at random, as every n-th point of a Sobol sequence or a grid would lie on a lattice.
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
@@ -125,11 +121,7 @@ def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> t
 
 
 def read_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
-    """Read paths of the ball.
-
-    Raises:
-        DatasetError: If an episode is not where the table says, or is damaged.
-    """
+    """Read paths of the ball."""
     outcomes = dataset.throws["outcome"]
     for trial in trials:
         header, samples = read_samples(dataset, trial)
@@ -139,11 +131,7 @@ def read_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
 
 
 def read_motion(dataset: Dataset, trial: int) -> JointMotion:
-    """Read the commanded and measured motion of one throw.
-
-    Raises:
-        DatasetError: If the episode is not where the table says, or is damaged.
-    """
+    """Read the commanded and measured motion of one throw."""
     header, samples = read_samples(dataset, trial)
     config = dataset.plan.config_of(dataset.plan.trial(trial))
     trajectory = trajectory_of(config)

@@ -31,11 +31,7 @@ from throwcollect.wording import format_count
 
 
 def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """Make the part of a report that only datasets of throws have.
-
-    Raises:
-        DatasetError: If an episode is damaged, or not where the table says.
-    """
+    """Make the part of a report that only datasets of throws have."""
     robot = robot_of(dataset.config)
     throws, swept = dataset.throws, LANDING_HEIGHT in dataset.plan.keys
     height_m = None if swept else dataset.config.scene.landing_height_m

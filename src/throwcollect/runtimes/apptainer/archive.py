@@ -38,12 +38,7 @@ _DAMAGED = (
 
 
 def check_archive(archive: Path) -> None:
-    """Make sure that a file is an archive, as `docker save` writes it, with one image of throwcollect.
-
-    Raises:
-        ConfigError: If the file is something else.
-        DatasetError: If this user may not read the file.
-    """
+    """Make sure that a file is an archive, as `docker save` writes it, with one image of throwcollect."""
     try:
         with _refuse_damage(f"{archive}: is no archive of an image"):
             with tarfile.open(archive) as files:
@@ -66,10 +61,6 @@ def unpack_archive(archive: Path, directory: Path) -> None:
 
     Given an archive, Apptainer would compress its layers, only to unpack them again, which takes four times as long as
     the rest of the conversion. It takes the layers of such a directory as they are.
-
-    Raises:
-        ConfigError: If the archive is damaged.
-        OSError: If the archive cannot be read, or the directory cannot be written.
     """
     blobs = directory / "blobs" / "sha256"
     blobs.mkdir(parents=True)
@@ -101,11 +92,7 @@ def unpack_archive(archive: Path, directory: Path) -> None:
 
 @contextmanager
 def _refuse_damage(message: str) -> Iterator[None]:
-    """Turn the errors of reading a damaged archive, or something else than an archive, into one with this message.
-
-    Raises:
-        ConfigError: If the block gets such an error.
-    """
+    """Turn the errors of reading a damaged archive, or something else than an archive, into one with this message."""
     try:
         yield
     except _DAMAGED as error:

@@ -22,11 +22,7 @@ _PATIENCE_S = 10.0
 
 
 def find_program() -> str:
-    """Find the path of Apptainer, or else of Singularity.
-
-    Raises:
-        WorkerError: If neither is installed.
-    """
+    """Find the path of Apptainer, or else of Singularity."""
     found = next(filter(None, map(shutil.which, _PROGRAMS)), None)
     if found is None:
         raise WorkerError(
@@ -41,9 +37,6 @@ def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[st
 
     `places` has directories for Apptainer, by the end of the name of the environment variable that Apptainer reads,
     such as ``TMPDIR``; a variable that the user has set is left as it is.
-
-    Raises:
-        WorkerError: If Apptainer is not installed, or fails.
     """
     program = find_program()
     prefix = Path(program).name.upper()

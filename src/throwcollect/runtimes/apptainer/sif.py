@@ -54,12 +54,6 @@ def make_sif(
 
     Returns:
         Size of the file [B].
-
-    Raises:
-        ConfigError: If an argument names a file of the wrong kind, or there are no sources from which to build.
-        WorkerError: If neither Apptainer nor Singularity is installed, or a step fails.
-        DatasetError: If a file cannot be written or read.
-        MissingExtraError: If an image of an engine is named, and the package that asks the engine is not installed.
     """
     # Saving or building an image takes minutes, so a missing Apptainer is reported before that.
     find_program()
@@ -161,11 +155,7 @@ def _run(new: Path, work: Path, *arguments: str, cwd: Path | None = None) -> Non
 
 @contextmanager
 def _make_work_directory() -> Iterator[Path]:
-    """Make a directory for temporary files, which is removed after the block.
-
-    Raises:
-        ConfigError: If it cannot be made.
-    """
+    """Make a directory for temporary files, which is removed after the block."""
     try:
         directory = tempfile.TemporaryDirectory(prefix="throwcollect-sif-", ignore_cleanup_errors=True)
     except OSError as error:
@@ -177,12 +167,7 @@ def _make_work_directory() -> Iterator[Path]:
 
 @contextmanager
 def _replacing(output: Path) -> Iterator[Path]:
-    """Give a path for a new SIF, which takes the place of the output if the block ends without an error.
-
-    Raises:
-        ConfigError: If the output exists and is no SIF.
-        DatasetError: If the output cannot be written.
-    """
+    """Give a path for a new SIF, which takes the place of the output if the block ends without an error."""
     try:
         if output.is_dir() or (output.exists() and not is_sif(output)):
             raise ConfigError(f"{output}: exists and is no SIF, so it is not replaced", hint="choose another name")

@@ -19,23 +19,13 @@ _MAGIC = b"SIF_MAGIC\0"
 
 
 def is_sif(path: Path) -> bool:
-    """Whether a file is a SIF, judged by its first bytes.
-
-    Raises:
-        OSError: If it cannot be read.
-    """
+    """Whether a file is a SIF, judged by its first bytes."""
     with path.open("rb") as file:
         return file.read(_MAGIC_AT + len(_MAGIC))[_MAGIC_AT:] == _MAGIC
 
 
 def read_labels(sif: Path) -> dict[str, str]:
-    """Read the labels of a SIF; those that were not set are left out.
-
-    Raises:
-        ConfigError: If there is no such file, or it is no SIF.
-        WorkerError: If neither Apptainer nor Singularity is installed, or it cannot read the file.
-        DatasetError: If this user may not read the file.
-    """
+    """Read the labels of a SIF; those that were not set are left out."""
     try:
         if not is_sif(sif):
             raise ConfigError(
@@ -53,11 +43,6 @@ def check_sif(sif: Path) -> None:
     """Make sure that a SIF holds the throwcollect that is installed here, because another may collect other bytes.
 
     A SIF without labels is accepted.
-
-    Raises:
-        ConfigError: If there is no such file, it is no SIF, or holds another version or other sources.
-        WorkerError: If neither Apptainer nor Singularity is installed, or it cannot read the file.
-        DatasetError: If this user may not read the file.
     """
     labels = read_labels(sif)
     hint = f"{command('image', 'sif', '-o', sif)} makes it anew"

@@ -14,11 +14,7 @@ _DEFAULT_HOST = "unix:///var/run/docker.sock"
 
 
 def engine_address() -> str:
-    """Find the address of the engine as the command ``docker`` does: by ``DOCKER_HOST`` or its context.
-
-    Raises:
-        WorkerError: If the context does not exist, or its file is damaged.
-    """
+    """Find the address of the engine as the command ``docker`` does: by ``DOCKER_HOST`` or its context."""
     if address := os.environ.get("DOCKER_HOST"):
         return address
     settings = Path(os.environ.get("DOCKER_CONFIG") or os.path.expanduser("~/.docker"))
@@ -51,11 +47,7 @@ def has_socket() -> bool:
 
 
 def check_socket() -> None:
-    """Raise the error of `docker_engine.connect` if the engine's socket does not exist, without importing the client.
-
-    Raises:
-        WorkerError: If the socket or the context does not exist.
-    """
+    """Raise the error of `docker_engine.connect` if the engine has no socket, without importing the client."""
     engine_address()
     if not has_socket():
         raise no_answer(os.strerror(errno.ENOENT))

@@ -36,11 +36,6 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> str:
 
     Returns:
         Id of the image, which is a SHA-256 of its content.
-
-    Raises:
-        ConfigError: If a mount or a network does not exist or must not be used, or the router's port is taken,
-            or published twice.
-        WorkerError: If the engine does not answer, or does not have the image.
     """
     with engine_errors("the Docker engine cannot be asked"):
         # If a launcher died, its router still occupies the port. This run takes over that router, and its port.
@@ -58,12 +53,7 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> str:
 
 
 def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:
-    """Check the image, the mounts and the networks of a container that the catalogue describes for a component.
-
-    Raises:
-        ConfigError: If a mount or a network does not exist or must not be used.
-        WorkerError: If the engine does not answer, or does not have the image.
-    """
+    """Check the image, the mounts and the networks of a container that the catalogue describes for a component."""
     _check(client, spec.image, {f"components.{component}": spec.section}, mounts="volumes")
 
 

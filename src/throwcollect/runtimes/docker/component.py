@@ -61,12 +61,7 @@ class JoinOptions:
 
 
 def find_join_options(run: str, runtime: str, connection: Connection, spec: ContainerSpec) -> JoinOptions:
-    """Find out how a container can join a run of a runtime; processes of this machine join that run by `connection`.
-
-    Raises:
-        ConfigError: If the container cannot join the run.
-        WorkerError: If the engine does not say where it runs.
-    """
+    """Find out how a container can join a run of a runtime; processes of this machine join that run by `connection`."""
     if connection.middleware.is_fast_dds:
         raise ConfigError(
             f"run {run}: is on Fast DDS, which containers of the catalogue cannot join",
@@ -135,11 +130,7 @@ class ComponentContainer:
         self._container = NodeContainer(self._client, CONTAINER, self._logs.path(CONTAINER), self._clock)
 
     def collect(self, session: Session) -> None:
-        """Run the container until it ends, somebody asks to stop, or the run that it has joined ends; then close.
-
-        Raises:
-            WorkerError: If the container cannot be started or fails, or the engine does not answer any more.
-        """
+        """Run the container until it ends, somebody asks to stop, or the run that it has joined ends; then close."""
         try:
             self._watch = EngineWatch(self._client, self._place, self._clock)
             session.event("started")
@@ -216,11 +207,7 @@ class ComponentContainer:
         return NodeState(CONTAINER, "frozen" if frozen else "running", 0, handle[:12], None)
 
     def _has_ended(self, session: Session) -> bool:
-        """Whether the container has ended well, or the run that it has joined has ended.
-
-        Raises:
-            WorkerError: If the container failed, or could not be started.
-        """
+        """Whether the container has ended well, or the run that it has joined has ended."""
         container = self._container
         if self._clock.given_up:
             raise WorkerError(

@@ -29,11 +29,7 @@ _TIMEOUTS = (Timeout, PoolTimeoutError, TimeoutError)
 
 
 def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
-    """Connect to the engine at `engine_address`; each request waits for `timeout_s` [s] at most.
-
-    Raises:
-        WorkerError: If no engine answers.
-    """
+    """Connect to the engine at `engine_address`; each request waits for `timeout_s` [s] at most."""
     # Not all versions of the client look at the context.
     environment = {**os.environ, "DOCKER_HOST": engine_address()}
     try:
@@ -47,9 +43,6 @@ def find_other_machine() -> str | None:
 
     Containers on another machine have no directories of this one, and processes of this one do not reach them. An
     engine with a socket in the file system is here; one that is reached by TCP or SSH says where it is.
-
-    Raises:
-        WorkerError: If no engine answers.
     """
     if engine_address().startswith("unix:"):
         return None
@@ -95,11 +88,7 @@ def _inside(error: BaseException) -> Iterator[object]:
 
 @contextmanager
 def engine_errors(what: str, *, hint: str | None = None) -> Iterator[None]:
-    """Replace errors of the engine in this block by ours, whose message begins with `what`.
-
-    Raises:
-        WorkerError: In the place of any of `ENGINE_ERRORS`.
-    """
+    """Replace errors of the engine in this block by ours, whose message begins with `what`."""
     try:
         yield
     except ENGINE_ERRORS as error:

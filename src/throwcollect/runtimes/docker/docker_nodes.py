@@ -106,9 +106,6 @@ class DockerNodes(NodeHost):
 
         Returns:
             Names of the nodes whose containers exist already; the next `exits` reports those that have ended.
-
-        Raises:
-            WorkerError: If the engine refuses.
         """
         place = self._place
         hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
@@ -172,12 +169,7 @@ class DockerNodes(NodeHost):
         return self.running()
 
     def info(self) -> Info:
-        """Read the summary of the finished dataset.
-
-        Raises:
-            WorkerError: If the engine does not answer.
-            DatasetError: If the dataset is not finished.
-        """
+        """Read the summary of the finished dataset."""
         return dataset_info(self._client, self._place, self.config) if self._place.in_volume else super().info()
 
     @property
@@ -214,11 +206,7 @@ class DockerNodes(NodeHost):
         return tuple(self._nodes)
 
     def exits(self) -> list[NodeExit]:
-        """The nodes that ended, or could not be started, since the last call.
-
-        Raises:
-            WorkerError: If the engine does not answer any more.
-        """
+        """The nodes that ended, or could not be started, since the last call."""
         if self._clock.given_up:
             raise self._make_silence_error()
         ends = [end for node in self._nodes.values() if (end := self._find_end(node)) is not None]

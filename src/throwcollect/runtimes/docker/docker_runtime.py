@@ -101,11 +101,7 @@ class DockerRuntime(Runtime):
             return []
 
     def is_left(self, run: str) -> bool:
-        """Whether the engine holds containers of a run; false if the engine has ended, as its containers end with it.
-
-        Raises:
-            WorkerError: If the engine does not answer in time.
-        """
+        """Whether the engine holds containers of a run; false if the engine has ended, which ends its containers."""
         from throwcollect.runtimes.docker.docker_engine import connect, timed_out
         from throwcollect.runtimes.docker.held_runs import find_held_runs
 
@@ -127,11 +123,7 @@ class DockerRuntime(Runtime):
 
 
 def _refuse_other_machine() -> None:
-    """Refuse an engine of another machine.
-
-    Raises:
-        WorkerError: If the engine runs on another machine, or does not answer.
-    """
+    """Refuse an engine of another machine."""
     from throwcollect.runtimes.docker.docker_engine import find_other_machine
 
     if (other := find_other_machine()) is not None:
@@ -142,11 +134,7 @@ def _refuse_other_machine() -> None:
 
 
 def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:
-    """Choose the middleware of containers: one that the image has, and over which the launcher can join the nodes.
-
-    Raises:
-        ConfigError: If the configuration asks for rclpy, but the image has none that the launcher can join.
-    """
+    """Choose the middleware of containers: one that the image has, and over which the launcher can join the nodes."""
     if rmw is None:
         problem = f"the image {image} has no rclpy"
     # Every launcher has the embedded client, which speaks this protocol, and only has to reach the router.
@@ -166,9 +154,6 @@ def _handle_outdated_image(client: DockerClient, name: str, config: Config, warn
     """Handle an image that was made from other sources, which may collect other bytes.
 
     It is used only if the user has named it; otherwise a new one is built.
-
-    Raises:
-        WorkerError: If ``run.runtime: auto`` may use processes instead, or the image cannot be built.
     """
     from throwcollect.runtimes.docker.image import build
 

@@ -27,11 +27,7 @@ _AT_ONCE = 8
 
 
 def find_held_runs(client: DockerClient) -> list[HeldRun]:
-    """Find all runs of which an engine holds containers or a network, sorted by id.
-
-    Raises:
-        WorkerError: If the engine does not answer.
-    """
+    """Find all runs of which an engine holds containers or a network, sorted by id."""
     filters = {"label": RUN_LABEL}
     with engine_errors("the Docker engine does not say what it holds"):
         containers = client.api.containers(all=True, filters=filters)
@@ -60,9 +56,6 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
 
     Returns:
         Names of the containers, networks and volumes that were removed.
-
-    Raises:
-        WorkerError: If something could not be removed; everything else is removed first.
     """
     filters = {"label": f"{RUN_LABEL}={run_id}"}
     removed: list[str] = []

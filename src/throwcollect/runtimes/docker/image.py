@@ -65,10 +65,6 @@ def build(
 
     Returns:
         Size of the image [B].
-
-    Raises:
-        ConfigError: If the package does not run from a clone, or the wheelhouse lacks wheels.
-        WorkerError: If the engine does not answer, the base image cannot be pulled, or a step fails.
     """
     root = source_root()
     check_wheelhouse(root, wheelhouse, ros=True)
@@ -93,11 +89,7 @@ def build(
 
 
 def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> None:
-    """Make sure that the engine has an image: the default one is built from a clone, any other is pulled.
-
-    Raises:
-        WorkerError: If the image is missing and cannot be built or pulled.
-    """
+    """Make sure that the engine has an image: the default one is built from a clone, any other is pulled."""
     if is_there(client, tag):
         return
     if tag != default_tag():
@@ -118,20 +110,12 @@ def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Non
 
 
 def is_outdated(client: DockerClient, tag: str) -> bool:
-    """Whether an image of the engine was made from other sources than those of this package's clone.
-
-    Raises:
-        WorkerError: If the engine does not answer.
-    """
+    """Whether an image of the engine was made from other sources than those of this package's clone."""
     return are_others(_read_label(client, tag, SOURCES_LABEL))
 
 
 def rmw_of(client: DockerClient, tag: str) -> str | None:
-    """Middleware of the genuine rclpy in an image of the engine; None if the image has no rclpy.
-
-    Raises:
-        WorkerError: If the engine does not answer.
-    """
+    """Middleware of the genuine rclpy in an image of the engine; None if the image has no rclpy."""
     return _read_label(client, tag, RMW_LABEL)
 
 
@@ -142,11 +126,7 @@ def _read_label(client: DockerClient, tag: str, name: str) -> str | None:
 
 
 def is_there(client: DockerClient, image: str) -> bool:
-    """Whether the engine has an image.
-
-    Raises:
-        WorkerError: If the engine does not answer.
-    """
+    """Whether the engine has an image."""
     with engine_errors(f"the engine does not say whether it has the image {image}"):
         try:
             client.images.get(image)
@@ -162,11 +142,6 @@ def save_image(
 
     The image is pulled if the engine does not have it. None takes the image of these sources, which is built, with
     arguments as for `build`, if the engine has none, or one of other sources.
-
-    Raises:
-        ConfigError: If the image has to be built, but the package does not run from a clone.
-        WorkerError: If no engine answers, or the image cannot be built or pulled.
-        DatasetError: If the archive cannot be written.
     """
     name = image or default_tag()
     with closing(connect()) as client:

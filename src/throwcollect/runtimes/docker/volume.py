@@ -28,11 +28,7 @@ _INFO = TypeAdapter(Info)
 
 
 def place_directory(client: DockerClient, place: RunPlace, config: Config, directory: Path) -> None:
-    """Copy a prepared directory into the run's directory of the volume, where the files belong to this user.
-
-    Raises:
-        WorkerError: If it cannot be copied.
-    """
+    """Copy a prepared directory into the run's directory of the volume, where the files belong to this user."""
     with (
         engine_errors(f"{directory} cannot be copied into the volume {place.source}"),
         tempfile.SpooledTemporaryFile(_IN_MEMORY) as packed,
@@ -50,10 +46,6 @@ def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey
 
     The key is copied as files, so that it appears neither on a command line nor in the engine's description of
     containers.
-
-    Raises:
-        WorkerError: If the engine refuses.
-        ConfigError: If the key cannot be read.
     """
     key.check()
     with engine_errors(f"the key of run {place.run_id} cannot be copied into the volume {place.key_volume}"):
@@ -69,12 +61,7 @@ def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey
 
 
 def dataset_info(client: DockerClient, place: RunPlace, config: Config) -> Info:
-    """Let a container print the summary of the dataset in the volume, and read it.
-
-    Raises:
-        WorkerError: If the engine cannot be asked.
-        DatasetError: If there is no finished dataset.
-    """
+    """Let a container print the summary of the dataset in the volume, and read it."""
     command = ["dataset", "info", place.data, "--json"]
     with (
         engine_errors(f"the dataset in the volume {place.source} cannot be looked at"),

@@ -75,11 +75,7 @@ class EngineWatch:
         return None if container is None else self._states.get(container)
 
     def look(self, container: str) -> None:
-        """Inspect a container.
-
-        Raises:
-            OSError: If the engine does not answer; in general, one of `ENGINE_ERRORS`.
-        """
+        """Inspect a container."""
         with self._looking:
             try:
                 self._states[container] = _state(self._client.api.inspect_container(container), self._network)

@@ -51,10 +51,6 @@ class Belongings(Generic[ABelonging]):
         self._by_name.clear()
 
     def _require_room(self, what: str) -> None:
-        """Refuse one more belonging if the client has too many.
-
-        Raises:
-            ConfigError: If it has the largest number.
-        """
+        """Refuse one more belonging if the client has too many."""
         if len(self._by_name) >= _MOST:
             raise ConfigError(f"{what}: this client has {_MOST} of these already, which is the limit")

@@ -83,11 +83,7 @@ class Bridge:
 
     @property
     def session(self) -> BridgeSession:
-        """The place in the ROS graph; only for the bridge's thread.
-
-        Raises:
-            ThrowcollectError: If there is no router.
-        """
+        """The place in the ROS graph; only for the bridge's thread."""
         if self._session is None:
             raise ThrowcollectError("the router of the run does not answer")
         return self._session

@@ -174,11 +174,7 @@ class BridgeClient(Peer):
             goal.fail(sentence(error))
 
     def _require_writing(self, what: str) -> None:
-        """Refuse a request that changes something if this client may only look.
-
-        Raises:
-            ConfigError: If the client may only look.
-        """
+        """Refuse a request that changes something if this client may only look."""
         if self._read_only:
             raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
 
@@ -191,9 +187,5 @@ class BridgeClient(Peer):
         _logger.info("a client says: %s", request.text_or("msg", ""))
 
     def _authenticate(self, request: BridgeRequest) -> None:
-        """Refuse the operation by which clients of ROS 1 authenticate themselves.
-
-        Raises:
-            ConfigError: Always.
-        """
+        """Refuse the operation by which clients of ROS 1 authenticate themselves."""
         raise ConfigError(f"{request.op}: clients do not authenticate here", expected="the token in the address")

@@ -44,11 +44,7 @@ class BridgeSession:
             ros.shutdown(context=self._context)
 
     def type_of(self, topic: str, wanted: str) -> str:
-        """Full name of the type of a topic, which a client may name in full, as ``pkg/Type``, or not at all.
-
-        Raises:
-            ConfigError: If the topic has another type, or none is named and it has none or several.
-        """
+        """Full name of the type of a topic, which a client may name in full, as ``pkg/Type``, or not at all."""
         # Only the endpoints of this topic are asked for: a list of all topics, made for each of thousands of requests,
         # would keep all clients of the bridge waiting.
         endpoints = self.node.get_publishers_info_by_topic(topic) + self.node.get_subscriptions_info_by_topic(topic)
@@ -77,11 +73,7 @@ class BridgeSession:
         return feed
 
     def service_client(self, service: str, type_name: str) -> Any:
-        """A client of a service, given by its absolute name; all clients of the bridge share it.
-
-        Raises:
-            ConfigError: If there is no such type.
-        """
+        """A client of a service, given by its absolute name; all clients of the bridge share it."""
         key = service, type_name
         if key not in self._clients:
             self._clients[key] = self.node.create_client(find_interface("srv", type_name), service)

@@ -65,11 +65,7 @@ class Goals(Errands[Goal]):
         self._action_clients: dict[tuple[str, str], ros.ActionClient] = {}
 
     def send(self, goal: Goal, request: BridgeRequest) -> None:
-        """Send a goal.
-
-        Raises:
-            ConfigError: If nobody offers the action, or the goal is malformed.
-        """
+        """Send a goal."""
         goal.form = request.form()
         on_feedback = goal.send_feedback if request.flag("feedback") else None
         type_name = request.text("action_type")
@@ -94,11 +90,7 @@ class Goals(Errands[Goal]):
         self.begin(goal, client.server_is_ready, send)
 
     def cancel(self, request: BridgeRequest) -> None:
-        """Ask the action to cancel a goal; the goal's result says whether it did.
-
-        Raises:
-            ConfigError: If there is no such goal.
-        """
+        """Ask the action to cancel a goal; the goal's result says whether it did."""
         goal = next((goal for goal in self._open if goal.id == request.id), None)
         if goal is None or goal.id is None:
             raise ConfigError(f"cancel_action_goal: no goal with the id {request.id} is under way")

@@ -30,11 +30,7 @@ _NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
 
 
 def read_frame(frame: Frame) -> BridgeRequest:
-    """Read a frame of a client, which is JSON, or CBOR in a binary frame.
-
-    Raises:
-        ConfigError: If it is neither, or no operation.
-    """
+    """Read a frame of a client, which is JSON, or CBOR in a binary frame."""
     try:
         # The first byte decides: no CBOR map begins with a byte that can begin a JSON object.
         if isinstance(frame, str) or frame[:1].isspace() or frame[:1] == b"{":

@@ -24,11 +24,7 @@ class Sample:
         self._frames: dict[tuple[str, str], Frame] = {}
 
     def frame(self, topic: str, compression: str) -> Frame:
-        """Encode the message for a client that knows the topic by this name.
-
-        Raises:
-            ValueError: If the bytes are malformed.
-        """
+        """Encode the message for a client that knows the topic by this name."""
         # All clients with the same name and compression get the same frame, which is encoded once.
         key = topic, compression
         if key not in self._frames:

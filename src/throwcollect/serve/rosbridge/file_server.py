@@ -16,11 +16,7 @@ _LARGEST = 64 * 2**20
 
 
 def give_file(call: Call) -> None:
-    """Answer a call with the bytes of a mesh that it names as ``package://NAME/PATH``.
-
-    Raises:
-        ConfigError: If no robot has such a mesh, or the file is too large or cannot be read.
-    """
+    """Answer a call with the bytes of a mesh that it names as ``package://NAME/PATH``."""
     url = call.fields.text("name")
     name, _, rest = url.removeprefix(PACKAGE).partition("/")
     if not url.startswith(PACKAGE):

@@ -25,11 +25,7 @@ def is_guarded(topic: str) -> bool:
 
 
 def open_topic(given: str) -> str:
-    """Absolute name of a topic, given by a client's name for it.
-
-    Raises:
-        ConfigError: If ROS does not allow the name, or clients may not have the topic.
-    """
+    """Absolute name of a topic, given by a client's name for it."""
     topic = absolute_name(given)
     if is_guarded(topic):
         raise ConfigError(f"{topic}: {_GUARDED[topic.rpartition('/')[2]]}")
@@ -37,21 +33,13 @@ def open_topic(given: str) -> str:
 
 
 def refuse_leases(parameter: str) -> None:
-    """Refuse to read or set the parameter by which the coordinator leases trials.
-
-    Raises:
-        ConfigError: If ``parameter`` is its name.
-    """
+    """Refuse to read or set the parameter by which the coordinator leases trials."""
     if parameter == LEASES:
         raise ConfigError(f"{LEASES}: nobody but the coordinator may have this parameter, as its leases are signed")
 
 
 def refuse_secrets(type_name: str, request: Any) -> None:
-    """Refuse a request to a service of this type that would read or set the parameter by which trials are leased.
-
-    Raises:
-        ConfigError: If it would do so.
-    """
+    """Refuse a request to a service of this type that would read or set the parameter by which trials are leased."""
     if type_name not in _PARAMETER_SERVICES:
         return
     for name in [*getattr(request, "names", ()), *(each.name for each in getattr(request, "parameters", ()))]:

@@ -35,11 +35,7 @@ class Inbox:
             self._bytes += len(frame)
 
     def take(self) -> Frame:
-        """Take the oldest frame.
-
-        Raises:
-            IndexError: If there is none.
-        """
+        """Take the oldest frame."""
         with self._lock:
             frame = self._frames.popleft()
             self._bytes -= len(frame)

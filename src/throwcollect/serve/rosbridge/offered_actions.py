@@ -61,22 +61,14 @@ class OfferedAction:
         self._goals.clear()
 
     def publish_feedback(self, request: BridgeRequest) -> None:
-        """Publish feedback of the client on a goal.
-
-        Raises:
-            ConfigError: If there is no such goal, or the feedback is not of the type.
-        """
+        """Publish feedback of the client on a goal."""
         handle, _ = self._goals[self._find(request)]
         feedback = self._type.Feedback()
         fill(feedback, request.any("values"))
         handle.publish_feedback(feedback)
 
     def end(self, request: BridgeRequest) -> None:
-        """End a goal with the client's result.
-
-        Raises:
-            ConfigError: If there is no such goal, or the result is not of the type.
-        """
+        """End a goal with the client's result."""
         number = self._find(request)
         has_succeeded = request.flag("result", default=True)
         values, result = request.any("values"), self._type.Result()
@@ -86,11 +78,7 @@ class OfferedAction:
         self._finish(number, result, status)
 
     def take_status(self, request: BridgeRequest) -> None:
-        """Take note of the state of a goal; if it has ended, finish it with an empty result, as the client sends none.
-
-        Raises:
-            ConfigError: If there is no such goal.
-        """
+        """Note the state of a goal; if it has ended, finish it with an empty result, as the client sends none."""
         number, status = self._find(request), request.natural_or("status", 0)
         if status in (GoalStatus.SUCCEEDED, GoalStatus.CANCELED, GoalStatus.ABORTED):
             self._finish(number, self._type.Result(), status)

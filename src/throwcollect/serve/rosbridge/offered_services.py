@@ -51,11 +51,7 @@ class OfferedService:
         self._pending.clear()
 
     def respond(self, request: BridgeRequest) -> None:
-        """Answer one request of a node as the client says.
-
-        Raises:
-            ConfigError: If no such request waits, or the answer is not of the type.
-        """
+        """Answer one request of a node as the client says."""
         if not isinstance(request.id, str) or request.id not in self._pending:
             raise ConfigError(f"service_response: no request {request.id} to {self._name} waits for an answer")
         future, response = self._pending[request.id]

@@ -35,12 +35,7 @@ class Offers(Belongings[ABelonging]):
         self._probe = probe
 
     def advertise(self, request: BridgeRequest) -> None:
-        """Offer a service or an action; it replaces an earlier offer of this client with the same name.
-
-        Raises:
-            ConfigError: If there is no such type, ROS does not allow the name, or a node or another client offers it
-                already.
-        """
+        """Offer a service or an action; it replaces an earlier offer of this client with the same name."""
         given = request.text(self._kind)
         name = absolute_name(given)
         # The new offer is made before the old one is withdrawn, so that a malformed request changes nothing.
@@ -56,11 +51,7 @@ class Offers(Belongings[ABelonging]):
         self._client.host.offered.add(name + self._probe)
 
     def unadvertise(self, request: BridgeRequest) -> None:
-        """Withdraw something.
-
-        Raises:
-            ConfigError: If the client does not offer it.
-        """
+        """Withdraw something."""
         self._find(request)
         self._withdraw(absolute_name(request.text(self._kind)))
 

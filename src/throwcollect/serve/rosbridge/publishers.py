@@ -61,19 +61,11 @@ class Publishers(Belongings[Advertised]):
     """All topics that a client publishes."""
 
     def advertise(self, request: BridgeRequest) -> None:
-        """Announce a topic.
-
-        Raises:
-            ConfigError: If the topic has another type, or clients may not publish it.
-        """
+        """Announce a topic."""
         self._advertise(open_topic(request.text("topic")), request, request.text("type"))
 
     def unadvertise(self, request: BridgeRequest) -> None:
-        """Withdraw a topic.
-
-        Raises:
-            ConfigError: If ROS does not allow the name.
-        """
+        """Withdraw a topic."""
         topic = open_topic(request.text("topic"))
         advertised = self._by_name.pop(topic, None)
         if advertised is None:
@@ -82,11 +74,7 @@ class Publishers(Belongings[Advertised]):
             advertised.close()
 
     def publish(self, request: BridgeRequest) -> None:
-        """Publish a message; a topic that the client has not announced, but others have, is announced first.
-
-        Raises:
-            ConfigError: If nobody has announced the topic, clients may not publish it, or the message is malformed.
-        """
+        """Publish a message; a topic that the client has not announced, but others have, is announced first."""
         topic = open_topic(request.text("topic"))
         advertised = self._by_name.get(topic) or self._advertise(topic, request, request.text_or("type", ""))
         message = ros.get_message(advertised.type_name)()

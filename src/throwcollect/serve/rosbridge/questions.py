@@ -38,9 +38,6 @@ class Questions(Errands[Errand]):
             answered: Called with the response.
             failed: Called with a sentence if there will be none.
             timeout_s: Time after which the call fails [s].
-
-        Raises:
-            ConfigError: If there is no such type, or too many questions wait for an answer already.
         """
         if len(self._open) >= _MOST:
             raise ConfigError(f"{service}: {_MOST} requests wait for an answer already")

@@ -33,10 +33,6 @@ class Reassembly:
 
         Returns:
             The frame, if this was its last part.
-
-        Raises:
-            ConfigError: If the request is no part of a frame, or all waiting parts together are too long; then the
-                frame is dropped.
         """
         number, total = request.natural_or("num", _MOST_PARTS), request.natural_or("total", 0)
         data = request.any("data")

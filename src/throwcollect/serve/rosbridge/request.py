@@ -40,30 +40,18 @@ class Fields:
         self._what = what
 
     def text(self, name: str) -> str:
-        """A text that has to be there.
-
-        Raises:
-            ConfigError: If it is missing, is no text, or is too long.
-        """
+        """A text that has to be there."""
         value = self._fields.get(name)
         if not isinstance(value, str) or len(value) > _LONGEST:
             raise self._wrong(name, "a text", value)
         return value
 
     def text_or(self, name: str, default: str) -> str:
-        """A text that may be left out.
-
-        Raises:
-            ConfigError: If it is no text.
-        """
+        """A text that may be left out."""
         return default if self._fields.get(name) is None else self.text(name)
 
     def natural_or(self, name: str, default: int) -> int:
-        """A number from 0 on, which may be left out.
-
-        Raises:
-            ConfigError: If it is none.
-        """
+        """A number from 0 on, which may be left out."""
         value = self._fields.get(name)
         if value is None:
             return default
@@ -73,11 +61,7 @@ class Fields:
         return int(value)
 
     def seconds_or(self, name: str, default: float) -> float:
-        """A time [s] above 0, which may be left out.
-
-        Raises:
-            ConfigError: If it is none.
-        """
+        """A time [s] above 0, which may be left out."""
         value = self._fields.get(name)
         if value is None:
             return default
@@ -86,11 +70,7 @@ class Fields:
         return float(value)
 
     def flag(self, name: str, *, default: bool = False) -> bool:
-        """A truth value, which may be left out.
-
-        Raises:
-            ConfigError: If it is none.
-        """
+        """A truth value, which may be left out."""
         value = self._fields.get(name)
         if value is None:
             return default
@@ -126,11 +106,7 @@ class BridgeRequest(Fields):
         self.id: RequestId = given if isinstance(given, str | int) else None
 
     def form(self) -> Form:
-        """How the client wants answers and messages to be sent.
-
-        Raises:
-            ConfigError: If there is no such compression, or the fields are of the wrong type.
-        """
+        """How the client wants answers and messages to be sent."""
         compression = self.text_or("compression", "none")
         if compression not in COMPRESSIONS:
             raise ConfigError(f"{self.op}: no compression {compression}", expected="none, cbor or cbor-raw")

@@ -15,20 +15,12 @@ Definition = Mapping[str, object]
 
 
 def describe_message(name: str) -> list[Definition]:
-    """Describe a message, named in full or as ``pkg/Type``.
-
-    Raises:
-        ConfigError: If there is no such message.
-    """
+    """Describe a message, named in full or as ``pkg/Type``."""
     return _describe(full_name("msg", name), find_interface("msg", name), [])
 
 
 def describe_service(name: str, part: Literal["Request", "Response"]) -> list[Definition]:
-    """Describe the request or the response of a service, named in full or as ``pkg/Type``.
-
-    Raises:
-        ConfigError: If there is no such service.
-    """
+    """Describe the request or the response of a service, named in full or as ``pkg/Type``."""
     service = find_interface("srv", name)
     return _describe(f"{full_name('srv', name)}_{part}", getattr(service, part), [])
 

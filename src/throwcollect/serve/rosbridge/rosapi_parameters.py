@@ -34,11 +34,7 @@ class Parameters:
         self._questions = questions
 
     def get(self, call: Call) -> None:
-        """Answer with the value of a parameter, or the default that the client gives, in JSON or as a text.
-
-        Raises:
-            ConfigError: If it is no name of a parameter, or clients may not read it.
-        """
+        """Answer with the value of a parameter, or the default that the client gives, in JSON or as a text."""
         default = call.fields.text_or("default_value", "")
 
         def answer(value: Any) -> None:
@@ -52,19 +48,11 @@ class Parameters:
         self._get(call, answer)
 
     def has(self, call: Call) -> None:
-        """Answer whether there is a parameter.
-
-        Raises:
-            ConfigError: If it is no name of a parameter, or clients may not read it.
-        """
+        """Answer whether there is a parameter."""
         self._get(call, lambda value: call.reply({"exists": value.type != _NOT_SET}))
 
     def set(self, call: Call) -> None:
-        """Set a parameter.
-
-        Raises:
-            ConfigError: If it is no name of a parameter, clients may not set it, or the value is no JSON.
-        """
+        """Set a parameter."""
         node, name = _read_name(call)
         try:
             wanted = orjson.loads(call.fields.text("value"))
@@ -152,11 +140,7 @@ class Parameters:
 
 
 def _read_name(call: Call) -> tuple[str, str]:
-    """Node and name of a parameter.
-
-    Raises:
-        ConfigError: If it is no name of a parameter, or clients may not have it.
-    """
+    """Node and name of a parameter."""
     given = call.fields.text("name")
     node, separator, name = given.partition(":")
     if not (separator and name):

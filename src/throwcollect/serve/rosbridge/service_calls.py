@@ -53,11 +53,7 @@ class Call:
 
 
 def call_node(client: Peer, questions: Questions, call: Call, request: BridgeRequest) -> None:
-    """Call a service of a node, and answer the client when the node has answered.
-
-    Raises:
-        ConfigError: If there is no such service, or it cannot be called like this.
-    """
+    """Call a service of a node, and answer the client when the node has answered."""
     service = absolute_name(call.given)
     types = dict(client.host.session.node.get_service_names_and_types()).get(service, [])
     if not types:
@@ -75,11 +71,7 @@ def call_node(client: Peer, questions: Questions, call: Call, request: BridgeReq
 
 
 def _fill_arguments(message: Any, arguments: object) -> None:
-    """Set the fields of a request from a mapping, or from a list in their order.
-
-    Raises:
-        ConfigError: If they cannot have these values.
-    """
+    """Set the fields of a request from a mapping, or from a list in their order."""
     if isinstance(arguments, list):
         names = list(message.get_fields_and_field_types())
         if len(arguments) > len(names):

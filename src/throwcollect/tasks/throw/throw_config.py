@@ -75,11 +75,7 @@ class ThrowConfig(TaskConfig):
 
 
 def throw_section(task: TaskConfig) -> ThrowConfig:
-    """Return the section of a task, which has to be a throw.
-
-    Raises:
-        ConfigError: If the section belongs to another task.
-    """
+    """Return the section of a task, which has to be a throw."""
     if not isinstance(task, ThrowConfig):
         raise ConfigError([Problem(f"should be 'throw', got {task.name!r}", key="task.name")])
     return task

@@ -78,11 +78,7 @@ class Spoon(Tool):
         return total
 
     def ball_seat(self, radius: float) -> tuple[float, float, float]:
-        """Find the centre [m] of a ball that rests in the upright cup, in ``spoon_link``.
-
-        Raises:
-            ConfigError: If the ball falls through the floor of the cup.
-        """
+        """Find the centre [m] of a ball that rests in the upright cup, in ``spoon_link``."""
         config = self._config
         floor, rim, depth = config.cup_floor_radius_m, config.cup_rim_radius_m, config.cup_depth_m
         if radius <= floor:
