@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from pathlib import Path
 
-import pytest
 import uvicorn
 from starlette.responses import PlainTextResponse
-from tests.unit.serve.conftest import Served
 
-from throwcollect.errors import ConfigError
 from throwcollect.serve import server_process
-from throwcollect.serve.models import Models
-from throwcollect.serve.server_process import serve
-
-
-@pytest.mark.parametrize("host", ["é..b", "no host", "192.0.2.1"])
-def test_serving_at_an_unusable_host_is_an_error(served: Served, host: str) -> None:
-    with pytest.raises(ConfigError, match=f"--host {host} --port 0: cannot listen there: "):
-        serve(served.instances, Models(Path()), host=host, port=0, tell=lambda *_: None)
 
 
 async def is_closed(reader: asyncio.StreamReader, within_s: float) -> bool:
@@ -69,21 +57,5 @@ def test_a_connection_whose_headers_do_not_get_whole_is_closed() -> None:
             await asyncio.wait_for(whole.read(), 3)
             sending.close()
             asking.close()
-
-    asyncio.run(try_it())
-
-
-def test_of_too_many_connections_that_wait_the_oldest_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server_process, "_MOST_WAITING", 2)
-
-    async def try_it() -> None:
-        async with await serve_connections() as served:
-            opened = await open_connections(served, 3)
-            assert [await is_closed(reader, 0.1) for reader, _ in opened] == [True, False, False]
-            reader, writer = opened[-1]
-            writer.write(b"\r\n")
-            assert (await reader.readline()).startswith(b"HTTP/1.1 200")
-            for _, each in opened:
-                each.close()
 
     asyncio.run(try_it())
