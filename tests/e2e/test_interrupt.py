@@ -77,7 +77,7 @@ def in_the_middle(running: Running, share: float = 0.3, *, whole: Path) -> None:
 
 
 def assert_gone(nodes: list[psutil.Process]) -> None:
-    _, alive = psutil.wait_procs(nodes, timeout=10)
+    _, alive = psutil.wait_procs(nodes, timeout=60)
     assert alive == []
 
 

@@ -45,7 +45,7 @@ def test_a_simulation_says_why_it_ends(way: str, running: tuple[Command, Robot])
     else:
         robot.put_into(QUITTING)
     robot.wait_until(lambda: bool(find_logged(heard, "ends: ")), "a last word")
-    output, _ = process.communicate(timeout=10)
+    output, _ = process.communicate(timeout=60)
     robot.wait_until(lambda: robot.node.count_publishers(robot.topic("episode")) == 0)
     (line,) = find_logged(heard, "ends: ")
     assert way in line.msg

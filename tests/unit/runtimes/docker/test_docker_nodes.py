@@ -70,7 +70,7 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
 def until(condition: Callable[[], Any], *, runtime: DockerNodes | None = None) -> list[NodeExit]:
     """Wait for a condition, and meanwhile ask for ended nodes as a supervisor does."""
     exits: list[NodeExit] = []
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < deadline, "did not happen"
         exits += runtime.exits() if runtime else []
