@@ -1,4 +1,3 @@
-import json
 import os
 import stat
 import subprocess
@@ -189,35 +188,21 @@ def test_runs_are_remembered_for_a_week_after_their_end(
     assert (name in records.ids()) == remembered
 
 
-def truncate(text: str) -> str:
-    return text[: len(text) // 2]
-
-
-def without(key: str) -> Callable[[str], str]:
-    return lambda text: json.dumps({name: value for name, value in json.loads(text).items() if name != key})
-
-
 @pytest.mark.parametrize(
-    ("damage", "message"),
+    "damage",
     [
-        (truncate, "the record of the run is damaged"),
-        (lambda _: "[]", "the record of the run is damaged"),
-        (lambda _: "", "the record of the run is damaged"),
-        (without("launcher"), "the record of the run is damaged"),
-        (
-            lambda text: text.replace('"version":1', '"version":2').replace('"version": 1', '"version": 2'),
-            "another ver",
-        ),
+        lambda text: text[: len(text) // 2],
+        lambda _: "",
+        lambda text: text.replace('"launcher"', '"starter"'),
+        lambda text: text.replace('"version": 1', '"version": 2'),
     ],
 )
-def test_a_damaged_record_is_an_error_but_other_runs_can_be_listed(
-    damage: Callable[[str], str], message: str, state: Path
-) -> None:
+def test_a_damaged_record_is_an_error_but_other_runs_can_be_listed(damage: Callable[[str], str], state: Path) -> None:
     records = Records()
     name, whole = remember(records), remember(records)
     path = state / "runs" / f"{name}.json"
     path.write_text(damage(path.read_text()))
-    with pytest.raises(ConfigError, match=message) as caught:
+    with pytest.raises(ConfigError, match="the record is damaged, or of another version") as caught:
         records.get(name)
     assert caught.value.hint == f"throwcollect down --run {name} ends what is left of it, and forgets it"
     assert [each.record.run for each in records.all()] == [whole]
