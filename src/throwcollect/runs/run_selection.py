@@ -35,7 +35,7 @@ def find_run_to_change(records: Records, named: str | None, *, command: str, die
             f"no run of this directory lives; {other.id} was begun in {other.record.begun_in}",
             hint=f"throwcollect {command} --run {other.id}, if that one is meant",
         )
-    return _require_only_run(here or candidates, runs)
+    return _require_only_run(here or candidates)
 
 
 def find(named: StrPath) -> Run:
@@ -56,21 +56,19 @@ def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str
     here = [run for run in runs if _belongs_here(run.record)]
     known = here or runs
     living = [run for run in known if run.status == "running"]
-    run = known[-1] if known and not living else _require_only_run(living, runs)
+    run = known[-1] if known and not living else _require_only_run(living)
     if not here:
         say(f"run {run.id}, which was begun in {run.record.begun_in}")
     return run
 
 
-def _require_only_run(living: Sequence[Run], runs: Sequence[Run]) -> Run:
+def _require_only_run(living: Sequence[Run]) -> Run:
     if len(living) == 1:
         return living[0]
     if living:
         names = ", ".join(run.id for run in living)
         raise ConfigError(f"{len(living)} runs live", expected=names, hint="name one of them with --run")
-    raise ConfigError(
-        "no run lives", hint="throwcollect up -d starts one; throwcollect ps -a lists those that are over"
-    )
+    raise ConfigError("no run lives", hint="throwcollect up -d starts one; throwcollect ps -a lists earlier ones")
 
 
 def _belongs_here(record: RunRecord) -> bool:

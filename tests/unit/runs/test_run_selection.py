@@ -139,7 +139,7 @@ def test_without_an_id_the_only_living_run_is_changed(records: Records, make: Ma
     only = make("c", "lives")
     assert find(records, None).record == only
     make("d", "lives")
-    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: d-0123, c-0123\n  try: name one of them"):
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: c-0123, d-0123\n  try: name one of them"):
         find(records, None)
 
 
