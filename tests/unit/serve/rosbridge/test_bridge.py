@@ -15,7 +15,7 @@ from throwcollect.ros import Context, Node, SingleThreadedExecutor, get_message,
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.serve.rosbridge import Bridge, inbox
+from throwcollect.serve.rosbridge import Bridge, bridge_client
 
 String: Any = get_message("std_msgs/msg/String")
 
@@ -102,7 +102,7 @@ def test_topics_services_and_actions_of_a_client_survive_a_router_restart(router
 def test_requests_beyond_a_limit_are_dropped_without_a_router_and_the_client_is_told_once(
     routers: Routers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inbox, "_MOST_FRAMES", 3)
+    monkeypatch.setattr(bridge_client, "_MOST_FRAMES", 3)
     bridge = Bridge(None)
     party = Party(bridge)
     for number in range(6):

@@ -17,7 +17,7 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
-from throwcollect.serve.rosbridge import Bridge, belongings, subscriptions
+from throwcollect.serve.rosbridge import Bridge, subscriptions
 from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
@@ -253,21 +253,3 @@ def test_a_leaving_client_withdraws_its_topics_services_and_actions(bridge: Brid
     wait_for(lambda: all(there()))
     party.client.close()
     wait_for(lambda: not any(there()))
-
-
-def test_a_client_has_a_limited_number_of_topics_services_and_actions(
-    party: Party, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(belongings, "_MOST", 2)
-    kinds = {
-        "subscribe": ("topic", "std_msgs/String"),
-        "advertise": ("topic", "std_msgs/String"),
-        "advertise_service": ("service", "std_srvs/SetBool"),
-        "advertise_action": ("action", "control_msgs/FollowJointTrajectory"),
-    }
-    for op, (word, kind) in kinds.items():
-        for name in ("/many_1", "/many_2", "/many_3", "/many_2"):
-            party.ask(op=op, id=f"{op} {name}", type=kind, **{word: name})
-        assert party.next(op="status")["msg"].startswith(f"{op}: /many_3: this client has 2 of these already")
-    party.call("rosapi/get_time")
-    assert len([each for each in party.got() if each["op"] == "status"]) == len(kinds)
