@@ -45,7 +45,6 @@ def test_plan_with_json_still_warns_of_a_robot_below_the_ground(tmp_path: Path) 
     [
         ("verify {data}", "1 of 2 recordings checked"),
         ("stats {data}", "1 of 4 episodes read"),
-        ("rebuild {data}", "1 of 2 recordings looked through"),
         ("filter {data} {new} --where trial<3", "2 of 3 trials written"),
         ("merge {data} {new}", "3 of 4 trials written"),
         ("export {data} {new} --to npz", "3 of 4 trials exported"),
