@@ -28,7 +28,7 @@ from throwcollect.dataset.throws_table import name_alias, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
 from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there
 from throwcollect.robots.description import robot_of
@@ -75,20 +75,16 @@ class Dataset(Sequence[Throw]):
             ConfigError: If its ``config.yaml`` is wrong.
         """
         path = read_path("directory", directory)
-        # Metadata and table follow from the recordings, and the plan follows from the table or the configuration.
-        rebuild, repair = command("dataset", "rebuild", path), command("dataset", "repair", path, "OUTPUT")
-        remedies: Mapping[Path | None, str] = {path / METADATA: rebuild, path / PLAN: repair, path / THROWS: rebuild}
         try:
             bag = read_bag_metadata(path)
             plan = Plan.read(path / PLAN, read_config(path))
             if not is_there(path / THROWS):
                 raise DatasetError("is missing", path=path / THROWS)
             return cls(path, plan, read_throws(path, plan), bag)
-        except ForeignPlanError:
-            # The configuration may be what is wrong, so the plan should not be made again from it.
-            raise
         except DatasetError as error:
-            error.hint = error.hint or remedies.get(error.path)
+            # All of these follow from the configuration and the recordings.
+            if error.path in (path / METADATA, path / PLAN, path / THROWS):
+                error.hint = error.hint or command("resume", path)
             raise
 
     def __len__(self) -> int:

@@ -62,5 +62,6 @@ def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
         final = directory / name
         # The unfinished file comes first: when it vanishes in this moment, the final one is there.
         episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)
-        for found in episodes.values():
+        # An episode whose records are damaged can be saved, and not read in place.
+        for found in (each for each in episodes.values() if each.run is not None):
             yield table.row(plan.trial(found.trial), found.result, found.place)

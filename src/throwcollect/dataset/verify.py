@@ -23,11 +23,8 @@ from throwcollect.dataset.bag import (
 from throwcollect.dataset.data_card import HEADER, read_card
 from throwcollect.dataset.directory import (
     CARD,
-    CONFIG,
     FORMAT,
-    MANIFEST,
     METADATA,
-    PLAN,
     PROVENANCE,
     SHARD_SUFFIX,
     THROWS,
@@ -35,12 +32,9 @@ from throwcollect.dataset.directory import (
     shard_of,
 )
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.manifest import find_changed_files, find_manifest_problems, read_manifest
-from throwcollect.dataset.mcap_file import MAGIC
-from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.manifest import find_manifest_problems
 from throwcollect.dataset.provenance import load_provenance
 from throwcollect.dataset.summary_files import combine_digests
-from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardReport, check_shard
@@ -51,8 +45,6 @@ from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import is_digest
-from throwcollect.sweep.plan import Plan
-from throwcollect.wording import command
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
@@ -120,28 +112,6 @@ def find_unchecked(config: Config) -> tuple[str, ...]:
     if not robot_is_available(config):
         left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")
     return left_out
-
-
-def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Finding]:
-    """Find the files of a finished dataset that are not as they were written.
-
-    Files are compared with the manifest. Earlier versions wrote none: then the recordings that the table of throws
-    names have to begin and end as MCAP files do, or, in full, the dataset is verified.
-
-    Args:
-        directory: Its directory.
-        plan: Its trials; None if they cannot be read.
-        in_full: Whether all bytes are compared, and not only the sizes.
-    """
-    if not is_there(directory / MANIFEST):
-        if plan is None:
-            return [Finding(PLAN, "", "is missing or damaged")]
-        return list(_find_damage_without_manifest(directory, plan, in_full=in_full))
-    try:
-        entries = read_manifest(directory)
-    except DatasetError as error:
-        return [Finding.of(MANIFEST, error)]
-    return list(find_changed_files(directory, entries, in_full=in_full))
 
 
 def _find_plan_problems(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
@@ -291,28 +261,6 @@ def _find_problems_beside(directory: Path) -> Iterator[Finding]:
         return
     try:
         if not read_card(directory / CARD).startswith(HEADER):
-            rebuild = command("dataset", "rebuild", directory)
-            yield Finding(CARD, "", f"has no YAML header, which dataset hubs read; {rebuild} writes a missing file")
+            yield Finding(CARD, "", "has no YAML header, which dataset hubs read")
     except DatasetError as error:
         yield Finding.of(CARD, error)
-
-
-def _find_damage_without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:
-    try:
-        shards = set(read_throws_table(directory / THROWS, plan)["shard"].drop_null().to_pylist())
-    except DatasetError as error:
-        yield Finding.of(THROWS, error)
-        return
-    if in_full:
-        # The manifest and the data card follow from these, and a dataset without them counts as whole.
-        promised = {CONFIG, PLAN, THROWS, METADATA, *shards}
-        yield from (finding for finding in verify(directory) if finding.file in promised)
-        return
-    for name in sorted(shards):
-        try:
-            with open_mcap(directory / Path(name).name) as contents:
-                # An MCAP file begins and ends with the same bytes, and the end is written last.
-                if contents.slice(len(contents) - len(MAGIC), len(contents)) != MAGIC:
-                    yield Finding(name, "", "is cut off")
-        except DatasetError as error:
-            yield Finding.of(name, error)
