@@ -23,7 +23,6 @@ from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, unknown_name
-from throwcollect.dataset.selected_throws import select_throws
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
@@ -285,9 +284,13 @@ class Dataset(Sequence[Throw]):
                 for each throw; or numbers of trials, in the order in which they are wanted.
 
         Raises:
-            ConfigError: If it is none of these.
+            ConfigError: If the condition cannot be evaluated.
+            ValueError: If Arrow takes it for none of these, such as a mask that is too short.
             DatasetError: If a trial is not among the throws.
         """
+        # Arrow's functions take long to import, and most programs that open a dataset select nothing.
+        from throwcollect.dataset.selection import select_throws
+
         return replace(self, throws=select_throws(self.throws, which, self.directory))
 
     def trajectories(

@@ -208,10 +208,6 @@ def test_merge_refuses_a_single_path_and_an_empty_list(collected: Path, tmp_path
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (
-            lambda *paths: filter_trials(*paths, where=lambda row: row),
-            "where: got <function .*\n  expected: a text, such as: ",
-        ),
         (lambda *paths: sample(*paths, count="2"), "count: should be from 1 to 7, .*, got '2'"),
         (lambda *paths: sample(*paths, count=2, seed=-1), "seed: got -1\n  expected: 0 or more"),
     ],
