@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,20 +18,22 @@ from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
 from throwcollect.config.values import column_of
-from throwcollect.dataset.bag import read_bag_metadata
+from throwcollect.dataset.bag import find_next_command, read_bag_metadata
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS
+from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS, list_shards, path_of_part
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, unknown_name
+from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there
+from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.arrow_column import find_range, find_trial
 from throwcollect.sweep.plan import Plan
@@ -42,6 +45,10 @@ if TYPE_CHECKING:
 pd = lazily("pandas")
 
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
+
+
+class UnfinishedDatasetWarning(UserWarning):
+    """A dataset was opened whose collection has not come to its end."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -250,7 +257,7 @@ class Dataset(Sequence[Throw]):
         position = find_trial(self.throws["trial"], trial)
         if position < 0:
             raise DatasetError(f"no trial {trial}", path=self.directory, expected=f"0 to {len(self.plan.trials) - 1}")
-        return self[position].episode.read()
+        return self[position].read_episode()
 
     def robot_description(self) -> str | None:
         """Read the URDF text of the robot from the first recording; None if there is no recording.
@@ -340,6 +347,49 @@ class Dataset(Sequence[Throw]):
             None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)
             for trial, shard, offset, samples in rows
         ]
+
+
+def load(directory: StrPath) -> Dataset:
+    """Open a dataset for reading.
+
+    Its tables are read and checked against each other; recordings are opened when they are looked at. If the dataset is
+    not finished, its recordings are read through, and its rows are the trials that have ended so far: row i need not be
+    trial i, and `Dataset.digest` raises an error.
+
+    Raises:
+        DatasetError: If the directory holds no dataset, or its tables or plan are damaged.
+        ConfigError: If its ``config.yaml`` is wrong.
+
+    Warns:
+        UnfinishedDatasetWarning: If it is not finished.
+    """
+    path = read_path("directory", directory)
+    # If the directory is no dataset at all, `open` says what is wrong.
+    if is_there(path / METADATA) or not is_there(path / PLAN):
+        return Dataset.open(path)
+    plan = Plan.read(path / PLAN, read_config(path))
+    rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
+    found = find_next_command(path)
+    warnings.warn(
+        f"{path} {found.state}: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
+        f"`{found.command}` {found.purpose}",
+        UnfinishedDatasetWarning,
+        stacklevel=2,
+    )
+    return Dataset(path, plan, ThrowsTable.of(plan).table(rows), {})
+
+
+def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
+    """Make the rows of the refused trials, and of those whose episodes are on disk as `resume` would keep them."""
+    table = ThrowsTable.of(plan)
+    yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
+    names = list_shards(plan)
+    for name in log_progress(names, len(names), "recording", "looked through"):
+        final = directory / name
+        # The unfinished file comes first: when it vanishes in this moment, the final one is there.
+        episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)
+        for found in episodes.values():
+            yield table.row(plan.trial(found.trial), found.result, found.place)
 
 
 def _find_custom(bag: Mapping[str, Any], name: str) -> object:
