@@ -338,7 +338,7 @@ def talos(tmp_path, monkeypatch):
         ),
         ("urdf", "gripper_right_base_link", "hand", "link gripper_right_base_link is missing"),
         ("urdf", 'parent link="base_link"', "parent", "joint torso_1_joint: there is no link ''"),
-        ("urdf", "talos_data/meshes/torso/base_link", "x", "link base_link: .*x_collision.STL: no such file"),
+        ("urdf", "talos_data/meshes/torso/base_link", "x", "link base_link: .*x_collision.STL: .*No such file"),
         ("srdf", "</robot>", "", "cannot be read as robot description"),
         ("srdf", 'name="half_sitting"', 'name="sitting"', "no group_state half_sitting"),
         ("srdf", 'value="-0.0002"', 'value="?"', "group_state half_sitting is not readable: .*'\\?'"),
