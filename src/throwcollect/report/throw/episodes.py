@@ -112,8 +112,9 @@ def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> t
     by_distance = landed.trial[np.argsort(landed.distance_m, kind="stable")].tolist()
     usable = [trial for trial in by_distance if trial in recorded]
     picks = np.linspace(0, len(usable) - 1, min(len(usable), _MOST_LANDED)).round().astype(int)
+    numbers = dataset["trial"]
     others = (
-        next((trial for trial in np.flatnonzero(outcomes.are(name)).tolist() if trial in recorded), None)
+        next((trial for trial in numbers[outcomes.are(name)].tolist() if trial in recorded), None)
         for name in outcomes.names
         if name != LANDED
     )
@@ -122,12 +123,12 @@ def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> t
 
 def read_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
     """Read paths of the ball."""
-    outcomes = dataset.throws["outcome"]
+    outcomes = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["outcome"].to_pylist(), strict=True))
     for trial in trials:
         header, samples = read_samples(dataset, trial)
         release_ns = _find_release(header, dataset.config)
         release = None if release_ns is None else int(np.searchsorted(samples.stamps_ns, release_ns))
-        yield BallPath(trial, outcomes[trial].as_py(), samples.ball_position, release)
+        yield BallPath(trial, outcomes[trial], samples.ball_position, release)
 
 
 def read_motion(dataset: Dataset, trial: int) -> JointMotion:

@@ -36,7 +36,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     throws, swept = dataset.throws, LANDING_HEIGHT in dataset.plan.keys
     height_m = None if swept else dataset.config.scene.landing_height_m
     landings = read_landings(throws, outcomes)
-    planned = landings[outcomes.are(LANDED)[landings.trial]]
+    planned = landings[outcomes.are(LANDED)[landings.row]]
     coverage = count_throws(planned, throws, target=dataset.config.sweep.target)
     examples = choose_examples(dataset, planned, outcomes)
     paths = tuple(read_paths(dataset, examples))
