@@ -47,7 +47,7 @@ def replay_dataset(
     if plot is not None and engine is None:
         raise ConfigError("--plot: should be given with --engine")
     dataset = Dataset.open(directory)
-    known = dataset["trial"]
+    known = dataset.throws["trial"].to_pylist()
     for trial in trials or ():
         if trial not in known:
             raise ConfigError(f"{directory}: no trial {trial}", expected=f"trials from {known[0]} to {known[-1]}")
