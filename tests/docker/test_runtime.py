@@ -34,16 +34,14 @@ from tests.e2e.collection import collect_here
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.container_options import KEY_LABEL
 from throwcollect.runtimes.docker.docker_engine import connect
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.docker.held_runs import find_held_runs, remove
 from throwcollect.runtimes.node_collection import roster
-from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeRole, NodeSpec
+from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeRole, NodeSpec
 from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.supervisor import Supervisor
-from throwcollect.version import __version__
 
 pytestmark = pytest.mark.docker
 
@@ -69,12 +67,6 @@ def until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
     while not condition():
         assert time.monotonic() < deadline, "did not happen"
         time.sleep(0.02)
-
-
-def wait_for_end(runtime: DockerNodes) -> NodeExit:
-    found: list[NodeExit] = []
-    until(lambda: bool(found.extend(runtime.exits()) or found))
-    return found[0]
 
 
 def container(client: DockerClient, collection: Collection, node: str) -> Container:
@@ -258,38 +250,6 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
         remove(client, run, volumes=True)
 
 
-def test_a_node_that_the_engine_cannot_start_or_kills_ends_with_the_reason(bare: Any) -> None:
-    runtime = bare("containers.sim.options.runtime=nowhere", "containers.coordinator.memory=16m")
-    runtime.start(NodeSpec("sim_0", ("--version",), NodeRole.EXPENDABLE))
-    end = wait_for_end(runtime)
-    assert (end.name, end.code) == ("sim_0", None)
-    assert "cannot be started" in end.reason
-    assert "nowhere" in end.reason
-    assert (runtime.running(), runtime.handle("sim_0")) == ((), None)
-    runtime.start(NodeSpec(COORDINATOR, ("config", "/data/small.yaml"), NodeRole.EXPENDABLE))
-    assert wait_for_end(runtime).reason == "ran out of memory (limit 16m)"
-
-
-def test_an_ended_node_has_its_exit_code_and_last_log_lines(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
-    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # so that only events of the engine report the end
-    runtime = bare()
-    runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), NodeRole.EXPENDABLE))
-    end = wait_for_end(runtime)
-    assert (end.code, end.reason) == (2, "exit code 2")
-    assert end.log.splitlines()[-1] == "throwcollect: /data/nothing.yaml: no such file"
-    assert runtime.exits() == []
-    runtime.start(NodeSpec("sim_0", ("--version",), NodeRole.EXPENDABLE))
-    assert wait_for_end(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], f"throwcollect {__version__}"]
-
-
-def test_a_node_whose_container_is_removed_counts_as_ended(bare: Any, client: DockerClient) -> None:
-    runtime = bare()
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-    until(lambda: runtime.handle(ROUTER) is not None)
-    client.containers.get(runtime.handle(ROUTER)).remove(force=True)
-    assert wait_for_end(runtime).reason in ("its container was removed", "ended by SIGKILL")
-
-
 def test_a_published_router_listens_only_on_the_loopback_interface(bare: Any, client: DockerClient) -> None:
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
@@ -383,19 +343,6 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
     line = CutLine(f"{tmp_path}/line.sock", "/var/run/docker.sock")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/line.sock")
     return line
-
-
-def test_the_runtime_reconnects_to_the_engine_after_an_interruption(
-    bare: Any, client: DockerClient, line: CutLine
-) -> None:
-    runtime = bare(through=connect())
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-    until(lambda: runtime.logs.tail(ROUTER) != "")
-    handle = runtime.handle(ROUTER)
-    line.interrupt()
-    client.containers.get(handle).kill("SIGTERM")
-    assert wait_for_end(runtime).reason == "exit code 0"
-    assert runtime.logs.tail(ROUTER) == "router listening on tls/router:7447"
 
 
 @pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused\n"), ("clog", "")])

@@ -142,16 +142,6 @@ def test_ctrl_c_leaves_no_containers_networks_or_keys_behind(
     assert (code, "interrupted; finished throws are in" in err) == (130, True), err
 
 
-def test_several_runs_do_not_disturb_one_another(
-    config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
-) -> None:
-    both = [start(config, tmp_path / name, 1, "--runtime", "docker") for name in ("one", "other")]
-    for running in both:
-        code, _, err = running.finish()
-        assert code == 0, err
-        assert fingerprints(running.directory) == expected
-
-
 def test_a_detached_run_is_followed_scaled_and_waited_for(
     config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
 ) -> None:

@@ -16,7 +16,6 @@ from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
 from throwcollect.config.yaml_nodes import compose
 from throwcollect.coordinator.progress import Progress
-from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError, WorkerError
 from throwcollect.ros import IntegerRange
@@ -142,9 +141,6 @@ class NodeCollection:
         if end is not None and not finished:
             kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
             hint = place.way_on if kind is WorkerError else None
-            if place.volume is None and not config_path(place.directory).exists():
-                # The coordinator could not even say so in its log, which lies there, too.
-                raise kind(f"{place.directory}: was removed or renamed during the run")
             raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
     def _listen(self) -> None:

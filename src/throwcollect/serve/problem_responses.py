@@ -11,7 +11,6 @@ from fastapi.responses import JSONResponse
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError, create_model
 from starlette.exceptions import HTTPException
-from starlette.routing import Match, Mount
 
 from throwcollect.config.problems import findings
 from throwcollect.config.shape import ValueShape
@@ -36,8 +35,6 @@ _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (WorkerError, 503),
 )
 """Status of each kind of error, the first that fits; that of any other is 500."""
-
-_METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 
 _SCHEMA = {
     "type": "object",
@@ -100,12 +97,8 @@ def add_handlers(app: FastAPI) -> None:
         return problem(500, "internal error", hint="the log of the server says where; please report it")
 
     @app.exception_handler(HTTPException)
-    async def http(request: Request, error: HTTPException) -> ProblemResponse:
-        headers = dict(error.headers or {})
-        if "Allow" in headers:
-            # Each method has a route of its own, and Starlette names only the method of the first route.
-            headers["Allow"] = ", ".join(sorted(_list_methods_at(request)))
-        return problem(error.status_code, str(error.detail), headers=headers)
+    async def http(_: Request, error: HTTPException) -> ProblemResponse:
+        return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
 
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: RequestValidationError) -> ProblemResponse:
@@ -171,11 +164,3 @@ def _find_model_of_body(request: Request) -> type[BaseModel] | None:
     field = route.body_field if isinstance(route, APIRoute) else None
     model = None if field is None else field.field_info.annotation
     return model if isinstance(model, type) and issubclass(model, BaseModel) else None
-
-
-def _list_methods_at(request: Request) -> set[str]:
-    # A router that is included in another one does not list its methods, but it says whether a request would match.
-    # The mounted files of the page would match any request.
-    routes = [route for route in request.app.routes if not isinstance(route, Mount)]
-    scopes = [{**request.scope, "method": method} for method in _METHODS]
-    return {scope["method"] for scope in scopes if any(each.matches(scope)[0] is Match.FULL for each in routes)}

@@ -85,17 +85,3 @@ def test_a_scratch_directory_has_to_exist_unless_a_variable_names_it(
         return
     with pytest.raises(ConfigError, match=r"cluster\.scratch: there is no directory /nope on this machine"):
         plan_tasks()
-
-
-def test_a_submission_refused_for_a_used_directory_keeps_its_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    config = write_config(tmp_path, trials=4, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
-    for name in ("config.yaml", "trials.parquet", "cluster/mine.txt", "notes.txt"):
-        (tmp_path / "mine" / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / "mine" / name).write_text("mine")
-    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
-    before = sorted((tmp_path / "mine").rglob("*"))
-    with pytest.raises(ConfigError, match="a directory that is new or empty"):
-        submit(config, tmp_path / "mine", 2, onlooker=SILENT)
-    assert sorted((tmp_path / "mine").rglob("*")) == before

@@ -1,17 +1,14 @@
 """A description with numbers that cannot be right is refused, instead of making a robot that nobody described."""
 
-from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError, MemberError
-from throwcollect.robots import description
+from throwcollect.errors import ConfigError
 from throwcollect.robots.clearance import Clearance
-from throwcollect.robots.description import joint_model, physics_description
+from throwcollect.robots.description import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import tool_of
 
@@ -84,20 +81,6 @@ def test_a_number_that_cannot_be_right_is_named_and_refused(
         joint_model(make_arm(tmp_path, kind, old, new))
     # The parser of URDF would print its own complaints to the terminal.
     assert capfd.readouterr().err == ""
-
-
-def test_a_tool_with_the_name_of_a_link_or_the_ground_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("ground", "torso_1"):
-        tool = SimpleNamespace(name=name, link=f"{name}_link")
-        monkeypatch.setattr(description, "tool_of", lambda _, tool=tool: tool)
-        with pytest.raises(ConfigError, match=f"tool.name: the tool is recorded as {name}, .* has the name {name}"):
-            physics_description(Config())
-
-
-def test_a_function_that_does_not_find_the_files_is_named(tmp_path: Path) -> None:
-    for share, said in ((lambda: 1 / 0, "ZeroDivisionError"), (lambda: str(tmp_path), "should be an instance of Path")):
-        with pytest.raises(MemberError, match=f"the robot arm of .* cannot find its files: .*{said}"):
-            _ = replace(make_arm(tmp_path), share=share).urdf_path
 
 
 INERTIA = '<mass value="2"/><inertia ixx="{}" ixy="0" ixz="0" iyy="{}" iyz="0" izz="{}"/>'

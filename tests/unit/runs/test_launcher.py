@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterator
 from datetime import datetime, timezone
@@ -108,17 +107,6 @@ def test_a_launcher_that_gives_up_says_that_containers_are_left(
     assert re.search(r"  sim_0 +running +container ", told)
 
 
-def test_a_run_with_left_containers_stays_abandoned_if_the_engine_is_silent(
-    engine: Engine, run: OpenRun, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(docker_clock, "SILENCE_S", 0.1)
-    run.update(left=True)
-    engine.withheld = "."
-    with pytest.raises(WorkerError, match="no answer in time"):
-        launch_run(run)
-    assert status(run) == "abandoned"
-
-
 def test_a_new_launch_removes_left_containers_after_the_coordinator_finished(engine: Engine, run: OpenRun) -> None:
     for name in ("router", "sim_0", COORDINATOR):
         key = engine.create(f"throwcollect-{run.run}-{name}", {RUN_LABEL: run.run, NODE_LABEL: name})
@@ -130,10 +118,3 @@ def test_a_new_launch_removes_left_containers_after_the_coordinator_finished(eng
         launch_run(run)
     assert engine.names() == []
     assert status(run) == "ended"
-
-
-def test_ps_prints_times_as_rfc_3339_prescribes(run: OpenRun, capsys: pytest.CaptureFixture[str]) -> None:
-    ps(everything=True, json=True)
-    document = json.loads(capsys.readouterr().out)[0]
-    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00", document["started"])
-    assert document["ended"] is None

@@ -44,8 +44,6 @@ class Offers(Belongings[ABelonging]):
             self._withdraw(name)
         elif self._is_taken(name):
             raise ConfigError(f"{request.op}: {name} is offered already", expected="another name")
-        else:
-            self._require_room(f"{request.op}: {name}")
         offered.open()
         self._by_name[name] = offered
         self._client.host.offered.add(name + self._probe)

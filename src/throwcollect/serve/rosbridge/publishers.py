@@ -15,7 +15,6 @@ from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.request import BridgeRequest
 
 _DEPTH = 100
-_LONGEST_QUEUE = 10_000
 _HEADER = "std_msgs/Header"
 
 
@@ -94,8 +93,7 @@ class Publishers(Belongings[Advertised]):
             if known.type_name != type_name:
                 raise ConfigError(f"{topic} is advertised as {known.type_name} already", expected="that type")
             return known
-        self._require_room(f"advertise: {topic}")
-        depth = min(request.natural_or("queue_size", _DEPTH) or _DEPTH, _LONGEST_QUEUE)
+        depth = request.natural_or("queue_size", _DEPTH) or _DEPTH
         advertised = Advertised(self._client, topic, type_name, request.flag("latch"), depth)
         advertised.open()
         self._by_name[topic] = advertised

@@ -163,7 +163,6 @@ class Subscriptions(Belongings[SubscribedTopic]):
                 f"subscribe: {given} is subscribed to as {subscription.type_name} already", expected="that type"
             )
         if subscription is None:
-            self._require_room(f"subscribe: {given}")
             subscription = SubscribedTopic(self._client, given, type_name)
             subscription.want(request.id, wanted)
             subscription.open()

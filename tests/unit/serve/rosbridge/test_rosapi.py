@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -109,12 +108,6 @@ def test_rosapi_describes_a_type_with_all_nested_types(party: Party) -> None:
     assert dict(zip(field["constnames"], field["constvalues"], strict=True))["FLOAT64"] == "8"
     odometry = party.call("/rosapi/message_details", type="geometry_msgs/PoseWithCovariance")["typedefs"]
     assert odometry[0]["fieldarraylen"] == [-1, 36]
-
-
-def test_rosapi_returns_the_time_and_the_ros_version(party: Party) -> None:
-    now = party.call("/rosapi/get_time")["time"]
-    assert now["sec"] + now["nanosec"] * 1e-9 == pytest.approx(time.time(), abs=60)
-    assert party.call("/rosapi/get_ros_version") == {"version": 2, "distro": "jazzy"}
 
 
 def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:

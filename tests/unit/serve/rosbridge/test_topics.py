@@ -17,8 +17,8 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
-from throwcollect.serve.rosbridge import Bridge, belongings, subscriptions
-from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscribedTopic, SubscriptionRequest
+from throwcollect.serve.rosbridge import Bridge, subscriptions
+from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -42,13 +42,6 @@ def words(node: Node, topic: str = "/words") -> Callable[..., None]:
 
 def data(party: Party) -> list[str]:
     return [each["msg"]["data"] for each in party.got() if each["op"] == "publish"]
-
-
-def test_messages_carry_the_topic_name_that_the_client_used(party: Party, node: Node) -> None:
-    say = words(node)
-    party.ask(op="subscribe", topic="words", type="std_msgs/String")
-    say("a")
-    assert party.next(op="publish") == {"op": "publish", "topic": "words", "msg": {"data": "a"}}
 
 
 def test_each_late_client_hears_a_latched_topic(bridge: Bridge, party: Party, node: Node) -> None:
@@ -75,19 +68,6 @@ def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
     time.sleep(1.1)
     go_on.set()
     assert party.next(op="publish")["msg"]["data"] == "first"
-
-
-def test_a_topic_that_turns_out_to_be_latched_is_heard_from_its_beginning(party: Party, node: Node) -> None:
-    party.ask(op="subscribe", topic="/later", type="std_msgs/msg/String")
-    publisher = node.create_publisher(String, "/later", LATCHED)
-    publisher.publish(String(data="at once"))
-    assert party.next(op="publish")["msg"] == {"data": "at once"}
-    wait_for(
-        lambda: (
-            [each.qos_profile.durability for each in node.get_subscriptions_info_by_topic("/later")]
-            == [DurabilityPolicy.TRANSIENT_LOCAL]
-        )
-    )
 
 
 @pytest.mark.parametrize(
@@ -146,26 +126,6 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
     assert data(party)[before:] in ([], ["i"])
 
 
-def test_queued_messages_are_sent_at_even_times_despite_late_timers(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 100.0
-    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
-    waiting: list[tuple[float, Callable[[], None]]] = []
-    sent: list[tuple[Any, float]] = []
-    pace = RateLimit(
-        lambda sample: sent.append((sample, now)), lambda seconds, action: waiting.append((now + seconds, action))
-    )
-    pace.change(SubscriptionRequest(throttle_s=0.03, queue_length=100))
-    samples: list[Any] = list(range(20))
-    for sample in samples:
-        pace.offer(sample)
-    while waiting:
-        due, action = waiting.pop()
-        now = due + 0.005
-        action()
-    assert [sample for sample, _ in sent] == samples
-    assert [time_s for _, time_s in sent[1:]] == pytest.approx([100.005 + 0.03 * number for number in range(1, 20)])
-
-
 def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
@@ -182,38 +142,6 @@ def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pyte
         now = arrives
         pace.offer(sample)
     assert len(sent) == pytest.approx(1800, abs=60)
-
-
-@pytest.mark.parametrize("end", ["close", "lose"])
-def test_messages_that_wait_for_their_time_are_forgotten_when_their_subscription_or_its_session_ends(end: str) -> None:
-    timers: list[Callable[[], None]] = []
-    sent: list[str] = []
-    feed = SimpleNamespace(remove=lambda _: None)
-    client: Any = SimpleNamespace(
-        host=SimpleNamespace(
-            session=SimpleNamespace(listen=lambda _topic, _type, listener: heard.append(listener) or feed),
-            later=lambda _seconds, action: timers.append(action),
-        ),
-        send=lambda frame, _size: sent.append(frame),
-    )
-    heard: list[Callable[[Any], None]] = []
-    topic = SubscribedTopic(client, "/words", "std_msgs/msg/String")
-    topic.want(None, SubscriptionRequest(throttle_s=60.0, queue_length=10))
-    topic.open()
-
-    def hear(word: str) -> None:
-        heard[-1](SimpleNamespace(frame=lambda _topic, _compression: word))
-
-    for word in "abc":
-        hear(word)
-    getattr(topic, end)()
-    timers.pop()()
-    assert (sent, timers) == (["a"], [])
-    # In a new session, messages wait as before.
-    topic.open()
-    hear("d")
-    timers.pop()()
-    assert sent == ["a", "d"]
 
 
 def test_a_long_message_comes_in_fragments_of_the_requested_size(party: Party, node: Node) -> None:
@@ -325,52 +253,3 @@ def test_a_leaving_client_withdraws_its_topics_services_and_actions(bridge: Brid
     wait_for(lambda: all(there()))
     party.client.close()
     wait_for(lambda: not any(there()))
-
-
-def test_a_subscription_does_not_list_all_topics(party: Party, node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Thousands of subscriptions would otherwise take time that grows with their square."""
-    publisher = node.create_publisher(String, "/listed", 10)
-    party.call("rosapi/get_time")
-    lists: list[str] = []
-
-    def list_all() -> list[Any]:
-        lists.append("all")
-        return []
-
-    monkeypatch.setattr(party.client.host.session.node, "get_topic_names_and_types", list_all)
-    party.ask(op="subscribe", topic="/listed", type="std_msgs/String")
-    wait_for_listener(publisher)
-    publisher.publish(String(data="heard"))
-    assert party.next(op="publish")["msg"] == {"data": "heard"}
-    assert lists == []
-
-
-def test_a_client_has_a_limited_number_of_topics_services_and_actions(
-    party: Party, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(belongings, "_MOST", 2)
-    kinds = {
-        "subscribe": ("topic", "std_msgs/String"),
-        "advertise": ("topic", "std_msgs/String"),
-        "advertise_service": ("service", "std_srvs/SetBool"),
-        "advertise_action": ("action", "control_msgs/FollowJointTrajectory"),
-    }
-    for op, (word, kind) in kinds.items():
-        for name in ("/many_1", "/many_2", "/many_3", "/many_2"):
-            party.ask(op=op, id=f"{op} {name}", type=kind, **{word: name})
-        assert party.next(op="status")["msg"].startswith(f"{op}: /many_3: this client has 2 of these already")
-    party.call("rosapi/get_time")
-    assert len([each for each in party.got() if each["op"] == "status"]) == len(kinds)
-
-
-def test_requests_of_one_client_do_not_keep_another_waiting(bridge: Bridge, party: Party) -> None:
-    other, begin = Party(bridge), threading.Event()
-    party.call("rosapi/get_time")
-    bridge.submit(lambda: begin.wait(PATIENCE_S))
-    party.ask(op="call_service", service="/rosapi/get_time")
-    other.ask(op="call_service", service="/rosapi/get_time")
-    party.ask(op="call_service", service="/rosapi/get_time")
-    begin.set()
-    wait_for(lambda: len(party.times) == 3 and other.times)
-    assert other.times[0] < party.times[2]
-    other.client.close()
