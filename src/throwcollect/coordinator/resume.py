@@ -74,6 +74,12 @@ def resume(
             through.
     """
     with hold_lock(directory):
+        if is_there(directory / SOURCES):
+            raise DatasetError(
+                "was derived from other datasets, so nothing is collected into it",
+                path=directory,
+                hint="derive it again if it is damaged",
+            )
         stored = _read_stored_config(directory)
         if stored is not None:
             refuse_changes(directory, stored, make_self_contained(config))

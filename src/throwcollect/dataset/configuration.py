@@ -26,7 +26,7 @@ def read_config(directory: Path) -> Config:
 
 @contextmanager
 def reading_config(directory: Path, file: Path | None = None, overrides: Sequence[str] = ()) -> Iterator[Config]:
-    """Read the configuration by which a dataset goes on, its own or that of a file; errors in the block name its places.
+    """Read the configuration by which a dataset goes on, its own or that of a file, whose places errors name.
 
     The overrides are ``key=value`` pairs, as ``--set`` takes them.
     """

@@ -55,8 +55,9 @@ class UnfinishedDatasetWarning(UserWarning):
 class Dataset(Sequence[Throw]):
     """Throws of a dataset, in order of trials unless they were selected in another one.
 
-    ``dataset[i]`` is the throw of row i of `throws`. A dataset as it is loaded has every trial of the plan, so there i
-    is the number of the trial; trials that were refused or lost have a row, too, but no trajectory (see `recorded`).
+    ``dataset[i]`` is the throw of row i of `throws`. A dataset that was collected has every trial of the plan, so i is
+    the number of the trial; trials that were refused or lost have a row, too, but no trajectory (see `recorded`). A
+    dataset that was derived has only the trials that were taken, with their numbers.
 
     May be shared by threads and sent to other processes. No file stays open.
 
@@ -252,7 +253,7 @@ class Dataset(Sequence[Throw]):
         """
         position = find_trial(self.throws["trial"], trial)
         if position < 0:
-            raise DatasetError(f"no trial {trial}", path=self.directory, expected=f"0 to {len(self.plan.trials) - 1}")
+            raise DatasetError(f"no trial {trial}", path=self.directory)
         return self[position].read_episode()
 
     def robot_description(self) -> str | None:
@@ -338,11 +339,13 @@ class Dataset(Sequence[Throw]):
         columns = (self.throws[name].to_pylist() for name in ("trial", "shard", "chunk_offset", "samples"))
         rows = list(zip(*columns, strict=True))
         paths = {name: self.directory / name for name in {shard for _, shard, *_ in rows} if name is not None}
-        start_ns, joints = self.config.trial_start_ns, self.joints
-        return [
-            None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)
-            for trial, shard, offset, samples in rows
-        ]
+        start_ns, joints, first = self.config.trial_start_ns, self.joints, self.plan.first_of_part
+
+        def place(trial: int, shard: str, offset: int, samples: int) -> StoredThrow:
+            own = trial - first(trial)
+            return StoredThrow(own, start_ns(own), paths[shard], offset, samples, joints)
+
+        return [None if row[1] is None else place(*row) for row in rows]
 
 
 def load(directory: StrPath) -> Dataset:

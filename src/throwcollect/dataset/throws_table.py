@@ -15,9 +15,10 @@ from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.config.target_columns import TARGET_PREFIX, is_target
 from throwcollect.config.values import column_of
-from throwcollect.dataset.directory import THROWS, list_shards
+from throwcollect.dataset.directory import SOURCES, THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import is_there
 from throwcollect.members import explain_failure
 from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
@@ -209,10 +210,14 @@ class RowsByTrial(Mapping[int, Row]):
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:
-    """Read the table of throws of a dataset, whose rows are the trials of its plan in order."""
+    """Read the table of throws of a dataset: the trials of its plan in order, or some of them if it was derived."""
     path = directory / THROWS
     table = read_throws_table(path, plan)
-    if table["trial"].to_pylist() != list(plan.trials.numbers):
+    numbers, planned = table["trial"].to_pylist(), plan.trials.numbers
+    if is_there(directory / SOURCES):
+        if numbers != sorted({number for number in numbers if number in planned}):
+            raise DatasetError("its rows are not trials of the plan in order", path=path)
+    elif numbers != list(planned):
         raise DatasetError(f"its rows are not the {len(plan.trials)} trials of the plan in order", path=path)
     if problem := _explain_unusable(table, plan):
         raise DatasetError(problem, path=path)

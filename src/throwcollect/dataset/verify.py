@@ -6,7 +6,7 @@ A file that cannot be read is reported, and everything that does not depend on i
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,24 +27,28 @@ from throwcollect.dataset.directory import (
     METADATA,
     PROVENANCE,
     SHARD_SUFFIX,
+    SOURCES,
     THROWS,
     TRIALS,
     shard_of,
 )
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.manifest import find_manifest_problems
+from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.provenance import load_provenance
 from throwcollect.dataset.summary_files import combine_digests
+from throwcollect.dataset.throws_table import Row
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardReport, check_shard
-from throwcollect.dataset.verify_tables import Tables, check_tables
+from throwcollect.dataset.verify_tables import Tables, check_tables, find_wrong_trials
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import is_digest
+from throwcollect.sweep.plan import Plan
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
@@ -148,9 +152,24 @@ def _make_file_check(
 
     def check_file(name: str) -> ShardReport:
         trials = None if expected is None else expected[name]
+        if tables.plan is not None and tables.plan.joined and tables.rows and trials:
+            return _check_file_of_part(directory / name, tables.plan, tables.rows, trials, robot=robot)
         return check_shard(directory / name, tables.config, trials, check.find_problems)
 
     return check_file
+
+
+def _check_file_of_part(
+    path: Path, plan: Plan, rows: Mapping[int, Row], trials: Sequence[int], *, robot: bool
+) -> ShardReport:
+    """Check a file of a merged dataset, whose episodes have the numbers of the plan that they were collected by."""
+    first = plan.first_of_part(trials[0])
+    part = plan.part_from(first)
+    own = {trial - first: {**rows[trial], "trial": trial - first} for trial in trials if trial in rows}
+    check = EpisodeCheck(part, own, doubtful=find_wrong_trials(part), robot=robot)
+    report = check_shard(path, plan.config, [trial - first for trial in trials], check.find_problems)
+    report.digests = {first + trial: digest for trial, digest in report.digests.items()}
+    return report
 
 
 def _list_trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
@@ -158,9 +177,11 @@ def _list_trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]
     if tables.plan is None or tables.rows is None:
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
+    # A derived dataset has some trials of its plan.
+    planned = () if is_there(directory / SOURCES) else range(len(tables.plan.trials))
     refused = tables.plan.trials.refused
     # The table may have rows of trials that the plan does not have, and lack others.
-    for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
+    for trial in sorted({*planned, *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
         # If the row of a trial is missing, its episode is most likely in its file nevertheless.
         if (trial not in refused and name in names) if row is None else row["shard"] == name:
@@ -228,7 +249,7 @@ def _find_digest_problems(
             return
         # For episodes that cannot be read, the digests are taken from the table.
         digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
-    targets = None if tables.plan is None else tables.plan.trials.targets
+    targets = None if tables.throws is None else read_targets(tables.throws)
     written = entries.get("throwcollect.digest")
     digest = combine_digests((digests[trial] for trial in sorted(digests)), targets)
     if written != digest:

@@ -62,8 +62,9 @@ def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> t
     by_distance = landed.trial[np.argsort(landed.distance_m, kind="stable")].tolist()
     usable = [trial for trial in by_distance if trial in recorded]
     picks = np.linspace(0, len(usable) - 1, min(len(usable), _MOST_LANDED)).round().astype(int)
+    numbers = dataset["trial"]
     others = (
-        next((trial for trial in np.flatnonzero(outcomes.are(name)).tolist() if trial in recorded), None)
+        next((trial for trial in numbers[outcomes.are(name)].tolist() if trial in recorded), None)
         for name in outcomes.names
         if name != LANDED
     )

@@ -17,6 +17,7 @@ class Landings:
     """All throws whose ball crossed the landing plane, of any outcome; each array has the shape ``(n,)``.
 
     Attributes:
+        row: Place of the throw in the table.
         trial: Number of the trial.
         x_m: Ball centre in world [m], forward of the robot.
         y_m: Ball centre in world [m], left of the robot.
@@ -27,6 +28,7 @@ class Landings:
         code: Outcome, as index into `Outcomes.names`.
     """
 
+    row: NDArray[np.intp]
     trial: NDArray[np.int64]
     x_m: NDArray[np.float64]
     y_m: NDArray[np.float64]
@@ -52,6 +54,7 @@ def read_landings(throws: pa.Table, outcomes: Outcomes) -> Landings:
     """Read the landings of a table of throws."""
     x, y = read_numbers(throws, "landing_x_m"), read_numbers(throws, "landing_y_m")
     landings = Landings(
+        row=np.arange(len(throws)),
         trial=np.asarray(throws["trial"].to_numpy()),
         x_m=x,
         y_m=y,

@@ -31,7 +31,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     throws, swept = dataset.throws, LANDING_HEIGHT in dataset.plan.keys
     height_m = None if swept else dataset.config.scene.landing_height_m
     landings = read_landings(throws, outcomes)
-    planned = landings[outcomes.are(LANDED)[landings.trial]]
+    planned = landings[outcomes.are(LANDED)[landings.row]]
     coverage = count_throws(planned, throws, target=dataset.config.sweep.target)
     examples = [dataset[trial] for trial in choose_examples(dataset, planned, outcomes)]
     return TaskReport(
