@@ -11,7 +11,7 @@ import numpy as np
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
-from throwcollect.config.values import differences, leaves
+from throwcollect.config.values import differences
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.prepare import (
     check_room,
@@ -28,7 +28,6 @@ from throwcollect.dataset.manifest import is_as_written, is_begun
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import find_damage
-from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan
@@ -80,8 +79,7 @@ def resume(
                 f"{directory / TRIALS}: is missing or damaged, and nothing else holds the list of trials",
                 hint=f"{command('up', 'CONFIG', '--resume', directory)}, with the file that sweep.file of CONFIG names",
             )
-        if old is not None and PLAN in damaged and (not config.grows or find_wrong_trials(old)):
-            # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
+        if PLAN in damaged:
             old = None
         plan, listed = _make_plan(config, directory, sweep_directory, old, damaged, processes, onlooker)
         # The dataset may be finished only by its earlier configuration, or by files that are gone.
@@ -236,11 +234,10 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     """Refuse a configuration that differs from the stored one, with which a dataset was begun."""
     changed = differences(stored.without_run(), config.without_run())
-    may_grow = {leaf.name for config in (stored, config) for leaf in leaves(config) if leaf.key.grows}
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key not in may_grow or not _is_growth(before, after, config)
+        if not (key == "trials" or key.startswith("until.")) or not _is_growth(before, after, config)
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
@@ -251,25 +248,28 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
 
 def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials may replace an earlier one; None stands for no limit."""
-    if not config.grows:
-        # `_extend` compares the trials of a plan that does not grow.
+    if config.until is None:
+        # `_extend` compares the trials.
         return True
     return after is None or (before is not None and after >= before)
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
-    """Check that the new plan begins with the trials of the old one, and keep those that results have added."""
+    """Check that the new plan begins with the trials of the old one."""
     if old is None:
         return new
     count = min(len(old.trials), len(new.trials))
-    if count < len(old.trials) and not new.config.grows:
+    if count < len(old.trials) and new.config.until is None:
         raise ConfigError(
             [Problem(f"{directory} has {len(old.trials)} already, got {count}", key="trials")],
             expected=f"{len(old.trials)} or more",
             hint="throwcollect dataset sample takes some of them into a new dataset",
         )
     before, after = old.trials[:count], new.trials[:count]
-    are_same = np.array_equal(before.digests, after.digests) and before.refused.keys() == after.refused.keys()
+    are_same = np.array_equal(before.digests, after.digests)
+    if new.config.until is None:
+        # Otherwise, the collection checks most of the trials.
+        are_same = are_same and before.refused.keys() == after.refused.keys()
     if new.config.sweep.file is not None and not (are_same and before.targets == after.targets):
         raise ConfigError(
             [Problem(f"the list begins with other trials or targets than {directory} has", key="sweep.file")],
@@ -281,9 +281,4 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
-    # Of a plan that grows, only the first rounds are drawn again. What results have added is kept.
-    if count < len(old.trials):
-        trials = new.trials[:]
-        trials.extend(old.trials[count:])
-        new = replace(new, trials=trials)
     return new

@@ -132,11 +132,7 @@ def _read_or_remake_plan(directory: Path, config: Config, remake: Remake, remark
         reason = error.details
     try:
         plan, source = _make_plan_of_table(directory / THROWS, config), THROWS
-    except DatasetError as error:
-        if config.grows:
-            raise DatasetError(
-                f"{reason}; it grew with the results, so only {THROWS} could replace it", path=path, evidence=str(error)
-            ) from error
+    except DatasetError:
         try:
             plan, source = remake(config), CONFIG
         except ConfigError as failure:
