@@ -37,7 +37,7 @@ class Trials:
         """Collect the missing trials; returns the trials that were kept."""
         kept: set[int] = set()
         writer = DatasetWriter.open(directory)
-        writer.recover(lambda trial, _: kept.add(trial))
+        writer.recover(lambda trial, _: kept.add(trial) is None)
         for trial in sorted(ALL - kept):
             writer.append(self.episodes[trial], self.results[trial])
         writer.finish(wall_s=1.0)
