@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from throwcollect.arguments import check_whole_number, is_whole, read_list, read_path, refuse_argument, show_value
-from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.selection import find_rows
 from throwcollect.derive.derivation import Derived, derive
 from throwcollect.files import StrPath
 
@@ -36,15 +36,14 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
-    """Take the trials that fulfil a condition on columns of the table of throws; see `dataset.expression`.
+    """Take the trials that fulfil a condition on columns of the table of throws; see `dataset.selection`.
 
     Raises:
         ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    condition = Expression(where, place="where")
     dataset = Dataset.open(directory)
-    chosen = replace(dataset, throws=dataset.throws.take(condition.rows(dataset.throws)))
+    chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where").fill_null(False)))
     if not len(chosen.recorded):
         raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
     return derive([chosen], read_path("output", output), offered=len(dataset))

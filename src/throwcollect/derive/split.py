@@ -22,8 +22,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.arguments import as_float, check_mapping, check_whole_number, read_list, read_path, refuse_argument
 from throwcollect.config.kinds import NAME_WORDS, Name
-from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.selection import compute
 from throwcollect.derive.derivation import Derived, count_without_episode, derive
 from throwcollect.files import StrPath, new_directory
 
@@ -87,7 +87,7 @@ def split(
         fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping from names to
             shares.
         cells: Axes of the space that is cut into cells. Each is an expression on columns of the table of throws (see
-            `dataset.expression`) and the width of the cells along this axis, such as ``landing_x_m=0.05``.
+            `dataset.selection`) and the width of the cells along this axis, such as ``landing_x_m=0.05``.
         seed: Seed of the choice, 0 or more.
 
     Raises:
@@ -153,8 +153,10 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
         name, width = _read_pair(text, "cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:
             raise refuse_argument("cells", f"the width of cells should be above 0, got {text!r}")
-        values = Expression(name, place="cells").numbers(throws)
-        columns.append([_number_along(value, float(width)) for value in values])
+        values = compute(name, throws, "cells")
+        if not pa.types.is_floating(values.type):
+            raise refuse_argument("cells", f"{name!r} is no number, but {values.type}")
+        columns.append([_number_along(value, float(width)) for value in values.to_pylist()])
     return [None if None in cell else cell for cell in zip(*columns, strict=True)]
 
 
