@@ -42,7 +42,7 @@ def test_a_filtered_dataset_has_the_trials_that_fulfil_the_condition(collected: 
         assert throw.trial == number
         assert np.array_equal(throw.joints.time_s, before[number].joints.time_s)
         assert after.episode(number).chunk == before.episode(number).chunk
-    assert after.trajectories()["ball.position"].shape == after.recorded.trajectories()["ball.position"].shape
+    assert after.trajectories()["ball_position"].shape == after.recorded.trajectories()["ball_position"].shape
 
 
 def test_a_filter_that_keeps_all_trials_copies_the_shards_byte_for_byte(collected: Path, tmp_path: Path) -> None:
