@@ -29,8 +29,6 @@ PROTECTED = "tls/"
 """Beginning of the endpoints whose router lets nobody in without a key."""
 LISTENS_OF_RMW = ("tcp/localhost:0",)
 """Endpoints at which a session of rmw_zenoh_cpp listens, even as a client, unless its environment sets others."""
-NOT_IN_PATHS = ";?"
-"""Characters that a path to a key must not have, because Zenoh puts paths into endpoints, where they are separators."""
 
 _TLS = "transport/link/tls"
 _DEFAULT_MODE = "peer"

@@ -85,8 +85,7 @@ def _find_free_port(address: str) -> int:
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.bind((host, 0))
             return int(probe.getsockname()[1])
-    except (OSError, UnicodeError) as error:
-        # A host name with a part that is too long leads to a UnicodeError.
+    except OSError as error:
         raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
 
 
