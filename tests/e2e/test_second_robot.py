@@ -35,14 +35,14 @@ import throwcollect
 
 dataset = throwcollect.load(directory)
 throw = dataset[4]
-every, elbow = dataset.trajectories(["joints.position"]), dataset.trajectories(joints=["elbow_joint"])
+every, elbow = dataset.trajectories(["joints_position"]), dataset.trajectories(joints=["elbow_joint"])
 with throwcollect.Simulator(directory / "config.yaml") as simulator:
     simulated = simulator.throw(throw.parameters, trial=4)
 found = {
     "joints": [dataset.joints, throw.joints.names, simulated.joints.names, dataset.moving_joints],
     "digests": [throw.row["digest"], simulated.row["digest"]],
     "end": throw.joints.position[-1].tolist(),
-    "ends": every[4]["joints.position"][-1].tolist() + elbow[4]["joints.position"][-1].tolist(),
+    "ends": every[4]["joints_position"][-1].tolist() + elbow[4]["joints_position"][-1].tolist(),
     "statistics": {group: [*signals] for group, signals in throwcollect.compute_statistics(directory).signals.items()},
     "same": bool((throw.joints.effort == simulated.joints.effort).all()),
 }

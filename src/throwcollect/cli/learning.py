@@ -291,6 +291,7 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
 
 def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Row]:
     """Read the throws of a dataset that succeeded: the keys and the targets of each."""
+    from throwcollect.config.values import column_of
     from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.lists import Row
 
@@ -302,11 +303,12 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
             expected=f"{trained.task} of {trained.robot}, as the model has it",
         )
     throws = dataset.select(f"outcome == '{dataset.config.task.success}'").throws
-    if missing := [name for name in (*keys, *model.targets) if name not in throws.column_names]:
+    names = [*keys, *model.targets]
+    if missing := [name for name in names if column_of(name) not in throws.column_names]:
         raise ConfigError(
             f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
         )
-    rows = throws.select([*keys, *model.targets]).to_pylist()
+    rows = throws.select([*map(column_of, names)]).rename_columns(names).to_pylist()
     return [
         Row(f"{directory}: trial {trial}", row) for trial, row in zip(throws["trial"].to_pylist(), rows, strict=True)
     ]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
@@ -19,6 +20,21 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.members import load_member
 
 AnySection = TypeVar("AnySection", bound=Section)
+_NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_]")
+
+
+def column_of(key: str) -> str:
+    """Name the column of a swept key in tables of throws: the key with underscores, such as ``task_duration_s``.
+
+    Such a name needs no quotes in SQL and formulas. The name of any other column is returned as it is.
+    """
+    return _NOT_IN_NAMES.sub("_", key)
+
+
+def keys_by_column(config: Config, columns: Iterable[str]) -> dict[str, str]:
+    """Map those of some columns that belong to swept keys to these keys, in the order of the columns."""
+    keys = {column_of(key): key for key in sweepable_keys(config)}
+    return {column: keys[column] for column in columns if column in keys}
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:

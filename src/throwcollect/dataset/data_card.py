@@ -9,6 +9,7 @@ import pyarrow as pa
 
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
+from throwcollect.config.values import keys_by_column
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.misses import summarise_misses
@@ -112,10 +113,9 @@ def _describe_limits(engine: str) -> str:
 
 def _list_ranges(config: Config, throws: pa.Table) -> list[str]:
     rows = []
-    # Only swept keys have dots.
-    for name in (name for name in throws.column_names if "." in name):
+    for name, key in keys_by_column(config, throws.column_names).items():
         lowest, highest = find_range(throws[name]) or (math.nan, math.nan)
-        rows.append(f"| `{name}` | {unit_of_key(name)} | {lowest:g} | {highest:g} |")
+        rows.append(f"| `{key}` | {unit_of_key(key)} | {lowest:g} | {highest:g} |")
     return [
         "## What varies",
         "",

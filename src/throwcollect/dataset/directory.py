@@ -36,7 +36,7 @@ JOURNAL = "logs/journal.jsonl"
 ATTEMPT = ".attempt-"
 """Part of the name of the directory of each attempt at a slice, and of no dataset."""
 
-FORMAT = "1"
+FORMAT = "2"
 """Version of the layout that ``docs/dataset.md`` describes."""
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
-from throwcollect.config.values import leaves
+from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.miss_quantiles import find_median, find_share90
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.sweep.arrow_column import nan_where_null
@@ -75,7 +75,7 @@ class Misses:
         squares = 0.0
         columns = [column for column in self.targets if column.miss == miss and column.name in target]
         for column in columns:
-            value = row.get(column.of, self._fixed.get(column.of))
+            value = row.get(column_of(column.of), self._fixed.get(column.of))
             if value is None:
                 return None
             squares += (value - target[column.name]) ** 2

@@ -16,15 +16,16 @@ from throwcollect.arguments import check_whole_number, read_list, read_path
 from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
+from throwcollect.config.values import column_of
 from throwcollect.dataset.bag import read_bag_metadata
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.directory import METADATA, PLAN, THROWS
+from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_attribute, refuse_name
+from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, unknown_name
 from throwcollect.dataset.selected_throws import select_throws
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import name_alias, read_throws
+from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
 from throwcollect.episode.episode_message import Episode
@@ -80,6 +81,8 @@ class Dataset(Sequence[Throw]):
         remedies: Mapping[Path | None, str] = {path / METADATA: rebuild, path / PLAN: repair, path / THROWS: rebuild}
         try:
             bag = read_bag_metadata(path)
+            if (found := _find_custom(bag, "throwcollect.format")) != FORMAT:
+                raise DatasetError(f"has the format {found}", path=path, expected=FORMAT)
             plan = Plan.read(path / PLAN, read_config(path))
             if not is_there(path / THROWS):
                 raise DatasetError("is missing", path=path / THROWS)
@@ -107,12 +110,12 @@ class Dataset(Sequence[Throw]):
 
         Raises:
             IndexError: If there is no throw at this position.
-            ConfigError: If there is no such column; it is also a `KeyError`.
+            KeyError: If there is no such column.
             TypeError: If it is none of these.
         """
         if isinstance(which, str):
             if which not in self.throws.column_names:
-                raise refuse_name("no column", which, self.throws.column_names)
+                raise unknown_name("column", which, self.throws.column_names)
             return read_column(self.throws[which])
         if isinstance(which, slice):
             return replace(self, throws=self.throws.take(pa.array(range(len(self))[which], pa.int64())))
@@ -139,12 +142,6 @@ class Dataset(Sequence[Throw]):
         """Its configuration; that of a single trial has `Throw.parameters` in it."""
         return self.plan.config
 
-    # Type checkers would take any attribute for known if they saw this function.
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            raise refuse_attribute(self, name)
-
     @property
     def parameters(self) -> NamedArray:
         """Swept values of all throws, in the units of their keys; the names are dotted configuration keys.
@@ -161,12 +158,8 @@ class Dataset(Sequence[Throw]):
                 case _:
                     values = self.plan.trials.values[:, index]
                     bounds.append((values.min(), values.max()))
-        return NamedArray.of(self.throws, self.plan.keys, bounds)
-
-    @property
-    def aliases(self) -> Mapping[str, str]:
-        """Name without dots and with its unit of each swept key, such as ``task_end_arm_right_4_joint_rad``."""
-        return {key: name_alias(key) for key in self.plan.keys}
+        columns = self.throws.select([*map(column_of, self.plan.keys)])
+        return NamedArray.of(columns.rename_columns(list(self.plan.keys)), self.plan.keys, bounds)
 
     @property
     def landings(self) -> NamedArray:
@@ -239,8 +232,7 @@ class Dataset(Sequence[Throw]):
 
     def _read_custom(self, name: str) -> str:
         """Return what the product itself wrote into the metadata."""
-        custom = self._bag.get("custom_data")
-        value = custom.get(name) if isinstance(custom, dict) else None
+        value = _find_custom(self._bag, name)
         if not isinstance(value, str):
             raise self._make_missing_error(name)
         return value
@@ -345,3 +337,9 @@ class Dataset(Sequence[Throw]):
             None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)
             for trial, shard, offset, samples in rows
         ]
+
+
+def _find_custom(bag: Mapping[str, Any], name: str) -> object:
+    """Find what the product itself wrote into the metadata of a bag under a name; None if it is not there."""
+    custom = bag.get("custom_data")
+    return custom.get(name) if isinstance(custom, dict) else None

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.named_array import refuse_name
+from throwcollect.dataset.named_array import unknown_name
 from throwcollect.dataset.trajectory_columns import TIMES, Column, Recorded, empty_columns, fill
 from throwcollect.episode.trajectory_rows import STAMPS
 
@@ -52,7 +52,7 @@ class Series:
         return f"{type(self).__name__}({len(self)} samples, {self.time_s[-1]:.3f} s)"
 
     def _read_column(self, name: str) -> Column:
-        return self._recording.column(f"{self._prefix}.{name}")
+        return self._recording.column(f"{self._prefix}_{name}")
 
     @cached_property
     def time_s(self) -> NDArray[np.float64]:
@@ -118,7 +118,7 @@ class Joints(Series):
     def __getitem__(self, name: str) -> Joint:
         """Return one joint; its arrays are columns of the arrays of all joints."""
         if name not in self.names:
-            raise refuse_name("no joint", name, self.names)
+            raise unknown_name("joint", name, self.names)
         which = self.names.index(name)
         return Joint(name, self.time_s, self.position[:, which], self.velocity[:, which], self.effort[:, which])
 

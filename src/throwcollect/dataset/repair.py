@@ -12,7 +12,7 @@ import numpy as np
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
-from throwcollect.config.values import reason_not_sweepable
+from throwcollect.config.values import keys_by_column, reason_not_sweepable
 from throwcollect.dataset.bag import refuse_other_directory
 from throwcollect.dataset.configuration import unfitting_plan
 from throwcollect.dataset.creation import create
@@ -153,7 +153,8 @@ def _make_plan_of_table(path: Path, config: Config) -> Plan:
     names = table.column_names
     # Between number and outcome are the columns that were drawn: swept keys, then targets.
     drawn = names[1 : names.index("outcome")] if "outcome" in names else []
-    keys = tuple(name for name in drawn if not is_target(name))
+    columns = keys_by_column(config, (name for name in drawn if not is_target(name)))
+    keys = tuple(columns.values())
     targets = tuple(name for name in drawn if is_target(name))
     rows = table.to_pylist()
     if (
@@ -162,10 +163,10 @@ def _make_plan_of_table(path: Path, config: Config) -> Plan:
         or not table.schema.equals(ThrowsTable(keys, config, targets).schema)
         or not rows
         or [row["trial"] for row in rows] != list(range(len(rows)))
-        or any(row[key] is None for row in rows for key in keys)
+        or any(row[name] is None for row in rows for name in columns)
     ):
         raise DatasetError("not the table of this configuration, or not of all trials in order", path=path)
-    points = Points(keys, np.array([[row[key] for key in keys] for row in rows]), read_targets(table))
+    points = Points(keys, np.array([[row[name] for name in columns] for row in rows]), read_targets(table))
     reasons = [row["reason"] if row["outcome"] == REFUSED else None for row in rows]
     return Plan(config, make_trials(config, points).refuse(reasons))
 

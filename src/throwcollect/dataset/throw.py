@@ -12,7 +12,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.target_columns import is_target
-from throwcollect.dataset.named_array import refuse_attribute, refuse_name
+from throwcollect.config.values import column_of
+from throwcollect.dataset.named_array import unknown_name
 from throwcollect.dataset.recorded_motion import Ball, Joints, LazyRows
 from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.dataset.trajectory_columns import COLUMNS, TIMES, Recorded, name_components
@@ -24,13 +25,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 pd = lazily("pandas")
-
-_PARTS = (
-    *(f"events.{name}" for name in ("release", "apex", "landing", "contacts")),
-    *("joints.names", "ball.time_s", "joints.time_s"),
-    *(column for column in COLUMNS if "." in column),
-)
-"""Attributes of the attributes of a throw, which are easily looked for in the throw itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,20 +126,14 @@ class Throw:
             text += f" at x = {x:.3f} m, y = {y:.3f} m after {landing.time_s:.3f} s"
         return f"{text}; {self._episode.samples} samples)" if self._episode else f"{text}; not recorded)"
 
-    # Type checkers would take any attribute for known if they saw this function.
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            raise refuse_attribute(self, name, _PARTS)
-
     def __getitem__(self, column: str) -> Any:
         """Return its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.
 
         Raises:
-            ConfigError: If there is no such column; it is also a `KeyError`.
+            KeyError: If there is no such column.
         """
         if column not in self._table.column_names:
-            raise refuse_name("no column", column, self._table.column_names)
+            raise unknown_name("column", column, self._table.column_names)
         return self.row[column]
 
     def __contains__(self, column: object) -> bool:
@@ -172,8 +160,8 @@ class Throw:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Value of each swept key, in the key's unit."""
-        return {key: self.row[key] for key in self._keys}
+        """Value of each swept key, in the key's unit; by dotted key, as `Simulator.throw` takes them."""
+        return {key: self.row[column_of(key)] for key in self._keys}
 
     @property
     def target(self) -> dict[str, float]:

@@ -36,7 +36,7 @@ COLUMNS = (
     TIMES,
     STAMPS,
     *JOINT_COLUMNS,
-    "ball.position",
+    "ball_position",
     BALL_ORIENTATION,
     *BALL_VELOCITIES,
 )
@@ -130,7 +130,7 @@ def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
 
     The column is any of `COLUMNS` but times and stamps. A column of joints has the joints `joints`.
     """
-    series, _, quantity = column.partition(".")
+    series, _, quantity = column.partition("_")
     if series == "joints":
         return tuple(f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints)
     return tuple(f"ball_{component}" for component in _BALL_COMPONENTS[quantity])

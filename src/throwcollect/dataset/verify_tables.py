@@ -11,11 +11,11 @@ import pyarrow as pa
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.config.shape import unit_of_key
+from throwcollect.config.values import column_of
 from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_of
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.recorded_trial import shorten
-from throwcollect.dataset.throws_table import Row, RowsByTrial, read_throws_table
+from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
@@ -80,18 +80,18 @@ def check_tables(directory: Path) -> Tables:
         except DatasetError as error:
             tables.findings.append(Finding.of(THROWS, error))
         else:
-            tables.findings += _find_unit_problems(throws.schema)
+            tables.findings += _find_unit_problems(throws.schema, ThrowsTable.of(tables.plan).schema)
             tables.findings += _find_row_problems(tables.plan, throws["trial"].to_pylist())
             tables.rows = RowsByTrial(throws)
             tables.findings += _find_plan_problems(tables.plan, tables.rows, tables.doubtful)
     return tables
 
 
-def _find_unit_problems(schema: pa.Schema) -> Iterator[Finding]:
+def _find_unit_problems(schema: pa.Schema, expected: pa.Schema) -> Iterator[Finding]:
     """Find units of columns that are not theirs; exports take them over, while descriptions are for people alone."""
     for column in schema:
-        stated, unit = (column.metadata or {}).get(b"unit"), unit_of_key(column.name)
-        if stated not in (None, unit.encode()):
+        stated, unit = ((each.metadata or {}).get(b"unit") for each in (column, expected.field(column.name)))
+        if stated != unit:
             yield Finding(THROWS, column.name, f"has the unit {shorten(stated)}, should be {unit!r}")
 
 
@@ -149,8 +149,8 @@ def _find_plan_problems(plan: Plan, rows: Mapping[int, Row], doubtful: Collectio
         place = f"trial {trial.number}"
         for key, value in trial.values.items():
             # The plan itself is known to be wrong about a doubtful trial.
-            if row[key] != value and trial.number not in doubtful:
-                yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
+            if row[column := column_of(key)] != value and trial.number not in doubtful:
+                yield Finding(THROWS, place, f"has {column} = {row[column]!r}, the plan {value!r}")
         for name in plan.trials.target_names:
             if row[name] != (planned := trial.target.get(name)):
                 yield Finding(THROWS, place, f"has {name} = {row[name]!r}, the plan {planned!r}")

@@ -17,7 +17,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.export.resampling import count_resampled, resample
-from throwcollect.export.signals import Signal, list_signals, unit_of
+from throwcollect.export.signals import Signal, list_signals
 from throwcollect.progress_log import ProgressLog
 from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
@@ -120,7 +120,7 @@ class ExportSource:
             targets,
             list_signals(dataset.joints, dataset.moving_joints, targets),
             _list_entries(dataset, rate_hz),
-            add_units(dataset.throws),
+            dataset.throws.drop_columns(list(_PLACES)),
             ProgressLog(len(dataset.throws), "trial", "exported"),
         )
 
@@ -178,18 +178,6 @@ def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: in
         "ball_velocity_mps": samples.ball_linear_velocity,
         "ball_angular_velocity_radps": samples.ball_angular_velocity,
     }
-
-
-def add_units(throws: pa.Table) -> pa.Table:
-    """Leave the places of the recordings out of the table of throws, and add the unit of each number."""
-    table = throws.drop_columns(list(_PLACES))
-    fields = [
-        field
-        if pa.types.is_string(field.type)
-        else field.with_metadata({**(field.metadata or {}), b"unit": unit_of(field.name).encode()})
-        for field in table.schema
-    ]
-    return table.cast(pa.schema(fields))
 
 
 def read_metadata(field: pa.Field) -> dict[str, str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from throwcollect.config.values import with_values
+from throwcollect.config.values import column_of, with_values
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import ThrowsTable
@@ -96,7 +96,7 @@ def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
         compared = [
             column
             for column in again
-            if column not in ("trial", *trial.values, *trial.target)
+            if column not in ("trial", *map(column_of, trial.values), *trial.target)
             and all(isinstance(row.get(column), int | float) for row in (stored, again))
         ]
         values = {column: float(again[column]) - float(stored[column]) for column in compared}

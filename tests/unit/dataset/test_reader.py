@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
-from tests.unit.dataset.damage import change_table
+from tests.unit.dataset.damage import change_table, replace_text
 
 import throwcollect
 from throwcollect.dataset.inspect import check_recordings_are_there
@@ -57,7 +57,7 @@ def test_a_loaded_dataset_has_its_table_and_its_throws_by_position(loaded: Datas
     assert trials(loaded) == list(range(7))
     assert (loaded[-1].trial, loaded[3].trial) == (6, 3)
     assert loaded.parameters.names == ("task.duration_s",)
-    assert loaded[3].parameters == {"task.duration_s": loaded.throws["task.duration_s"][3].as_py()}
+    assert loaded[3].parameters == {"task.duration_s": loaded.throws["task_duration_s"][3].as_py()}
     assert loaded.config.name == "quick"
 
 
@@ -237,12 +237,18 @@ def test_opening_a_directory_near_a_dataset_names_that_dataset(dataset: Path, tm
         assert caught.value.hint is None
 
 
+def test_a_dataset_of_another_format_is_refused(dataset: Path) -> None:
+    replace_text(dataset / "metadata.yaml", "throwcollect.format: '2'", "throwcollect.format: '1'")
+    with pytest.raises(DatasetError, match="has the format 1\n  expected: 2"):
+        Dataset.open(dataset)
+
+
 def test_a_text_in_place_of_a_list_of_names_is_refused(loaded: Dataset) -> None:
-    with pytest.raises(ConfigError, match=r"^columns: 'ball\.position' is a text") as caught:
-        loaded.trajectories("ball.position")
-    assert caught.value.expected == "a list of names: ['ball.position']"
+    with pytest.raises(ConfigError, match=r"^columns: 'ball_position' is a text") as caught:
+        loaded.trajectories("ball_position")
+    assert caught.value.expected == "a list of names: ['ball_position']"
     with pytest.raises(ConfigError, match=r"^joints: 'arm_right_4_joint' is a text"):
-        loaded.trajectories(["joints.position"], joints="arm_right_4_joint")
+        loaded.trajectories(["joints_position"], joints="arm_right_4_joint")
 
 
 def test_an_episode_is_read_back_as_it_was_written(collection: Any, dataset: Path) -> None:

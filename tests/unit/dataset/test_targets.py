@@ -53,7 +53,7 @@ def test_a_throw_has_its_target_and_its_miss_is_the_distance(targeted: Path) -> 
     dataset = Dataset.open(targeted)
     assert dataset.plan.keys == ("task.duration_s",)
     names = dataset.throws.column_names
-    assert names[:5] == ["trial", "task.duration_s", "target_x_m", "target_y_m", "outcome"]
+    assert names[:5] == ["trial", "task_duration_s", "target_x_m", "target_y_m", "outcome"]
     assert [throw.target for throw in dataset] == [
         {"target_x_m": 1.4, "target_y_m": -0.1},
         {},

@@ -1,3 +1,4 @@
+import re
 from dataclasses import make_dataclass, replace
 from pathlib import Path
 
@@ -39,22 +40,30 @@ def test_results_read_back_equal_from_the_table_of_throws(collection: Collection
     assert outcomes == {ThrowOutcome.LANDED, ThrowOutcome.NOT_RELEASED, ThrowOutcome.TRACKING_FAILED}
 
 
-def test_the_column_of_a_swept_key_has_a_unit_and_an_alias_without_dots() -> None:
+def test_the_column_of_a_swept_key_needs_no_quotes_and_has_the_unit_of_the_key() -> None:
     swept = {
         "task.end.arm_right_4_joint": {"min": -0.7, "max": -0.4},
         "task.duration_s": {"min": 0.9, "max": 1.1},
         "ball.friction": {"min": 0.1, "max": 0.5},
+        "scene.gravity_mps2": {"min": 9.7, "max": 9.9},
     }
     collection = Collection({"sweep": {"sampler": "uniform", "parameters": swept}})
     schema = ThrowsTable.of(collection.plan).schema
-    told = {key: schema.field(key).metadata for key in swept}
-    assert [each[b"alias"].decode() for each in told.values()] == [
-        "task_end_arm_right_4_joint_rad",
-        "task_duration_s",
-        "ball_friction",
-    ]
-    assert [each[b"unit"].decode() for each in told.values()] == ["rad", "s", ""]
-    assert told["ball.friction"][b"description"] == b"Swept value of ball.friction [-]."
+    units = {name: schema.field(name).metadata[b"unit"].decode() for name in schema.names[1 : 1 + len(swept)]}
+    assert units == {
+        "task_end_arm_right_4_joint": "rad",
+        "task_duration_s": "s",
+        "ball_friction": "1",
+        "scene_gravity_mps2": "m/s^2",
+    }
+    assert schema.field("ball_friction").metadata[b"description"] == b"Swept value of ball.friction [-]."
+    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) for name in schema.names)
+
+
+def test_two_swept_keys_that_share_a_column_are_refused() -> None:
+    keys = ("task.end.upper_arm", "task.end.upper-arm")
+    with pytest.raises(ConfigError, match="have the same name: task_end_upper_arm"):
+        ThrowsTable(keys, Config())
 
 
 @pytest.mark.parametrize("column", ["digest", "trial", "landing_x_m"])
@@ -65,7 +74,7 @@ def test_a_task_with_a_result_named_like_another_column_is_refused(
         "Results", [(column, float, measured(Number("A number.")))], bases=(ThrowResult,), frozen=True
     )
     monkeypatch.setattr(ThrowTask, "results", results)
-    with pytest.raises(ConfigError, match=f"the task throw have columns of the same name as others .*: {column}"):
+    with pytest.raises(ConfigError, match=f"table of throws of the task throw have the same name: {column}"):
         ThrowsTable((), Config())
 
 

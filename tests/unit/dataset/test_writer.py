@@ -131,7 +131,7 @@ def test_rows_hold_the_results_of_throws_and_columns_have_descriptions(collectio
     table = pq.read_table(dataset / "throws.parquet")
     result = collection.result(collection.episode(2))
     row = table.to_pylist()[2]
-    assert row["task.duration_s"] == collection.plan.trials[2].values["task.duration_s"]
+    assert row["task_duration_s"] == collection.plan.trials[2].values["task.duration_s"]
     for name in ("release", "apex", "landing"):
         ball = getattr(result, name)
         assert row[f"{name}_time_s"] == ball.time_s

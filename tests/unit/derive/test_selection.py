@@ -103,7 +103,7 @@ def test_a_merged_dataset_sweeps_the_keys_that_any_source_sweeps_or_that_differ(
     card = (tmp_path / "all" / "README.md").read_text()
     assert f"| other | {tmp_path / 'other'} | 2 | 2 | {digest(tmp_path / 'other')} |" in card
     # A derived dataset can be the source of another one.
-    filter_trials(tmp_path / "all", tmp_path / "light", where="ball.mass_kg < 0.04")
+    filter_trials(tmp_path / "all", tmp_path / "light", where="ball_mass_kg < 0.04")
     assert verify(tmp_path / "light") == []
     assert [number for _, number in sources(tmp_path / "light")] == [7, 8]
 

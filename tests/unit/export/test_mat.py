@@ -123,7 +123,7 @@ def test_a_fitted_dmp_moves_as_commanded_up_to_its_error(exported: Export, sourc
 def test_a_dmp_of_the_configuration_is_exported_with_its_own_weights(make_collection: Any, tmp_path: Path) -> None:
     dataset = make_collection(OF_A_DMP).collect(tmp_path / "dataset")
     export(dataset, tmp_path / "out", to="mat")
-    swept = table_of(dataset)["task.trajectory.weights.arm_right_4_joint.5"]
+    swept = table_of(dataset)["task_trajectory_weights_arm_right_4_joint_5"]
     assert Dataset.open(dataset).config.task.trajectory.family == "dmp"
     for trial, (throws, number) in open_recordings(tmp_path / "out", dataset).items():
         dmp, path = throws["DMP"][0, number][0, 0], throws["qPath"][0, number]
@@ -140,7 +140,7 @@ def test_the_exported_table_has_all_trials_with_units(exported: Export, source: 
     throws, units = contents["throws"][0, 0], contents["units"][0, 0]
     assert contents["digest_of_dataset"][0] == info(source).digest
     for name, values in table_of(source).items():
-        column = throws[name.replace(".", "_")][:, 0]
+        column = throws[name][:, 0]
         if column.dtype == object:
             assert [str(cell[0]) if cell.size else "" for cell in column] == [value or "" for value in values]
         else:

@@ -15,6 +15,7 @@ import pytest
 from tests.unit.learning.worlds import DRAG, KEYS, TARGETS, draw, land, make_dataset
 
 from throwcollect import ConfigError, DatasetError, Model, fit, load_model
+from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_card import PROGRAM
 from throwcollect.learning.model_directory import read_score, write_score
@@ -62,7 +63,7 @@ def test_a_model_can_be_learned_from_throws_that_end_close_together(dataset: Dat
         near = change(near, column, [1.0 + 1e-5 * ((7 * k + number) % COUNT) for k in range(COUNT)])
     model = fit(near)
     assert model.targets == TARGETS
-    points = [{key: near.throws[key][k].as_py() for key in KEYS} for k in range(3)]
+    points = [{key: near.throws[column_of(key)][k].as_py() for key in KEYS} for k in range(3)]
     assert model.predict(points) == pytest.approx(np.full((3, 2), 1.0 + 5e-6 * COUNT), abs=5e-3)
 
 
@@ -176,7 +177,7 @@ def test_fit_leaves_out_throws_that_did_not_land(dataset: Dataset) -> None:
 
 
 def test_a_constant_parameter_is_left_out_or_refused_by_name(dataset: Dataset) -> None:
-    constant = change(dataset, KEYS[2], [0.1] * COUNT)
+    constant = change(dataset, column_of(KEYS[2]), [0.1] * COUNT)
     assert KEYS[2] not in fit(constant).parameters
     with pytest.raises(ConfigError, match=r"torso_1_joint has the value 0\.1 in all throws"):
         fit(constant, parameters=KEYS)
@@ -338,7 +339,7 @@ def test_loading_a_damaged_model_is_an_error_that_names_the_file(
     assert caught.value.path == path
 
 
-@pytest.mark.parametrize("targets", [["landing_x_m", "effort_peak_share"], [KEYS[0]]])
+@pytest.mark.parametrize("targets", [["landing_x_m", "effort_peak_share"], [column_of(KEYS[0])]])
 def test_a_target_that_is_also_an_effort_or_key_column_survives_saving(
     dataset: Dataset, tmp_path: Path, targets: list[str]
 ) -> None:

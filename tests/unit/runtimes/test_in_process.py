@@ -66,7 +66,7 @@ def test_an_inprocess_run_gives_the_throws_of_a_simulator(yaml: Path) -> None:
     assert (summary.episodes, summary.digest) == (3, digest(yaml.parent / "data"))
     with Simulator(yaml) as simulator:
         for throw in load(yaml.parent / "data"):
-            again = simulator.throw({"task.duration_s": throw.row["task.duration_s"]}, trial=throw.trial)
+            again = simulator.throw({"task.duration_s": throw.row["task_duration_s"]}, trial=throw.trial)
             assert throw.row["digest"] == again.row["digest"]
     assert onlooker.reports[-1].ended == 3
     assert onlooker.warnings == []

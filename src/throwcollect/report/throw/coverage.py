@@ -10,6 +10,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
+from throwcollect.config.values import column_of
 from throwcollect.report.plotted_points import read_numbers
 from throwcollect.report.throw.landings import Landings
 
@@ -81,7 +82,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
     else:
         if target.height_m is not None:
             # The column has the heights of all trials, but only trials with landings matter here.
-            values["height_m"] = read_numbers(throws, LANDING_HEIGHT)[landings.trial]
+            values["height_m"] = read_numbers(throws, column_of(LANDING_HEIGHT))[landings.trial]
         bins = target.dimensions
         values = {name: column for name, column in values.items() if name in bins}
         edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}

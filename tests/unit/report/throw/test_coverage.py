@@ -24,7 +24,7 @@ def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
             "hit_angle_rad": {"min": 0, "max": 1, "bins": 1},
         }
     )
-    throws = pa.table({"scene.landing_height_m": [0.2, 0.7, 1.0, 0.1]})
+    throws = pa.table({"scene_landing_height_m": [0.2, 0.7, 1.0, 0.1]})
     found = count_throws(make_landings([1.2, 1.2, 2.0, 2.1], [0.5, 0.5, 1.0, 0.5]), throws, target=target)
     assert found is not None
     assert found.counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height
