@@ -316,7 +316,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
 
 def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
     """Print which targets are out of reach, and why; only count those beyond the first `_MOST_PRINTED`."""
-    from throwcollect.learning.reach import explain_reach
+    from throwcollect.learning.aiming import explain_reach
 
     far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]
     for number, aim in far[:_MOST_PRINTED]:

@@ -12,11 +12,11 @@ from pydantic import ValidationError
 
 from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory, read_text, write_file
+from throwcollect.learning.distilling import ONNX, encode_onnx
 from throwcollect.learning.fitting import EFFORT
 from throwcollect.learning.learned_map import LearnedMap
 from throwcollect.learning.model_card import describe_model
 from throwcollect.learning.model_file import MODEL, ModelFile, read_model_file
-from throwcollect.learning.onnx_file import ONNX, encode_onnx
 from throwcollect.learning.score import Score
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 

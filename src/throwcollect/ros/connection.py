@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rclzenoh.domain import DOMAIN_VARIABLE
-from rclzenoh.session_config import OVERRIDE_VARIABLE, PROTECTED, Key, client_override
+from rclzenoh.session_config import DOMAIN_VARIABLE, OVERRIDE_VARIABLE, PROTECTED, Key, client_override
 from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import KEY_VARIABLE, RunKey

@@ -7,9 +7,8 @@ import socket
 
 import zenoh
 
-from rclzenoh.domain import domain_of_environment
 from rclzenoh.health import node_answers
-from rclzenoh.session_config import OPEN, connect_endpoint, environment_config
+from rclzenoh.session_config import OPEN, connect_endpoint, domain_of_environment, environment_config
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import is_beating
 from throwcollect.ros.middleware import Middleware

@@ -15,8 +15,8 @@ from throwcollect.dataset.provenance import read_provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.contents import Panel, ReportSection, Table
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.page import render_page
 from throwcollect.report.sections import Report, report_dataset
+from throwcollect.report.write import render_page
 
 SECTIONS = [
     "landing",

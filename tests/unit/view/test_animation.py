@@ -12,8 +12,7 @@ from PIL import Image
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
-from throwcollect.view.animation import Animation, render
-from throwcollect.view.camera import camera_on
+from throwcollect.view.animation import Animation, camera_on, render
 
 
 def picture(path: Path, number: int) -> NDArray[np.int_]:
