@@ -1,3 +1,5 @@
+"""Samples of exported throws at another rate."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Groups of failures in a report."""
+
 from __future__ import annotations
 
 from throwcollect.report.sections import FailureGroup, group_failures

@@ -1,3 +1,5 @@
+"""The page of a report: its sections, and text that is never markup."""
+
 from __future__ import annotations
 
 import re
