@@ -321,7 +321,7 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.engine_clock.SILENCE_S", 3.0)
+    monkeypatch.setattr("throwcollect.runtimes.docker.watch.SILENCE_S", 3.0)
     runtime = bare(through=connect())
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.logs.tail(ROUTER) != "")

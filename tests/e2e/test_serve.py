@@ -31,7 +31,7 @@ from throwcollect.ros.srv import GetParameters
 from throwcollect.run_key import RunKey
 from throwcollect.runs.records import Records
 from throwcollect.serve.finding import find_server, make_page_address
-from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
+from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e

@@ -14,7 +14,6 @@ from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.plotted_points import MOST_POINTS
 from throwcollect.report.throw import throw_figures
-from throwcollect.report.throw.coverage import Coverage, count_throws
 from throwcollect.report.throw.episodes import (
     BallPath,
     JointMotion,
@@ -24,7 +23,7 @@ from throwcollect.report.throw.episodes import (
     read_motion,
     read_paths,
 )
-from throwcollect.report.throw.landings import Landings, read_landings
+from throwcollect.report.throw.landings import Coverage, Landings, count_throws, read_landings
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 from throwcollect.wording import format_count

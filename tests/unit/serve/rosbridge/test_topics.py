@@ -16,8 +16,8 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
-from throwcollect.serve.rosbridge import Bridge, subscriptions
-from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscriptionRequest
+from throwcollect.serve.rosbridge import Bridge, topics
+from throwcollect.serve.rosbridge.topics import RateLimit, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -117,7 +117,7 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
 
 def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
-    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(topics, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
     sent: list[float] = []
     pace = RateLimit(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
