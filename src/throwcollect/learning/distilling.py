@@ -47,14 +47,6 @@ class DistilledMap:
     high: Vector
     polynomial: Polynomial
 
-    def has_shape(self, targets: int, context: int, parameters: int) -> bool:
-        """Whether ranges and polynomial fit these numbers of targets, of keys that are given, and of parameters."""
-        return (
-            len(self.low) == len(self.high) == targets
-            and bool((self.low < self.high).all())
-            and self.polynomial.has_shape(targets + context, parameters)
-        )
-
     def aim(self, targets: Array, context: Array) -> Array:
         """Scaled parameters for targets, clipped to their ranges, shape ``(n, n_parameters)``.
 

@@ -14,14 +14,9 @@ from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
-from throwcollect.serve.sockets import FULL, NOT_FOUND, close, refuse, refuse_ended, wait_for_end
+from throwcollect.serve.sockets import NOT_FOUND, close, refuse, refuse_ended, wait_for_end
 
-_MOST_CLIENTS = 16
 _LOOK_S = 0.5
-
-
-class FullError(ConflictError):
-    """The largest number of clients is connected."""
 
 
 @dataclass
@@ -39,13 +34,7 @@ class Bridges:
 
     @asynccontextmanager
     async def bridge(self, run: Run) -> AsyncIterator[Bridge]:
-        """The bridge of a run, for one more client.
-
-        Raises:
-            FullError: If the clients of all runs together have reached their largest number.
-        """
-        if sum(each.clients for each in self._shared.values()) >= _MOST_CLIENTS:
-            raise FullError(f"{_MOST_CLIENTS} clients are connected by rosbridge, which is the limit")
+        """The bridge of a run, for one more client."""
         if (shared := self._shared.get(run.id)) is None:
             run.record.middleware.joining.settle()
             bridge = Bridge(run.connection)
@@ -96,7 +85,7 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
             run = await asyncio.to_thread(find_run)
             bridge = await stack.enter_async_context(bridges.bridge(run))
         except ThrowcollectError as error:
-            await refuse(socket, FULL if isinstance(error, FullError) else NOT_FOUND, error.message)
+            await refuse(socket, NOT_FOUND, error.message)
             return
         ending = asyncio.create_task(_close_at_end(socket, run))
         stack.callback(ending.cancel)

@@ -19,8 +19,6 @@ NOT_FOUND = 4404
 """Close code of a socket to something that does not exist."""
 MAY_NOT = 4403
 """Close code of a socket that would change something, if the client's token allows only looking."""
-FULL = 1013
-"""Close code of a socket beyond the largest number; a later attempt may succeed."""
 FAILED = 4503
 """Close code of a socket to something that does not answer."""
 BROKEN = 1011

@@ -246,7 +246,6 @@ def test_adapting_refuses_places_in_another_unit(model: Model, factor: float) ->
     ("file", "change", "message"),
     [
         ("model.json", lambda text: text[:100], "Invalid JSON"),
-        ("model.json", lambda text: text.replace('"bias": [', '"bias": [1.0,'), "do not belong together"),
         ("model.json", lambda text: text.replace('"format": "1"', '"format": "2"'), "format"),
         ("model.json", lambda text: re.sub(r'"folds_error": {[^}]*}', '"folds_error": {}', text), "folds_error"),
         ("points.parquet", lambda _: "PAR1", "is damaged"),
