@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
+from throwcollect.config.values import column_of
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.data_card import data_card
@@ -172,7 +173,8 @@ def _write_shard(path: Path, episodes: Iterable[Episode], channels: Channels) ->
 def _make_row(plan: Plan, number: int, row: Row) -> Row:
     """Make the row of a copy: keys that its source does not sweep, but the new plan does, are columns here, too."""
     trial = plan.trial(number)
-    return {**row, **trial.values, **trial.target, "trial": number}
+    values = {column_of(key): value for key, value in trial.values.items()}
+    return {**row, **values, **trial.target, "trial": number}
 
 
 def _tabulate_sources(copies: Sequence[Copy], sources: Sequence[Dataset]) -> pa.Table:
