@@ -46,13 +46,11 @@ class Key:
         effect: What the value has an effect on.
         swept: Whether a sweep may vary the value from trial to trial, if it is a number that may have decimals.
         operator: Whether only the operator of a server sets the value, as it names files or resources of its machine.
-        grows: Whether the value may change when the collection of a dataset goes on, to add more trials.
     """
 
     effect: Effect | None = None
     swept: bool | None = None
     operator: bool | None = None
-    grows: bool | None = None
 
     @property
     def determines_samples(self) -> bool:

@@ -201,11 +201,11 @@ class Config(Section):
     """Name of the collection and of its files."""
     seed: Annotated[int, Field(ge=0, lt=2**32), Key(Effect.PLAN)] = 0
     """Root of all randomness."""
-    trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN, grows=True)] = None
+    trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN)] = None
     """Number of trials; with `until`, their largest number. Null takes all points of `grid` and `list`, and with
     `until` ten trials for each throw that should land."""
-    until: Annotated[AnyUntil | None, Key(Effect.PLAN, grows=True)] = None
-    """Collects until enough throws have landed, or `trials` are used up."""
+    until: Annotated[AnyUntil | None, Key(Effect.PLAN)] = None
+    """Ends the dataset with the trial at which enough throws have landed, or when `trials` are used up."""
     robot: Annotated[RobotConfig, Key(Effect.PHYSICS)] = RobotConfig()
     """The robot."""
     tool: Annotated[AnyTool, Key(Effect.PHYSICS)] = load_member("tools", "spoon")()
@@ -273,11 +273,6 @@ class Config(Section):
                 continue
             for joint in unknown:
                 yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
-
-    @property
-    def grows(self) -> bool:
-        """Whether trials are added to the plan while it is collected."""
-        return self.until is not None or self.sweep.target is not None
 
     def without_run(self) -> Config:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from contextlib import closing, suppress
 from dataclasses import replace
@@ -12,7 +13,7 @@ import numpy as np
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
-from throwcollect.config.values import differences, leaves
+from throwcollect.config.values import differences
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.prepare import (
     check_room,
@@ -41,7 +42,7 @@ from throwcollect.robots.description import is_available
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.result import LOST, Result
+from throwcollect.tasks.result import LOST, REFUSED, Result
 from throwcollect.wording import command
 
 _NO_EPISODE = "no whole episode of it was left"
@@ -87,8 +88,8 @@ def resume(
         damaged = _find_damaged(directory, onlooker)
         # The list may be read and written below, and a link in its place could lead to any file of the user.
         check_regular(directory / TRIALS)
-        if old is not None and ((PLAN in damaged and not config.grows) or find_wrong_trials(old)):
-            # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
+        # With `until`, the plan of a finished dataset ends where that does, and is not drawn to the same end.
+        if old is not None and (PLAN in damaged or find_wrong_trials(old)):
             old = None
         plan, listed = _make_plan(config, directory, sweep_directory, old, damaged, processes, onlooker)
         # The dataset may be finished only by its earlier configuration, or by files that are gone.
@@ -127,8 +128,27 @@ def finish_without_simulating(
         row = rows.get(episode.header.trial)
         return table.result(row) if row and row["digest"] == episode.digest else judge_episode(config, episode)
 
+    there: list[int] = []
+    wanted = math.inf if plan.config.until is None else plan.config.until.wanted
+
+    def keep(trial: int, result: Result) -> bool:
+        """Note an episode; with `until`, drop those that follow the last trial that is wanted."""
+        nonlocal wanted
+        if wanted <= 0:
+            return False
+        there.append(trial)
+        wanted -= result.outcome.value == plan.config.task.success
+        return True
+
     with closing(DatasetWriter.open(directory, channels=_read_channels(directory, plan))) as writer:
-        writer.recover(judge=judge)
+        writer.recover(keep, judge=judge)
+        if plan.config.until is not None:
+            # Where the dataset ends without the missing trials is not known, so it ends with the last known one.
+            last = max([*there, *([] if wanted <= 0 else rows)], default=plan.trials.first)
+            for trial in writer.list_missing():
+                if (row := rows.get(trial)) and row["outcome"] == REFUSED:
+                    writer.refuse(trial, row["reason"])
+            writer.end_with(last)
         for trial in writer.list_missing():
             row = rows.get(trial)
             writer.append_lost(trial, row["reason"] if row and row["outcome"] == LOST else _NO_EPISODE)
@@ -299,11 +319,10 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     """Refuse a configuration that differs from the stored one, with which a dataset was begun."""
     changed = differences(stored.without_run(), config.without_run())
-    may_grow = {leaf.name for config in (stored, config) for leaf in leaves(config) if leaf.key.grows}
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key not in may_grow or not _is_growth(before, after, config)
+        if not (key == "trials" or key.startswith("until.")) or not _is_growth(before, after, config)
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
@@ -314,25 +333,28 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
 
 def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials may replace an earlier one; None stands for no limit."""
-    if not config.grows:
-        # `_extend` compares the trials of a plan that does not grow.
+    if config.until is None:
+        # `_extend` compares the trials.
         return True
     return after is None or (before is not None and after >= before)
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
-    """Check that the new plan begins with the trials of the old one, and keep those that results have added."""
+    """Check that the new plan begins with the trials of the old one."""
     if old is None:
         return new
     count = min(len(old.trials), len(new.trials))
-    if count < len(old.trials) and not new.config.grows:
+    if count < len(old.trials) and new.config.until is None:
         raise ConfigError(
             [Problem(f"{directory} has {len(old.trials)} already, got {count}", key="trials")],
             expected=f"{len(old.trials)} or more",
             hint="throwcollect dataset sample takes some of them into a new dataset",
         )
     before, after = old.trials[:count], new.trials[:count]
-    are_same = np.array_equal(before.digests, after.digests) and before.refused.keys() == after.refused.keys()
+    are_same = np.array_equal(before.digests, after.digests)
+    if new.config.until is None:
+        # Otherwise, the collection checks most of the trials.
+        are_same = are_same and before.refused.keys() == after.refused.keys()
     if new.config.sweep.file is not None and not (are_same and before.targets == after.targets):
         raise ConfigError(
             [Problem(f"the list begins with other trials or targets than {directory} has", key="sweep.file")],
@@ -344,9 +366,4 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
-    # Of a plan that grows, only the first rounds are drawn again. What results have added is kept.
-    if count < len(old.trials):
-        trials = new.trials[:]
-        trials.extend(old.trials[count:])
-        new = replace(new, trials=trials)
     return new

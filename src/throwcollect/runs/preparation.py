@@ -281,7 +281,7 @@ def _make_plan(request: RunRequest, directory: Path, onlooker: Onlooker) -> Plan
     from throwcollect.coordinator.prepare import prepare as prepare_plan
 
     config = request.config
-    if (config.trials or 0) >= MANY_TRIALS and not config.grows:
+    if (config.trials or 0) >= MANY_TRIALS and config.until is None:
         onlooker.say(
             f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms for each on one core"
         )

@@ -72,8 +72,3 @@ def test_operator_keys_are_found_in_sections_of_unions_and_optional_sections():
         maybe: Own | None = None
 
     assert list(values._find_operator_keys(Whole)) == ["part.table", "maybe.table"]
-
-
-def test_only_trials_and_until_can_make_a_plan_grow():
-    grows = Config.model_validate({"until": {"landed": 5}})
-    assert [leaf.name for leaf in leaves(grows) if leaf.key.grows] == ["trials", "until.landed"]

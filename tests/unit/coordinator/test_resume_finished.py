@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -37,7 +38,7 @@ class Trials:
         """Collect the missing trials; returns the trials that were kept."""
         kept: set[int] = set()
         writer = DatasetWriter.open(directory)
-        writer.recover(lambda trial, _: kept.add(trial))
+        writer.recover(lambda trial, _: kept.add(trial) is None)
         for trial in sorted(ALL - kept):
             writer.append(self.episodes[trial], self.results[trial])
         writer.finish(wall_s=1.0)
@@ -232,3 +233,21 @@ def test_resume_refuses_a_dataset_whose_configuration_was_changed(trials: Trials
     with pytest.raises(DatasetError, match=r"one of the two was changed, and nothing says which"):
         resume(other, dataset, sweep_directory=dataset)
     assert contents(dataset) == before
+
+
+@pytest.mark.parametrize(("name", "lost"), [("plan.parquet", []), ("throws.parquet", []), ("quick_00001.mcap", [3])])
+def test_finishing_without_simulating_ends_a_dataset_with_until_where_it_ended(
+    tmp_path: Path, name: str, lost: list[int]
+) -> None:
+    collection, directory = Collection({"until": {"landed": 4}}), tmp_path / "dataset"
+    create(directory, collection.plan)
+    with closing(DatasetWriter.open(directory)) as writer:
+        collection.fill(writer, range(4))
+        writer.end_with(3)
+        writer.finish()
+    before = contents(directory)
+    (directory / name).unlink()
+    finish_without_simulating(collection.config, directory, sweep_directory=directory)
+    rows = pq.read_table(directory / "throws.parquet").to_pylist()
+    assert [row["outcome"] for row in rows] == ["lost" if number in lost else "landed" for number in range(4)]
+    assert lost or contents(directory) == before

@@ -227,7 +227,7 @@ def test_a_shard_that_cannot_be_finished_on_a_full_disk_keeps_all_its_episodes_f
     writer.close()
     found: list[int] = []
     with closing(DatasetWriter.open(directory)) as successor:
-        assert successor.recover(lambda trial, _: found.append(trial)) == 3
+        assert successor.recover(lambda trial, _: found.append(trial) is None) == 3
     assert found == [0, 1, 2]
     assert (directory / "quick_00000.mcap").read_bytes() == (collected / "quick_00000.mcap").read_bytes()
 
