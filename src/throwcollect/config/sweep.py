@@ -118,11 +118,11 @@ class SweepConfig(Section):
     possibly targets.
 
     A relative path starts at the directory of the configuration file."""
-    feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
+    feasibility: Literal["actual", "nominal"] = "actual"
     """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which all keys of
     `tool`, `ball` and `robot` have their defaults, except `posture`, `locked` and `base_height_m`. Somebody who plans
     motions for a real robot knows only the nominal one."""
-    target: Annotated[TargetConfig | None, Key(later=True)] = None
+    target: TargetConfig | None = None
     """Cells of landings, in which reports count throws."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:

@@ -21,9 +21,16 @@ from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.interfaces.catalog import _JAZZY, DEFINITIONS
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.codec import encode, fragments, json_text, plain_values, read_frame
+from throwcollect.serve.rosbridge.codec import (
+    LONGEST_FRAME,
+    Reassembly,
+    encode,
+    fragments,
+    json_text,
+    plain_values,
+    read_frame,
+)
 from throwcollect.serve.rosbridge.feed import Sample
-from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME, Reassembly
 from throwcollect.serve.rosbridge.request import BridgeRequest
 
 

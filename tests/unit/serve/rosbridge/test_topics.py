@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import threading
 import time
@@ -17,8 +16,8 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
-from throwcollect.serve.rosbridge import Bridge, subscriptions
-from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscriptionRequest
+from throwcollect.serve.rosbridge import Bridge, topics
+from throwcollect.serve.rosbridge.topics import RateLimit, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -42,16 +41,6 @@ def words(node: Node, topic: str = "/words") -> Callable[..., None]:
 
 def data(party: Party) -> list[str]:
     return [each["msg"]["data"] for each in party.got() if each["op"] == "publish"]
-
-
-def test_each_late_client_hears_a_latched_topic(bridge: Bridge, party: Party, node: Node) -> None:
-    node.create_publisher(String, "/latched", LATCHED).publish(String(data="urdf"))
-    other = Party(bridge)
-    for each in (party, other):
-        wait_for(lambda party=each: "/latched" in party.call("rosapi/topics")["topics"])
-        each.ask(op="subscribe", topic="/latched")
-        assert each.next(op="publish")["msg"] == {"data": "urdf"}
-    other.client.close()
 
 
 def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
@@ -128,7 +117,7 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
 
 def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
-    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(topics, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
     sent: list[float] = []
     pace = RateLimit(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
@@ -142,17 +131,6 @@ def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pyte
         now = arrives
         pace.offer(sample)
     assert len(sent) == pytest.approx(1800, abs=60)
-
-
-def test_a_long_message_comes_in_fragments_of_the_requested_size(party: Party, node: Node) -> None:
-    say = words(node)
-    party.ask(op="subscribe", topic="/words", type="std_msgs/String", fragment_size=100)
-    say("ä" * 1000)
-    wait_for(lambda: [each for each in party.got() if each.get("num") == each.get("total", 0) - 1], "the last part")
-    parts = [each for each in party.got() if each["op"] == "fragment"]
-    assert {len(each["data"]) for each in parts[:-1]} == {100}
-    assert {(each["total"], each["id"]) for each in parts} == {(len(parts), parts[0]["id"])}
-    assert json.loads("".join(each["data"] for each in parts))["msg"] == {"data": "ä" * 1000}
 
 
 def test_messages_come_as_cbor_with_typed_arrays_or_as_raw_bytes(party: Party, node: Node) -> None:
