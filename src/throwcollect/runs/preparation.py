@@ -135,7 +135,7 @@ def resume(
     with reading_config(directory, file, overrides) as read:
         sweep_directory = directory if file is None else file.parent
         if not simulate:
-            from throwcollect.coordinator.resume import finish_without_simulating
+            from throwcollect.coordinator.salvage import finish_without_simulating
 
             finish_without_simulating(read, directory, sweep_directory=sweep_directory, onlooker=onlooker)
             return None
