@@ -141,7 +141,7 @@ FLOWS = {
             "services": Box(1.1, 2, "services", "simulation_interfaces:\ncontrol, entities, stepping"),
             "simulation": Box(2.4, 0.5, "simulation", "steps all of it"),
             "limb": Box(2.4, 1.6, "limb × 8", "controller and its joints"),
-            "world": Box(3.5, 0.5, "world", "rules of a trial,\nspawned bodies"),
+            "world": Box(3.5, 0.5, "world", "rules of a trial"),
             "control": Box(3.5, 1.6, "control", "arithmetic"),
             "engine": Box(4.5, 0.5, "engine", "physics"),
         },

@@ -24,7 +24,6 @@ EXTRA_OF = MappingProxyType(
         "cryptography": "collect",
         "pinocchio": "collect",
         "pybullet": "collect",
-        "re2": "collect",
         "scipy": "collect",
         "setproctitle": "collect",
         "xxhash": "collect",

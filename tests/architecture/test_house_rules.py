@@ -144,7 +144,6 @@ HARMLESS = {
     "engines/mujoco/scenery.py": {"@"},  # what is compared there
     "robots/clear_postures.py": {"np.linalg.norm", "@"},  # bounds, compared with room to spare
     "robots/description.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
-    "sim/spawnable.py": {"np.linalg.eigh", "@"},  # whether a model can be spawned
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
 }
 

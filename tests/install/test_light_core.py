@@ -216,7 +216,6 @@ except throwcollect.MissingExtraError as error:
         ("collect", ("ps",)),
         ("collect", ("ros", "topic", "list")),
         ("collect", ("router",)),
-        ("collect", ("dataset", "rebuild", "DATASET")),
         ("collect", ("dataset", "view", "DATASET", "out")),
         ("docker", ("image", "build")),
         ("report", ("dataset", "report", "DATASET")),

@@ -5,12 +5,8 @@ from collections.abc import Iterator
 import pytest
 
 from tests.integration.robot import Robot, running_simulation, swing
-from tests.unit.sim.bodies import box
 from throwcollect.config.schema import Config
-from throwcollect.ros import Context, get_message
-
-Features = get_message("simulation_interfaces/msg/SimulatorFeatures")
-Result = get_message("simulation_interfaces/msg/Result")
+from throwcollect.ros import Context
 
 
 @pytest.fixture(scope="module")
@@ -24,13 +20,3 @@ def kinematic(tmp_path_factory: pytest.TempPathFactory, endpoint: str, session: 
 def test_a_simulation_on_the_ballistic_engine_carries_out_goals(kinematic: Robot) -> None:
     assert kinematic.outcome(kinematic.send(swing(0.3)))[1] == 0
     assert kinematic.joint("arm_right_4_joint") == pytest.approx(-0.5, abs=1e-9)
-
-
-def test_spawning_is_refused_and_missing_in_the_features(kinematic: Robot) -> None:
-    features = kinematic.call("get_simulator_features").features
-    assert Features.SPAWNING not in features.features
-    assert Features.STEP_SIMULATION_ACTION in features.features
-    assert list(features.spawn_formats) == []
-    answer = kinematic.call("spawn_entity", name="crate", resource_string=box())
-    assert answer.result.result == Result.RESULT_FEATURE_UNSUPPORTED
-    assert "knows robot, ground and ball alone" in answer.result.error_message

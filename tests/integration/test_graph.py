@@ -31,17 +31,10 @@ CONTROL = [
     "SetSimulationState",
     "ResetSimulation",
     "StepSimulation",
-    "SpawnEntity",
-    "SpawnEntities",
-    "DeleteEntity",
     "GetEntities",
     "GetEntitiesStates",
     "GetEntityState",
     "SetEntityState",
-    "GetEntityInfo",
-    "SetEntityInfo",
-    "GetEntityBounds",
-    "GetSpawnables",
 ]
 PARAMETERS = [
     "DescribeParameters",

@@ -157,9 +157,6 @@ def test_controllers_of_a_leased_trial_cannot_be_set(leased: Robot) -> None:
         ("reset_simulation", {}),
         ("set_simulation_state", {"state": SimulationState(state=0)}),
         ("set_entity_state", {"entity": "ball"}),
-        ("delete_entity", {"entity": "ball"}),
-        ("spawn_entity", {"name": "box"}),
-        ("spawn_entities", {}),
     ],
 )
 def test_the_world_of_a_leased_trial_cannot_be_changed(service: str, fields: dict[str, Any], leased: Robot) -> None:

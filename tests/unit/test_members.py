@@ -183,7 +183,7 @@ def find_what_is_said(text: str, family: str, value: str, directory: Path, monke
             "broken:NUMBER",
             ": broken:NUMBER should be a class derived from throwcollect.engines.engine.Engin",
         ),
-        ("engines", "broken:Stopped", ": broken:Stopped lacks ball_boxes, configure, is_as_loaded, load, place_ball"),
+        ("engines", "broken:Stopped", ": broken:Stopped lacks configure, load, place_ball"),
         ("tasks", "broken:Aimless", ": broken:Aimless lacks until"),
     ],
 )

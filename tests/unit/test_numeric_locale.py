@@ -3,9 +3,9 @@
 import ctypes
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
-from tests.unit.sim.bodies import pendulum
 
 from throwcollect import Simulator
 from throwcollect.engines.body import Vector
@@ -30,8 +30,10 @@ def test_a_block_changes_how_c_reads_numbers_for_its_own_thread_alone(use_decima
 
 
 def test_the_renderer_draws_the_same_robot_with_a_decimal_comma(use_decimal_comma: Callable[[], str]) -> None:
+    urdf = (Path(__file__).parents[1] / "plugins" / "planar_arm" / "planar_arm.urdf").read_text(encoding="utf-8")
+
     def load() -> list[Vector]:
-        with Renderer(pendulum(), 1.0, 0.025, (1.0, 0.5, 0.0, 1.0)) as renderer:
+        with Renderer(urdf, 1.0, 0.025, (1.0, 0.5, 0.0, 1.0)) as renderer:
             return renderer.find_frames()
 
     usual = load()

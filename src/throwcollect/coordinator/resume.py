@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,21 +23,28 @@ from throwcollect.coordinator.prepare import (
     read_listed_points,
 )
 from throwcollect.dataset.configuration import read_config, unfitting_plan
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS, config_path
+from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_as_written, is_begun
+from throwcollect.dataset.manifest import entry_of, entry_of_file, find_damage, is_as_written, is_begun
+from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws_table import read_throws
-from throwcollect.dataset.verify import find_damage
-from throwcollect.dataset.verify_tables import find_wrong_trials
+from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws, read_throws_table
+from throwcollect.dataset.verify_tables import find_wrong_trials, read_list
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
+from throwcollect.robots.description import is_available
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.result import LOST
+from throwcollect.tasks.result import LOST, Result
 from throwcollect.wording import command
 
+_NO_EPISODE = "no whole episode of it was left"
 _MUCH_BYTES = 50_000_000
 """Size of recordings from which on the search is announced: a core takes a second to look through so many bytes."""
 
@@ -47,40 +55,39 @@ def resume(
     *,
     sweep_directory: Path,
     processes: int = 1,
-    check: bool = False,
     before_writing: Callable[[], object] = lambda: None,
     onlooker: Onlooker = SILENT,
 ) -> Plan:
     """Write a configuration and its plan into a dataset's directory; some of its trials may have run already.
 
-    A finished dataset of which a file is missing or damaged counts as unfinished from then on.
+    The files of a finished dataset are compared byte for byte with its manifest. If one is missing or damaged, the
+    dataset counts as unfinished from then on.
 
     Args:
         config: The configuration to go on with. It may differ in how it is run, and have more trials.
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
         processes: How many processes may check the trials of a large plan, as for `draw_plan`.
-        check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
         before_writing: Is called before anything is written, unless every trial has ended; what it raises leaves the
             dataset as it is.
         onlooker: Is warned of what is missing or damaged in a finished dataset, and told how much there is to look
             through.
     """
     with hold_lock(directory):
+        if is_there(directory / SOURCES):
+            raise DatasetError(
+                "was derived from other datasets, so nothing is collected into it",
+                path=directory,
+                hint="derive it again if it is damaged",
+            )
         stored = _read_stored_config(directory)
         if stored is not None:
             refuse_changes(directory, stored, make_self_contained(config))
         old = _read_stored_plan(directory, stored, make_self_contained(config))
-        damaged = _find_damaged(directory, old, check=check, onlooker=onlooker)
+        damaged = _find_damaged(directory, onlooker)
         # The list may be read and written below, and a link in its place could lead to any file of the user.
         check_regular(directory / TRIALS)
-        # A configuration from another directory names a list of its own, from which the damaged one is made again.
-        if TRIALS in damaged and sweep_directory.samefile(directory):
-            raise DatasetError(
-                f"{directory / TRIALS}: is missing or damaged, and nothing else holds the list of trials",
-                hint=f"{command('up', 'CONFIG', '--resume', directory)}, with the file that sweep.file of CONFIG names",
-            )
-        if old is not None and PLAN in damaged and (not config.grows or find_wrong_trials(old)):
+        if old is not None and ((PLAN in damaged and not config.grows) or find_wrong_trials(old)):
             # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
             old = None
         plan, listed = _make_plan(config, directory, sweep_directory, old, damaged, processes, onlooker)
@@ -94,9 +101,46 @@ def resume(
             write_file(directory / TRIALS, encode_points(listed))
         if changes:
             remove(directory / METADATA)
-        _write(plan, directory, stored, old, replan=PLAN in damaged, ended=ended)
+        _write(plan, directory, stored, ended=ended)
         _announce_search(directory, onlooker)
         return plan
+
+
+def finish_without_simulating(
+    config: Config, directory: Path, *, sweep_directory: Path, onlooker: Onlooker = SILENT
+) -> None:
+    """Finish a dataset with the episodes that are whole, and give all other trials up as lost; else as `resume`.
+
+    An episode that the table of throws has keeps its result there, so neither the robot nor an engine is needed. A
+    finished dataset of which nothing is missing or damaged stays as it is.
+    """
+    plan = resume(config, directory, sweep_directory=sweep_directory, onlooker=onlooker)
+    if is_there(directory / METADATA):
+        onlooker.say(f"{directory}: is finished, and no file of it is missing or damaged")
+        return
+    table, provenance = ThrowsTable.of(plan), read_provenance(directory)
+    rows: Mapping[int, Row] = {}
+    with suppress(DatasetError):
+        rows = RowsByTrial(read_throws_table(directory / THROWS, plan))
+
+    def judge(config: Config, episode: Episode) -> Result:
+        row = rows.get(episode.header.trial)
+        return table.result(row) if row and row["digest"] == episode.digest else judge_episode(config, episode)
+
+    with closing(DatasetWriter.open(directory, channels=_read_channels(directory, plan))) as writer:
+        writer.recover(judge=judge)
+        for trial in writer.list_missing():
+            row = rows.get(trial)
+            writer.append_lost(trial, row["reason"] if row and row["outcome"] == LOST else _NO_EPISODE)
+        writer.finish(provenance=provenance)
+
+
+def _read_channels(directory: Path, plan: Plan) -> Channels | None:
+    """Read what is recorded where the robot is not installed, from the first recording that describes it; else None."""
+    for path in sorted(directory.glob(f"*{SHARD_SUFFIX}*")) if not is_available(plan.config) else ():
+        with suppress(DatasetError), open_mcap(path) as contents:
+            return Channels(plan.config, contents.read_robot_description())
+    return None
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
@@ -124,12 +168,12 @@ def _make_plan(
     own_list = given.sweep.file is not None and sweep_directory.samefile(directory)
     if (
         old is not None
-        and TRIALS not in damaged
         and old.config.without_run() == config.without_run()
         and (given.sweep.file is None or own_list or _has_list(directory, given, sweep_directory))
     ):
         # The digest of the plan also depends on the order of keys, which may have been changed in the file.
-        return replace(old, config=old.config.run_as(config)), None
+        lost_list = own_list and (TRIALS in damaged or not _has_own_list(directory, old))
+        return replace(old, config=old.config.run_as(config)), old.trials.points if lost_list else None
     check_room(directory, count_before(given))
     try:
         drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
@@ -142,25 +186,44 @@ def _make_plan(
     return plan, read_listed_points(given, directory=sweep_directory)
 
 
+def _has_own_list(directory: Path, plan: Plan) -> bool:
+    """Whether the list of trials in a dataset is that of its plan."""
+    try:
+        read_list(directory, plan)
+    except DatasetError:
+        return False
+    return True
+
+
 def _has_list(directory: Path, config: Config, elsewhere: Path) -> bool:
     """Whether a dataset has the list of trials that a configuration names, which may have more rows by now."""
-    path = directory / TRIALS
-    return is_there(path) and read_points(path, config) == read_listed_points(config, directory=elsewhere)
+    try:
+        return read_points(directory / TRIALS, config) == read_listed_points(config, directory=elsewhere)
+    except ConfigError:
+        return False
 
 
-def _write(plan: Plan, directory: Path, stored: Config | None, old: Plan | None, *, replan: bool, ended: bool) -> None:
+def _write(plan: Plan, directory: Path, stored: Config | None, *, ended: bool) -> None:
     """Write configuration and plan if they differ from the stored ones, or the plan is damaged."""
     # A finished dataset stays as it is, without the keys that say how it is run.
     kept = plan.config.without_run() if ended else plan.config
-    replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
+    replanned = not _has_contents(directory / PLAN, plan.encode())
     if stored != kept:
         if replanned:
             # Were this process killed here, the plan must not lie beside another configuration. If it is empty, it is
             # made again, and the directory still holds a dataset.
             write_file(directory / PLAN, b"")
         write_file(directory / CONFIG, dump_yaml(kept).encode())
-    if replanned or replan:
+    if replanned:
         plan.write(directory / PLAN)
+
+
+def _has_contents(path: Path, contents: bytes) -> bool:
+    """Whether a file is there and holds these bytes."""
+    try:
+        return entry_of_file(path) == entry_of(path.name, contents)
+    except DatasetError:
+        return False
 
 
 def _announce_search(directory: Path, onlooker: Onlooker) -> None:
@@ -172,11 +235,11 @@ def _announce_search(directory: Path, onlooker: Onlooker) -> None:
         onlooker.say(f"{directory}: looks through {size / 1e6:.0f} MB of recordings first; whole episodes stay")
 
 
-def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, onlooker: Onlooker) -> frozenset[str]:
+def _find_damaged(directory: Path, onlooker: Onlooker) -> frozenset[str]:
     """Find the names of files of a finished dataset that are missing or damaged; none if it is not finished."""
     if not is_there(directory / METADATA):
         return frozenset()
-    findings = find_damage(directory, plan, in_full=check)
+    findings = find_damage(directory, in_full=True)
     for finding in findings:
         onlooker.warn(f"{directory}: {finding}")
     if any(finding.file == SOURCES for finding in findings):
@@ -202,7 +265,7 @@ def is_complete(directory: Path) -> bool:
     """Whether a directory holds a dataset in which nothing is left to collect, and no file of it is missing."""
     try:
         plan = Plan.read(directory / PLAN, read_config(directory))
-        return has_all_trials(directory, plan) and not find_damage(directory, plan, in_full=False)
+        return has_all_trials(directory, plan) and not find_damage(directory, in_full=False)
     except (ConfigError, DatasetError):
         return False
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from throwcollect.config.loader import load
+from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, SOURCES, config_path, has_files
-from throwcollect.dataset.manifest import was_changed
+from throwcollect.dataset.directory import CONFIG, PLAN, SOURCES, config_path, describe_other, has_files
+from throwcollect.dataset.manifest import is_begun, was_changed
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
-from throwcollect.files import is_there
+from throwcollect.files import is_there, refuse_pointers
 from throwcollect.wording import command
 
 
@@ -20,6 +22,31 @@ def read_config(directory: Path) -> Config:
     except ConfigError as error:
         refuse_damaged_config(directory, error)
         raise
+
+
+@contextmanager
+def reading_config(directory: Path, file: Path | None = None, overrides: Sequence[str] = ()) -> Iterator[Config]:
+    """Read the configuration by which a dataset goes on, its own or that of a file, whose places errors name.
+
+    The overrides are ``key=value`` pairs, as ``--set`` takes them.
+    """
+    if not is_begun(directory):
+        refuse_lost_config(directory)
+        raise ConfigError(
+            f"{directory}: {describe_other(directory)}", expected="a directory that throwcollect up has made"
+        )
+    refuse_pointers(directory)
+    with ExitStack() as places:
+        try:
+            config = places.enter_context(load_locating_errors(file or config_path(directory), overrides))
+        except ConfigError as error:
+            # A problem without a place in a file is a problem of the overrides, which another file would not solve.
+            if file or all(problem.path is None for problem in error.problems):
+                raise
+            refuse_damaged_config(directory, error)
+            hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
+            raise ConfigError(error.problems, hint=hint) from error
+        yield config
 
 
 def unfitting_plan(error: ForeignPlanError) -> ForeignPlanError:

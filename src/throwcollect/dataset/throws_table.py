@@ -15,9 +15,10 @@ from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.config.target_columns import TARGET_PREFIX, is_target
 from throwcollect.config.values import column_of
-from throwcollect.dataset.directory import THROWS, list_shards
+from throwcollect.dataset.directory import SOURCES, THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import is_there
 from throwcollect.members import explain_failure
 from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
@@ -98,7 +99,6 @@ class ThrowsTable:
 
     Attributes:
         schema: Columns with their types and descriptions.
-        later: Names of the columns that datasets of earlier versions lack.
 
     The parameters are the swept keys, and the targets columns of targets, in their order.
 
@@ -114,7 +114,6 @@ class ThrowsTable:
         self._outcomes = task.outcomes
         with explain_failure("tasks", config.task.name, "declare its results"):
             self._columns = task.columns
-        self.later = frozenset(each.name for each in self._columns.columns if each.later)
         self.schema = pa.schema(
             [
                 make_field("trial", pa.int64(), "Number of the trial."),
@@ -166,14 +165,8 @@ class ThrowsTable:
 
 
 def read_throws_table(path: Path, plan: Plan) -> pa.Table:
-    """Read a table of throws with the columns of a plan, whatever trials its rows are of.
-
-    The table of an earlier version lacks the columns that came later.
-    """
-    table = read_parquet(path)
-    expected = ThrowsTable.of(plan)
-    lacking = expected.later - set(table.schema.names)
-    schema = pa.schema([field for field in expected.schema if field.name not in lacking])
+    """Read a table of throws with the columns of a plan, whatever trials its rows are of."""
+    table, schema = read_parquet(path), ThrowsTable.of(plan).schema
     # Metadata are not compared: descriptions of columns may have been worded otherwise when the table was written.
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
@@ -209,10 +202,14 @@ class RowsByTrial(Mapping[int, Row]):
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:
-    """Read the table of throws of a dataset, whose rows are the trials of its plan in order."""
+    """Read the table of throws of a dataset: the trials of its plan in order, or some of them if it was derived."""
     path = directory / THROWS
     table = read_throws_table(path, plan)
-    if table["trial"].to_pylist() != list(plan.trials.numbers):
+    numbers, planned = table["trial"].to_pylist(), plan.trials.numbers
+    if is_there(directory / SOURCES):
+        if numbers != sorted({number for number in numbers if number in planned}):
+            raise DatasetError("its rows are not trials of the plan in order", path=path)
+    elif numbers != list(planned):
         raise DatasetError(f"its rows are not the {len(plan.trials)} trials of the plan in order", path=path)
     if problem := _explain_unusable(table, plan):
         raise DatasetError(problem, path=path)

@@ -131,7 +131,9 @@ def read_trajectories(
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 
     def read(block: Sequence[StoredThrow], start: int, stop: int) -> None:
-        fill({name: column[start:stop] for name, column in found.items()}, block, read_stored_rows(block), joints)
+        throws = [(place.start_ns, place.samples) for place in block]
+        parts = {name: column[start:stop] for name, column in found.items()}
+        fill(parts, throws, read_stored_rows(block), block[0].joints, joints)
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:

@@ -165,8 +165,7 @@ def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> I
             f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_NAMED]
         )
         more = f"; {len(wrong) - _MOST_NAMED} more columns differ" if len(wrong) > _MOST_NAMED else ""
-        hint = "; to judge it again: throwcollect dataset rebuild" if "outcome" in wrong else ""
-        yield f"throws.parquet has {told}{more}{hint}"
+        yield f"throws.parquet has {told}{more}"
 
 
 def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str]:

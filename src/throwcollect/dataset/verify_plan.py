@@ -42,7 +42,8 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
     an episode that it had when they were drawn. If the rows of the table of throws are not known, only what depends on
     no result is drawn again. A plan that cannot be drawn here (see `can_draw`) is not compared.
     """
-    if not can_draw(plan.config):
+    # The trials of a joined plan have the seeds of the plans that it joins.
+    if plan.joined or not can_draw(plan.config):
         return
     try:
         drawing = _draw_rounds(plan, rows) if plan.config.grows else _draw(directory, plan)

@@ -19,11 +19,19 @@ from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes, data_card
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, THROWS
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN
 from throwcollect.dataset.journal import Event, Journal, was_open
+from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import LeftOfShard, RecoveredEpisode, find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import (
+    Judge,
+    LeftOfShard,
+    RecoveredEpisode,
+    find_left,
+    recover_shard,
+    remove_unfinished,
+)
 from throwcollect.dataset.row_store import EpisodeRows, RowStore
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.shard_layout import ShardLayout
@@ -88,7 +96,7 @@ class DatasetWriter:
         return self._layout.plan
 
     @classmethod
-    def open(cls, directory: Path) -> DatasetWriter:
+    def open(cls, directory: Path, *, channels: Channels | None = None) -> DatasetWriter:
         """Open a dataset to collect into, and keep all others from doing so; call `recover` next."""
         for name in (CONFIG, PLAN):
             if not (directory / name).is_file():
@@ -99,30 +107,31 @@ class DatasetWriter:
             journal = held.enter_context(closing(Journal(directory)))
             plan = Plan.read(directory / PLAN, read_config(directory))
             plan.take_in_rounds(directory / PLAN)
-            writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
+            writer = cls(directory, plan, journal=journal, growing=plan.config.grows, channels=channels)
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, tell: Tell = lambda *_: None, *, processes: int = 1) -> int:
+    def recover(self, tell: Tell = lambda *_: None, *, judge: Judge = judge_episode, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
         A finished dataset then counts as unfinished, even if all its trials have ended; `finish` writes the same files.
 
         Args:
             tell: Called for each trial that has an episode, in order of shards.
+            judge: Finds the result of an episode.
             processes: How many processes may look through the recordings of a large dataset, as for `find_left`.
 
         Returns:
             Number of episodes.
         """
         remove_unfinished(self._directory)
-        # metadata.yaml goes first, as it marks a finished dataset, which this is not without the others.
-        for name in (METADATA, MANIFEST, THROWS):
+        # metadata.yaml marks a finished dataset. The table stays until `finish` replaces it, as it has results.
+        for name in (METADATA, MANIFEST):
             remove(self._directory / name)
         count = 0
         # Every process gets the trials of the shards that it looks through, and not a whole plan.
         parts = {each: self._layout.part(each) for each in sorted(self._unfinished) if self._layout.has_file(each)}
-        all_left = find_left([*parts.values()], self._channels, processes=processes)
+        all_left = find_left([*parts.values()], self._channels, judge=judge, processes=processes)
         for number, left in zip(parts, all_left, strict=True):
             episodes = self._take_left(number, left)
             for each in episodes:
@@ -203,6 +212,10 @@ class DatasetWriter:
         self.note("lost", trial=trial, reason=reason)
         self._finish_shard_if_complete(number)
 
+    def list_missing(self) -> list[int]:
+        """List the trials that have not ended, in order."""
+        return [trial for number in sorted(self._unfinished) for trial in sorted(self._get_shard(number).missing)]
+
     def note(self, event: Event, **details: object) -> None:
         """Write an event into the journal."""
         if self._journal is not None:
@@ -217,24 +230,27 @@ class DatasetWriter:
         """Return the row of each trial that has an episode; all shards must be finished."""
         return EpisodeRows(self._finished_rows.table)
 
-    def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> dict[str, int]:
+    def finish(
+        self, *, wall_s: float | None = None, simulations: int | None = None, provenance: Provenance | None = None
+    ) -> dict[str, int]:
         """Write the files that describe the dataset as a whole.
 
         Args:
             wall_s: Real time that the dataset took [s], for the data card; None if not known, or if a journal tells.
             simulations: Number of simulations that took part, for the data card; None if that is not known.
+            provenance: How the dataset was collected; None if this process has collected it.
 
         Returns:
             Number of trials of each outcome.
         """
         if self._unfinished:
-            missing = sorted(trial for number in self._unfinished for trial in self._get_shard(number).missing)
+            missing = self.list_missing()
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         throws = self._finished_rows.table
         if self._journal is not None:
             wall_s = self._journal.measure_collected_s()
-        provenance = Provenance.of_this_machine(
+        provenance = provenance or Provenance.of_this_machine(
             simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory), robot=self._channels.robot
         )
         # How it was run must not change the dataset, so only files that the manifest does not cover say that.

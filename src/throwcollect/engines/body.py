@@ -51,15 +51,13 @@ class LinkShape:
         size: Edges of a box, radius of a sphere, radius and length along z of a cylinder or capsule (of its straight
             part) [m]; factors for the coordinates of a mesh.
         placement: Pose in the link.
-        mesh: The mesh; None if it is none.
-        is_concave: Whether a mesh keeps its shape; otherwise it collides as its convex hull.
+        mesh: The mesh, which collides as its convex hull; None if it is none.
     """
 
     kind: str
     size: tuple[float, ...]
     placement: Placement
     mesh: Mesh | None = None
-    is_concave: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,23 +131,16 @@ class BodyModel:
         name: Its name.
         links: The links; the first is the root, which all others hang on.
         joints: The joints.
-        is_fixed: The root is attached to the world.
     """
 
     name: str
     links: tuple[BodyLink, ...]
     joints: tuple[BodyJoint, ...] = ()
-    is_fixed: bool = True
 
     @property
     def moving(self) -> tuple[BodyJoint, ...]:
         """The joints that let links move."""
         return tuple(joint for joint in self.joints if joint.moves)
-
-    @property
-    def is_static(self) -> bool:
-        """Whether no part of it ever moves on its own."""
-        return self.is_fixed and not self.moving
 
     @cached_property
     def meshes(self) -> tuple[Mesh, ...]:
@@ -190,7 +181,7 @@ class BodyModel:
             moments = zip(INERTIA, map(_write, link.inertia.moments_kgm2), strict=True)
             ElementTree.SubElement(inertial, "inertia", dict(moments))
         for shape in link.shapes:
-            collision = ElementTree.SubElement(element, "collision", {"concave": "yes"} if shape.is_concave else {})
+            collision = ElementTree.SubElement(element, "collision")
             collision.append(_write_placement(shape.placement))
             keys = SIZES[shape.kind]
             texts = [_write(*shape.size)] if len(keys) == 1 else map(_write, shape.size)

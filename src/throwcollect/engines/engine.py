@@ -76,7 +76,7 @@ class Scene:
         moving: The joints that are commanded, in the order of every command and sample.
         base_height_m: Height of its fixed base above the ground.
         tool: The tool.
-        ground_is_solid: Whether the ground stops the ball in all steps; it stops other bodies in any case.
+        ground_is_solid: Whether the ground stops the ball in all steps.
         ball_radius_m: Radius of the ball.
     """
 
@@ -99,7 +99,7 @@ class Physics:
         ball_mass_kg: Mass of the ball.
         ball_friction: Coulomb friction of the ball [-].
         ball_restitution: Coefficient of restitution between the ball and everything that it touches [-].
-        surface_friction: Coulomb friction of robot, tool, ground and bodies that are added [-].
+        surface_friction: Coulomb friction of robot, tool and ground [-].
         efforts: Largest torque of each moving joint [Nm].
         position_gain_per_s: Velocity that a motor adds per radian of position error.
         velocity_gain: Share of the velocity error that a motor removes in one step [-].
@@ -160,7 +160,7 @@ class Observer:
 
         Args:
             step: Number of the first step in which they do.
-            bodies: Their names: the tool, `GROUND`, a link of the robot, or ``body/link`` of an added body.
+            bodies: Their names: the tool, `GROUND`, or a link of the robot.
         """
 
     def on_sample(self, step: int, sample: Sample) -> bool:
@@ -198,53 +198,16 @@ class LoadedLink:
     range: tuple[float, float] | None
 
 
-class Bodies(ABC):
-    """Bodies in a world besides robot, ground and ball, by name; they collide with these and with each other."""
-
-    @abstractmethod
-    def __contains__(self, name: object) -> bool: ...
-
-    @abstractmethod
-    def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world under a new name; of its state `start`, only the pose matters.
-
-        Raises:
-            RequestError: ``RESOURCE_PARSE_ERROR`` if the engine does not take it.
-        """
-
-    @abstractmethod
-    def remove(self, name: str) -> None:
-        """Take a body out of the world."""
-
-    @abstractmethod
-    def state(self, name: str) -> BodyState:
-        """Find pose and velocity of the root link of a body."""
-
-    @abstractmethod
-    def place(self, name: str, state: BodyState) -> None:
-        """Set pose and velocity of the root link of a body; its joints stay as they are."""
-
-    @abstractmethod
-    def boxes(self, name: str) -> list[Box]:
-        """Find the boxes around the links of a body, along the axes of the world."""
-
-    @abstractmethod
-    def bounds(self, name: str) -> list[Box]:
-        """Find the boxes around the links of a body, along the axes of its root link."""
-
-
 class Engine(ABC):
     """One world with a robot, a ball and the ground.
 
     What follows from a state and commands does not depend, in any bit, on what happened in the world before.
 
     Attributes:
-        bodies: Further bodies; None if the engine has no place for them.
         can_be_forked: Whether a world computes the same bits in a process that was forked off the one that made it. A
             world that needs threads, open files or devices does not.
     """
 
-    bodies: Bodies | None = None
     can_be_forked: ClassVar[bool] = False
 
     @abstractmethod
@@ -253,16 +216,11 @@ class Engine(ABC):
 
     @abstractmethod
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene without added bodies; the engine may keep parts that are the same as before.
+        """Make the world of a scene; the engine may keep parts that are the same as before.
 
         Raises:
             ConfigError: If the engine does not take the robot's description.
         """
-
-    @property
-    @abstractmethod
-    def is_as_loaded(self) -> bool:
-        """Say whether no body was added since the world was loaded; otherwise the next trial needs a new world."""
 
     def describe_robot(self) -> Sequence[LoadedLink] | None:
         """Describe the robot's links as the engine has them, with all joints at 0, right after `load`.
@@ -305,14 +263,6 @@ class Engine(ABC):
     @abstractmethod
     def place_ball(self, ball: BodyState) -> None:
         """Set pose and velocity of the ball."""
-
-    @abstractmethod
-    def ball_boxes(self) -> list[Box]:
-        """Find the box around the ball, along the axes of the world."""
-
-    @abstractmethod
-    def robot_boxes(self) -> list[Box]:
-        """Find the boxes around the links of the robot, along the axes of the world; none if it knows no shapes."""
 
 
 def ball_of(sample: Sample) -> BodyState:

@@ -20,8 +20,6 @@ Triangles = NDArray[np.float32]
 STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """A triangle in a binary STL file, which has a title of 80 bytes and the number of triangles before them."""
 
-FORMATS = (".stl", ".obj", ".dae")
-_LARGEST_FILE = 32 * 2**20
 _LARGEST_COORDINATE = 1e6
 _LEAST_THICKNESS = 1e-6
 """Least extent of a solid in its thinnest direction, as a share of its extent in the longest."""
@@ -40,31 +38,20 @@ class Mesh:
     def triangles(self) -> Triangles:
         """The triangles of the file, at least one; all numbers are finite."""
         path = self.path
-        self.check()
-        read = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}[path.suffix.lower()]
+        if (read := _READERS.get(path.suffix.lower())) is None:
+            expected = " or ".join(_READERS)
+            raise ConfigError(f"{path}: collision meshes of this format cannot be read", expected=expected)
         try:
             triangles = read(path)
-        except (OSError, RuntimeError, ValueError, IndexError) as error:
+        except OSError as error:
+            raise ConfigError(f"{path}: cannot be read as a mesh: {error.strerror}") from error
+        except (RuntimeError, ValueError, IndexError) as error:
             raise ConfigError(f"{path}: cannot be read as a mesh: {error}") from error
         if not len(triangles):
             raise ConfigError(f"{path}: a mesh without triangles")
         if not (np.abs(triangles) <= _LARGEST_COORDINATE).all():
             raise ConfigError(f"{path}: coordinates beyond {_LARGEST_COORDINATE:g}")
         return triangles
-
-    def check(self) -> None:
-        """Check the file as far as that is possible without reading it."""
-        path = self.path
-        try:
-            size = path.stat().st_size if path.is_file() else None
-        except (OSError, ValueError) as error:
-            raise ConfigError(f"{path!s:.255}: cannot be read: {error}") from error
-        if size is None:
-            raise ConfigError(f"{path!s:.255}: no such file")
-        if path.suffix.lower() not in FORMATS:
-            raise ConfigError(f"{path}: collision meshes of this format cannot be read", expected=" or ".join(FORMATS))
-        if size > _LARGEST_FILE:
-            raise ConfigError(f"{path}: {size} bytes; at most {_LARGEST_FILE}")
 
     @property
     def is_flat(self) -> bool:
@@ -122,3 +109,6 @@ def _read_collada(path: Path) -> Triangles:
     numbers = [[triangle[corner] for corner in range(3)] for triangle in triangles]
     corners: Triangles = np.asarray(model.vertices(), np.float32)[numbers]
     return corners
+
+
+_READERS = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}

@@ -91,7 +91,7 @@ def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
         """Simulate a trial, and compare its row with the stored one."""
         trial = plan.trial(number)
         result = judge_episode(with_values(config, trial.values), replayer.run(trial))
-        stored, again = dataset[number].row, table.row(trial, result, None)
+        stored, again = dataset.select([number])[0].row, table.row(trial, result, None)
         # Columns of text, and numbers that only one of the two rows has, cannot be compared.
         compared = [
             column

@@ -130,30 +130,20 @@ def read_visual(link: ElementTree.Element, visual: ElementTree.Element) -> LinkS
 
 
 def locate_mesh(filename: str, directory: Path, packages: Path) -> Path:
-    """Find the file that a description in a directory means by a path or a URL (see `locate_file`).
+    """Find the file that a description in a directory means by a path or a URL; packages are directories of `packages`.
 
     Raises:
         ConfigError: If it is a URL of another scheme than ``file`` and ``package``.
     """
-    return locate_file(filename, packages) if "://" in filename else directory / filename
-
-
-def locate_file(url: str, packages: Path) -> Path:
-    """Find the file of a URL; packages are directories of `packages`.
-
-    Raises:
-        ConfigError: If it has another scheme than ``file`` and ``package``, or is not a URL.
-    """
-    try:
-        parts = urlsplit(url)
-    except ValueError as error:
-        raise ConfigError(f"{url!r:.255}: not a URL: {error}") from error
+    if "://" not in filename:
+        return directory / filename
+    parts = urlsplit(filename)
     # With three slashes, the package is the first part of the path.
     if parts.scheme == "package":
         return packages / unquote(parts.netloc + parts.path).lstrip("/")
     if parts.scheme == "file" and parts.netloc in ("", "localhost"):
         return Path(unquote(parts.path))
-    raise ConfigError(f"{url!r:.255}: unknown kind of URL", expected="file:///... or package://...")
+    raise ConfigError(f"{filename!r:.255}: unknown kind of URL", expected="file:///... or package://...")
 
 
 class _Reader:

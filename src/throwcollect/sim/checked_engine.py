@@ -13,7 +13,6 @@ from throwcollect.engine_packages import require_engine
 from throwcollect.engines.engine import (
     BALL_NUMBERS,
     GROUND,
-    Bodies,
     Engine,
     Observer,
     Sample,
@@ -58,9 +57,6 @@ class _Checked:
             return self._ask(attribute, partial(getattr, self._checked, attribute), declared.fget)
         return partial(self._call, attribute)
 
-    def __contains__(self, name: object) -> bool:
-        return bool(self._call("__contains__", name))
-
     def _call(self, method: str, *arguments: object) -> Any:
         return self._ask(method, lambda: getattr(self._checked, method)(*arguments), getattr(self._kind, method))
 
@@ -85,14 +81,6 @@ class _CheckedEngine(_Checked):
     """Names that the scene has for what may touch the ball; further bodies come on top of them."""
     _numbers = 0
     """How many numbers a sample of the scene has."""
-
-    @property
-    def bodies(self) -> Bodies | None:
-        """The further bodies of the engine."""
-        with explain_failure("engines", self._name, "carry out bodies"):
-            bodies = getattr(self._checked, "bodies", None)
-            check_type("bodies", bodies, Bodies | None)
-        return None if bodies is None else cast(Bodies, _Checked(self._name, Bodies, bodies))
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene, which says what states and samples have."""
@@ -129,9 +117,7 @@ class _CheckedEngine(_Checked):
     def check_names(self, bodies: frozenset[str]) -> None:
         """Make sure that bodies which touch the ball are in the world."""
         for name in bodies - self._known:
-            body, slash, _ = name.partition("/")
-            if not (slash and (added := self.bodies) is not None and body in added):
-                raise ValueError(f"{name!r} touches the ball, but there is no such tool, link or body")
+            raise ValueError(f"{name!r} touches the ball, but there is no such tool or link")
 
 
 class _StepChecker(Observer):

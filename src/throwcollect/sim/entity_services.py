@@ -1,24 +1,25 @@
-"""Services about the entities in the world: their names, states, bounds and descriptions."""
+"""Services about the entities in the world, ball and robot: their names and states."""
 
 from __future__ import annotations
 
+import math
+
+from throwcollect.engines.engine import BodyState
+from throwcollect.errors import RequestError
 from throwcollect.ros import Node
-from throwcollect.ros.msg import Bounds, EntityState, Vector3
-from throwcollect.ros.srv import (
-    DeleteEntity,
-    GetEntities,
-    GetEntitiesStates,
-    GetEntityBounds,
-    GetEntityInfo,
-    GetEntityState,
-    SetEntityInfo,
-    SetEntityState,
-)
-from throwcollect.sim.body_messages import body_state, entity_state
-from throwcollect.sim.entities import EntityInfo
-from throwcollect.sim.entity_filter import select
+from throwcollect.ros.msg import EntityFilters, EntityState
+from throwcollect.ros.srv import GetEntities, GetEntitiesStates, GetEntityState, SetEntityState
 from throwcollect.sim.service_results import offer
 from throwcollect.sim.simulation import Simulation
+from throwcollect.units import NS_PER_S
+
+_BALL = "ball"
+_WORLD_FRAME = "world"
+_LARGEST_COORDINATE_M = 1e3
+_LARGEST_SPEED = 1e3
+"""Largest speed that a client may give the ball [m/s, rad/s]: at a higher one, its place would soon be no number."""
+
+_NORM_TOLERANCE = 1e-3
 
 
 class EntityServices:
@@ -26,59 +27,81 @@ class EntityServices:
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._entities = simulation.entities
+        self._robot = simulation.config.robot.name
         offer(node, GetEntities, "get_entities", self._list)
         offer(node, GetEntitiesStates, "get_entities_states", self._list_states)
         offer(node, GetEntityState, "get_entity_state", self._get_state)
         offer(node, SetEntityState, "set_entity_state", self._set_state)
-        offer(node, GetEntityInfo, "get_entity_info", self._get_info)
-        offer(node, SetEntityInfo, "set_entity_info", self._set_info)
-        offer(node, GetEntityBounds, "get_entity_bounds", self._get_bounds)
-        offer(node, DeleteEntity, "delete_entity", self._delete)
 
     def _list(self, request: GetEntities.Request, response: GetEntities.Response) -> None:
-        response.entities = select(self._entities, request.filters)
+        response.entities = self._select(request.filters)
 
     def _list_states(self, request: GetEntitiesStates.Request, response: GetEntitiesStates.Response) -> None:
-        response.entities = select(self._entities, request.filters)
+        response.entities = self._select(request.filters)
         response.states = [self._read_state(name) for name in response.entities]
 
     def _get_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
         response.state = self._read_state(request.entity)
 
-    def _read_state(self, name: str) -> EntityState:
-        return entity_state(self._entities.state(name), self._simulation.now_ns)
-
     def _set_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:
         self._simulation.trial.require_free()
-        state, acceleration = request.state, request.state.acceleration
-        accelerations = (acceleration.linear, acceleration.angular)
-        self._entities.place(
-            request.entity,
-            body_state(state.pose, state.twist),
-            frame=state.header.frame_id,
-            accelerates=any((vector.x, vector.y, vector.z) != (0.0, 0.0, 0.0) for vector in accelerations),
-        )
+        self._require(request.entity)
+        if request.entity != _BALL:
+            raise RequestError("RESULT_OPERATION_FAILED", f"{request.entity} is fixed to the world")
+        if (frame := request.state.header.frame_id) not in ("", _WORLD_FRAME):
+            raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=_WORLD_FRAME)
+        self._simulation.world.ball = _to_body_state(request.state)
 
-    def _get_info(self, request: GetEntityInfo.Request, response: GetEntityInfo.Response) -> None:
-        info = self._entities.info(request.entity)
-        response.info.category.category = info.category
-        response.info.description = info.description
-        response.info.tags = list(info.tags)
+    def _select(self, filters: EntityFilters) -> list[str]:
+        if filters != EntityFilters():
+            message = f"entities cannot be filtered: there are {_BALL} and {self._robot} alone"
+            raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
+        return [_BALL, self._robot]
 
-    def _set_info(self, request: SetEntityInfo.Request, _response: SetEntityInfo.Response) -> None:
-        info = request.info
-        self._entities.set_info(
-            request.entity, EntityInfo(int(info.category.category), info.description, tuple(info.tags))
-        )
+    def _read_state(self, name: str) -> EntityState:
+        self._require(name)
+        world = self._simulation.world
+        return _to_message(world.ball if name == _BALL else world.robot_base, self._simulation.now_ns)
 
-    def _get_bounds(self, request: GetEntityBounds.Request, response: GetEntityBounds.Response) -> None:
-        box = self._entities.bounds(request.entity)
-        if box is not None:
-            response.bounds.type = Bounds.TYPE_BOX
-            # In simulation_interfaces/msg/Bounds the upper corner comes first.
-            response.bounds.points = [Vector3(x=x, y=y, z=z) for x, y, z in reversed(box)]
+    def _require(self, name: str) -> None:
+        if name not in (_BALL, self._robot):
+            raise RequestError("RESULT_NOT_FOUND", f"no entity {name!r:.80}; known: {_BALL}, {self._robot}")
 
-    def _delete(self, request: DeleteEntity.Request, _response: DeleteEntity.Response) -> None:
-        self._simulation.trial.require_free()
-        self._entities.remove(request.entity)
+
+def _to_body_state(message: EntityState) -> BodyState:
+    """Read and check a state in the frame of the world."""
+    position, turn = message.pose.position, message.pose.orientation
+    linear, angular = message.twist.linear, message.twist.angular
+    state = BodyState(
+        (position.x, position.y, position.z),
+        (turn.x, turn.y, turn.z, turn.w),
+        (linear.x, linear.y, linear.z),
+        (angular.x, angular.y, angular.z),
+    )
+    # Each condition is written as `not ... <=`, so that it rejects NaN, too, for which no comparison holds.
+    norm = math.hypot(*state.orientation_xyzw)
+    if not abs(norm - 1.0) <= _NORM_TOLERANCE:
+        text = f"orientation {state.orientation_xyzw}: a quaternion of norm {norm:g}"
+        raise RequestError("INVALID_POSE", text, expected="norm 1")
+    if not all(abs(value) <= _LARGEST_COORDINATE_M for value in state.position):
+        expected = f"within {_LARGEST_COORDINATE_M:g} m of the world's origin"
+        raise RequestError("INVALID_POSE", f"position {state.position} m", expected=expected)
+    speeds = (*state.linear_velocity, *state.angular_velocity)
+    if not all(abs(speed) <= _LARGEST_SPEED for speed in speeds):
+        expected = f"numbers up to {_LARGEST_SPEED:g} m/s and rad/s"
+        raise RequestError("RESULT_OPERATION_FAILED", f"twist {speeds}", expected=expected)
+    return state
+
+
+def _to_message(state: BodyState, now_ns: int) -> EntityState:
+    """Make the message of a state in world at a time; accelerations are not measured."""
+    message = EntityState()
+    message.header.frame_id = _WORLD_FRAME
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, NS_PER_S)
+    position, orientation = message.pose.position, message.pose.orientation
+    position.x, position.y, position.z = state.position
+    orientation.x, orientation.y, orientation.z, orientation.w = state.orientation_xyzw
+    linear, angular = message.twist.linear, message.twist.angular
+    linear.x, linear.y, linear.z = state.linear_velocity
+    angular.x, angular.y, angular.z = state.angular_velocity
+    return message

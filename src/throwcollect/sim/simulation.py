@@ -18,7 +18,6 @@ from throwcollect.control import GoalResult, JointTrajectoryController, Trajecto
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples
 from throwcollect.errors import RequestError, ThrowcollectError
 from throwcollect.robots.description import robot_of, start_posture
-from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.pace import STRETCH_S, WATCHED_STRETCH_S, Pace, long_stretch_steps, longest_steps, stretch_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
@@ -40,8 +39,7 @@ class Scope(IntFlag):
 
     TIME = 1
     STATE = 2
-    SPAWNED = 4
-    ALL = TIME | STATE | SPAWNED
+    ALL = TIME | STATE
 
 
 @dataclass
@@ -77,7 +75,6 @@ class Simulation:
         self.trial = PresentTrial(config)
         self.state = StateCode.PLAYING
         self.world = World(config)
-        self.entities = Entities(self.world, config.robot.name)
         self._steps: StepRequest | None = None
         self._period_ns = period_ns = round(NS_PER_S / config.sim.physics_hz)
         self._stride = config.sim.physics_hz // config.record.rate_hz
@@ -142,18 +139,10 @@ class Simulation:
         """Go back to the start, in whole or in part.
 
         Args:
-            scope: ``STATE`` puts world and controllers into the start state of the trial that is set up, and spawned
-                entities back to where they were spawned. ``TIME`` puts the clock to the trial's start. Either aborts
-                all goals; only both together begin a trial. ``SPAWNED`` takes spawned entities out of the world.
+            scope: ``STATE`` puts world and controllers into the start state of the trial that is set up. ``TIME`` puts
+                the clock to the trial's start. Either aborts all goals; only both together begin a trial.
         """
-        of_time, of_state, of_spawned = Scope.TIME in scope, Scope.STATE in scope, Scope.SPAWNED in scope
-        if of_spawned:
-            self.world.spawned.clear()
-            # Descriptions that clients have given to entities belong to the world that ends here.
-            if of_time and of_state:
-                self.entities.forget_infos()
-        if not (of_time or of_state):
-            return
+        of_time, of_state = Scope.TIME in scope, Scope.STATE in scope
         self._interrupt_steps("the simulation was reset")
         self._running = self._in_trial = False
         self.trial.begin()

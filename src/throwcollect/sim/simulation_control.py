@@ -9,38 +9,21 @@ from throwcollect.ros.srv import GetSimulationState, GetSimulatorFeatures, Reset
 from throwcollect.sim.entity_services import EntityServices
 from throwcollect.sim.service_results import offer
 from throwcollect.sim.simulation import Scope, Simulation, StateCode
-from throwcollect.sim.spawn_services import SpawnServices
 from throwcollect.version import __version__
 
 _FEATURES = (
-    "SPAWNING",
-    "DELETING",
-    "ENTITY_TAGS",
-    "ENTITY_BOUNDS",
-    "ENTITY_BOUNDS_BOX",
-    "ENTITY_CATEGORIES",
-    "SPAWNING_RESOURCE_STRING",
     "ENTITY_STATE_GETTING",
     "ENTITY_STATE_SETTING",
-    "ENTITY_INFO_GETTING",
-    "ENTITY_INFO_SETTING",
-    "SPAWNABLES",
     "SIMULATION_RESET",
     "SIMULATION_RESET_TIME",
     "SIMULATION_RESET_STATE",
-    "SIMULATION_RESET_SPAWNED",
     "SIMULATION_STATE_GETTING",
     "SIMULATION_STATE_SETTING",
     "SIMULATION_STATE_PAUSE",
     "STEP_SIMULATION_SINGLE",
     "STEP_SIMULATION_MULTIPLE",
     "STEP_SIMULATION_ACTION",
-    "SPAWNING_ENTITIES",
 )
-_NEED_BODIES = frozenset({"SPAWNING", "DELETING", "SPAWNING_RESOURCE_STRING", "SPAWNABLES", "SPAWNING_ENTITIES"})
-"""Features that need an engine which takes further bodies."""
-
-_FORMATS = ("urdf",)
 _WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL)
 
 
@@ -55,15 +38,11 @@ class SimulationControl:
         offer(node, SetSimulationState, "set_simulation_state", self._set_state)
         offer(node, ResetSimulation, "reset_simulation", self._reset)
         EntityServices(node, simulation)
-        SpawnServices(node, simulation)
 
     def _get_features(
         self, _request: GetSimulatorFeatures.Request, response: GetSimulatorFeatures.Response
     ) -> GetSimulatorFeatures.Response:
-        takes_bodies = self._simulation.world.engine.bodies is not None
-        names = [name for name in _FEATURES if takes_bodies or name not in _NEED_BODIES]
-        response.features.features = [getattr(Features, name) for name in names]
-        response.features.spawn_formats = list(_FORMATS) if takes_bodies else []
+        response.features.features = [getattr(Features, name) for name in _FEATURES]
         response.features.custom_info = (
             f"throwcollect {__version__}; one step is one physics step of "
             f"{1.0 / self._simulation.config.sim.physics_hz:g} s; the clock runs while a trial runs"
@@ -90,7 +69,7 @@ class SimulationControl:
             self._simulation.reset()
             return
         if request.scope & ~int(Scope.ALL):
-            known = ", ".join(f"{scope.value} {scope.name}" for scope in (Scope.TIME, Scope.STATE, Scope.SPAWNED))
-            message = f"scope {request.scope} has bits that mean nothing"
+            known = ", ".join(f"{scope.value} {scope.name}" for scope in (Scope.TIME, Scope.STATE))
+            message = f"scope {request.scope} cannot be reset"
             raise RequestError("RESULT_FEATURE_UNSUPPORTED", message, expected=f"sums of {known}; 0 or 255 for all")
         self._simulation.reset(Scope(request.scope))

@@ -36,7 +36,6 @@ from throwcollect.sim.contact_log import ContactLog
 from throwcollect.sim.motors import Motors
 from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, SampleLog, to_samples
 from throwcollect.sim.scene import drag_of, physics_of, scene_of
-from throwcollect.sim.spawned import SpawnedBodies
 from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
 
@@ -58,7 +57,6 @@ class World(Observer):
 
     Attributes:
         engine: The physics engine.
-        spawned: The bodies that clients have put into the world.
         moving: Names of the joints that are simulated and commanded, in the order of `Robot.joints`.
         steps: Number of physics steps taken in this trial.
         end_reason: Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on.
@@ -84,7 +82,6 @@ class World(Observer):
 
     def __init__(self, config: Config) -> None:
         self.engine: Engine = make_engine(config.sim.engine)
-        self.spawned = SpawnedBodies(self.engine)
         self._joints = robot_of(config).joints
         self._described: tuple[object, Description] | None = None
         self._start_key: object = None
@@ -121,7 +118,7 @@ class World(Observer):
         """
         # Of `task.end`, only the names of joints count, because they say which joints are locked.
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
-        if key != self._start_key or not self.engine.is_as_loaded:
+        if key != self._start_key:
             # If settling fails, the next trial must not take the present state for its start state.
             self._start_key = None
             self._settle(trial)
@@ -141,7 +138,6 @@ class World(Observer):
     def restart_clock(self, start_ns: int) -> None:
         """Begin a new record at time `start_ns` [ns], without steps and contacts; the present state stays as it is."""
         now = self.engine.state
-        # A body that was removed since the last step does not press on the ball any more.
         self._touching = now.touching
         self._begin(start_ns, now.sample)
 
@@ -254,27 +250,23 @@ class World(Observer):
     def _settle(self, trial: Config) -> None:
         """Let the ball come to rest in the tool of the still robot, and keep that state."""
         description = self._describe(trial)
-        try:
-            self._load(scene_of(trial, description), trial.sim.engine)
-            self.moving, self._locked = description.moving, description.locked
-            posture = start_posture(trial)
-            offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
-            self._offsets = np.array([offsets[joint] for joint in self.moving])
-            self._start = [posture[joint] + offsets[joint] for joint in self.moving]
-            tool = tool_of(trial)
-            self._tool = tool.name
-            seat = tool.ball_seat(trial.ball.radius_m)
-            self.engine.configure(physics_of(trial, self.moving))
-            self.engine.rest(self._start, seat)
-            # At least one step is taken, because contact forces and motor torques are known only after a step.
-            steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
-            targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
-            # The first sample is due one step after the last step, so no sample is recorded.
-            self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
-            self._settled = self.engine.state
-        finally:
-            # This happens after an error, too: spawned bodies belong in the world, and loading may have removed them.
-            self.spawned.load()
+        self._load(scene_of(trial, description), trial.sim.engine)
+        self.moving, self._locked = description.moving, description.locked
+        posture = start_posture(trial)
+        offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
+        self._offsets = np.array([offsets[joint] for joint in self.moving])
+        self._start = [posture[joint] + offsets[joint] for joint in self.moving]
+        tool = tool_of(trial)
+        self._tool = tool.name
+        seat = tool.ball_seat(trial.ball.radius_m)
+        self.engine.configure(physics_of(trial, self.moving))
+        self.engine.rest(self._start, seat)
+        # At least one step is taken, because contact forces and motor torques are known only after a step.
+        steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
+        targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
+        # The first sample is due one step after the last step, so no sample is recorded.
+        self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
+        self._settled = self.engine.state
 
     def _load(self, scene: Scene, engine: str) -> None:
         self.engine.load(scene)

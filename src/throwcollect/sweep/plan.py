@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ _FORMAT = "1"
 _FORMAT_KEY = b"throwcollect.plan_format"
 _CONFIG_KEY = b"throwcollect.config_digest"
 _SLICE_KEY = b"throwcollect.slice"
+_JOINED_KEY = b"throwcollect.joined"
 _MOST_REASONS = 5
 _ROWS_AT_ONCE = 1 << 16
 _MISNUMBERED = "the trials are not numbered from 0 without gaps"
@@ -49,11 +51,14 @@ class Plan:
         config: Configuration that the trials vary.
         trials: At least one trial; the first trial has number 0 unless this is a slice.
         slice: Which slice this is; None for the whole plan.
+        joined: If this plan joins those of merged datasets, the numbers of trials of these; else empty. An episode has
+            the number that its trial has in its own plan.
     """
 
     config: Config
     trials: Trials
     slice: Slice | None = None
+    joined: tuple[int, ...] = ()
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -66,6 +71,22 @@ class Plan:
         if index < 0:
             raise IndexError(number)
         return self.trials[index]
+
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """Numbers of trials of the plans that this one joins; its own number if it joins none."""
+        return self.joined or (len(self.trials),)
+
+    def first_of_part(self, number: int) -> int:
+        """Return the number of the first trial of the joined plan that a trial belongs to."""
+        return max((first for first in accumulate(self.joined, initial=0) if first <= number), default=0)
+
+    def part_from(self, first: int) -> Plan:
+        """Return the joined plan whose first trial has this number, with trials from 0 on, as it was collected."""
+        count = dict(zip(accumulate(self.parts, initial=0), self.parts, strict=False))[first]
+        trials = self.trials[first : first + count]
+        refused = {number - first: reason for number, reason in trials.refused.items()}
+        return Plan(self.config, Trials(trials.points, trials.seeds, trials.digests, refused=refused))
 
     def slice_of(self, wanted: Slice) -> Plan:
         """Cut a slice out of the plan."""
@@ -107,6 +128,8 @@ class Plan:
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
             metadata[_SLICE_KEY] = str(self.slice)
+        if self.joined:
+            metadata[_JOINED_KEY] = " ".join(map(str, self.joined))
         schema = _make_schema(self.keys, trials.target_names).with_metadata(metadata)
         return encode_table(make_table(columns, schema))
 
@@ -155,7 +178,10 @@ class Plan:
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
         read_rounds(path, trials)
-        return cls(config, trials)
+        joined = metadata.get(_JOINED_KEY, b"").split()
+        if not all(map(bytes.isdigit, joined)) or (joined and sum(map(int, joined)) != len(trials)):
+            raise DatasetError("is damaged: it does not have the trials of the plans that it joins", path=path)
+        return cls(config, trials, joined=tuple(map(int, joined)))
 
 
 def draw_first_points(config: Config, *, directory: Path) -> Points:

@@ -344,9 +344,9 @@ def test_a_kill_while_rounds_are_joined_into_the_plan_loses_no_round(trials: Tri
     assert call > 4
 
 
-def test_recovery_removes_unfinished_files_of_earlier_versions(trials: Trials, tmp_path: Path) -> None:
+def test_recovery_removes_half_written_files(trials: Trials, tmp_path: Path) -> None:
     create(tmp_path / "dataset", trials.plan)
-    for name in ("plan.parquet.part", "config.yaml.new", "datapackage.json.new"):
+    for name in ("plan.parquet.new", "config.yaml.new", "datapackage.json.new"):
         (tmp_path / "dataset" / name).write_bytes(b"half")
     with closing(DatasetWriter.open(tmp_path / "dataset")) as writer:
         writer.recover()

@@ -11,15 +11,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.unit.sim.bodies import box, pendulum
 
 from throwcollect.config.schema import Config
 from throwcollect.engine_packages import PACKAGES
-from throwcollect.engines.engine import GROUND, BodyState, Box, Engine, Observer, Sample, State, Steps, ball_of
+from throwcollect.engines.engine import GROUND, BodyState, Engine, Observer, Sample, State, Steps, ball_of
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import physics_description, start_posture
 from throwcollect.sim.scene import physics_of, scene_of
-from throwcollect.sim.spawnable import read_model
 from throwcollect.tools.tool import tool_of
 
 CONFIG = Config.model_validate({"scene": {"landing_height_m": 0.5}})
@@ -126,19 +124,13 @@ def test_a_forked_world_and_its_parent_simulate_the_same_throw(engine: Engine) -
     assert found == hashlib.sha256(repr(watch_throw(engine)).encode()).digest()
 
 
-def test_a_decimal_comma_of_the_process_changes_no_throw_and_no_body(
-    name: str, use_decimal_comma: Callable[[], str]
-) -> None:
-    def simulate() -> tuple[Watcher, list[Box]]:
+def test_a_decimal_comma_of_the_process_changes_no_throw(name: str, use_decimal_comma: Callable[[], str]) -> None:
+    def simulate() -> Watcher:
         made = load_member("engines", name)()
         begin(made)
-        seen, boxes = watch_throw(made), list[Box]()
-        if made.bodies is not None:
-            model = read_model(pendulum(), lambda _: pytest.fail("there is no mesh"))
-            made.bodies.add("pendulum", model, BodyState((3.0, 0.0, 0.5)))
-            boxes = [*made.bodies.boxes("pendulum"), *made.bodies.bounds("pendulum")]
+        seen = watch_throw(made)
         made.close()
-        return seen, boxes
+        return seen
 
     usual = simulate()
     use_decimal_comma()
@@ -287,28 +279,3 @@ def test_a_placed_ball_has_exactly_the_given_state(engine: Engine) -> None:
     put = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3))
     engine.place_ball(put)
     assert ball_of(engine.state.sample) == put
-    ((lowest, highest),) = engine.ball_boxes()
-    assert all(low < at < high for low, at, high in zip(lowest, put.position, highest, strict=True))
-
-
-def test_bodies_can_be_added_and_removed_if_the_engine_supports_bodies(engine: Engine) -> None:
-    assert engine.is_as_loaded
-    if engine.bodies is None:
-        pytest.skip("the engine has no further bodies")
-    crate = read_model(box("0.2 0.4 0.6", mass=0), lambda _: pytest.fail("there is no mesh"))
-    start = BodyState((3.0, 0.0, 0.5))
-    engine.bodies.add("crate", crate, start)
-    assert engine.bodies.state("crate") == start
-    engine.place_ball(BodyState((3.0, 0.0, 0.83)))
-    engine.run(still(engine, 50), Observer())
-    assert engine.state.touching == {"crate/body"}
-    engine.bodies.remove("crate")
-    assert engine.state.touching == frozenset()
-    seen = Watcher()
-    engine.run(still(engine, 1), seen)
-    assert seen.touches == [(1, frozenset())]
-    assert not engine.is_as_loaded
-    engine.bodies.add("crate", crate, start)
-    begin(engine)
-    assert "crate" not in engine.bodies
-    assert engine.is_as_loaded

@@ -21,13 +21,11 @@ from tests.unit.engines.test_engine_contract import (
     still,
     swing,
 )
-from tests.unit.sim.bodies import box, write_mesh
 
 from throwcollect.engines.engine import BodyState, Observer, Physics, Scene, ball_of
 from throwcollect.engines.mujoco.mujoco_engine import MujocoEngine
 from throwcollect.engines.mujoco.scenery import make_spec, resize_ball
-from throwcollect.errors import ConfigError, RequestError
-from throwcollect.sim.spawnable import read_model
+from throwcollect.errors import ConfigError
 
 TRIALS: list[tuple[Scene, Physics]] = [
     (SCENE, PHYSICS),
@@ -160,67 +158,6 @@ def test_a_diverging_world_has_numbers_that_are_not_finite_and_can_begin_again(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_body_that_mujoco_cannot_load_is_refused_without_harm_to_the_world(
-    engine: MujocoEngine, tmp_path: Path
-) -> None:
-    flat = write_mesh(tmp_path / "flat.stl", np.zeros((4, 3, 3)))
-    mesh = box().replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="flat.stl"/>')
-    before = engine.state
-    with pytest.raises(RequestError, match="the physics engine cannot load it"):
-        engine.bodies.add("flat", read_model(mesh, lambda _: flat), BodyState((3.0, 0.0, 1.0)))
-    assert "flat" not in engine.bodies
-    assert engine.state == before
-    engine.run(still(engine, 10), Observer())
-    assert engine.state.touching == before.touching
-
-
-def test_a_body_without_mass_that_has_a_mesh_is_refused(engine: MujocoEngine, tmp_path: Path) -> None:
-    mesh = box(mass=0).replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="bucket.stl"/>')
-    bucket = read_model(mesh, lambda _: write_mesh(tmp_path / "bucket.stl", np.zeros((4, 3, 3))))
-    with pytest.raises(RequestError, match="fill in the mesh of a body that is attached to the world"):
-        engine.bodies.add("bucket", bucket, BodyState((3.0, 0.0, 1.0)))
-
-
-def test_a_link_of_a_body_may_have_any_name(engine: MujocoEngine) -> None:
-    strange = box(name="strange", mass=0).replace('name="body"', 'name="world"')
-    engine.bodies.add("a/b c", read_model(strange, _no_mesh), BodyState((3.0, 0.0, 0.5)))
-    engine.place_ball(BodyState((3.0, 0.0, 0.63)))
-    engine.run(still(engine, 50), Observer())
-    assert engine.state.touching == {"a/b c/world"}
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_bodies_that_merely_touch_the_ground_do_not_change_a_throw(engine: MujocoEngine, restitution: float) -> None:
-    bouncy = replace(PHYSICS, ball_restitution=restitution)
-    without = trial(engine, SCENE, bouncy)
-    engine.load(SCENE)
-    engine.configure(bouncy)
-    # The lower faces of the crates are exactly at the height of the ground.
-    for number in range(3):
-        engine.bodies.add(f"crate{number}", read_model(box(mass=1), _no_mesh), BodyState((5.0, number, 0.1)))
-    engine.rest(START.tolist(), SEAT)
-    seen = Watcher()
-    engine.run(still(engine, 25), seen)
-    engine.reset(engine.state)
-    engine.run(swing(600), seen)
-    assert seen.touches == without.touches
-    for (_, sample), (_, other) in zip(seen.samples, without.samples, strict=True):
-        assert sample == pytest.approx(other, abs=1e-4)
-
-
-def test_a_body_stays_where_it_is_while_others_are_added_and_removed(engine: MujocoEngine) -> None:
-    engine.bodies.add("one", read_model(box(), _no_mesh), BodyState((3.0, 0.0, 2.0)))
-    engine.run(still(engine, 50), Observer())
-    fallen = engine.bodies.state("one")
-    assert fallen.position[2] < 2.0
-    arm = engine.state.sample
-    engine.bodies.add("two", read_model(box(), _no_mesh), BodyState((4.0, 0.0, 2.0)))
-    assert engine.bodies.state("one") == fallen
-    assert engine.state.sample == arm
-    engine.bodies.remove("two")
-    assert engine.bodies.state("one") == fallen
-
-
 def test_a_robot_description_that_mujoco_cannot_load_is_refused() -> None:
     broken = MujocoEngine()
     joint, *others = SCENE.robot.joints
@@ -230,7 +167,3 @@ def test_a_robot_description_that_mujoco_cannot_load_is_refused() -> None:
     begin(broken)
     assert broken.state.sample[: len(MOVING)] != END.tolist()
     broken.close()
-
-
-def _no_mesh(filename: str) -> Path:
-    raise AssertionError(filename)

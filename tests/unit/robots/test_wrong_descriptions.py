@@ -155,7 +155,7 @@ def test_a_mesh_is_found_by_every_kind_of_url_and_read_as_text(url: str, tmp_pat
     ("url", "said"),
     [
         ("arm.ply", r"link upper_arm_link: .*arm.ply: collision meshes of this format cannot be read"),
-        ("none.stl", r"link upper_arm_link: .*none.stl: no such file"),
+        ("none.stl", r"link upper_arm_link: .*none.stl: .*No such file"),
         ("http://x/arm.stl", "link upper_arm_link: 'http://x/arm.stl': unknown kind of URL"),
         ("flat.stl", "link upper_arm_link: .*flat.stl: the mesh is flat"),
         ("broken.dae", "link upper_arm_link: .*broken.dae: cannot be read as a mesh"),

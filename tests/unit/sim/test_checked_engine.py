@@ -11,8 +11,8 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
-from throwcollect.engines.engine import Bodies, Observer, Sample, State, Steps
-from throwcollect.errors import MemberError, ThrowcollectError
+from throwcollect.engines.engine import Observer, Sample, State, Steps
+from throwcollect.errors import MemberError
 from throwcollect.replay.replayer import Replayer
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.trial_runner import TrialRunner
@@ -132,7 +132,6 @@ def test_a_right_engine_of_another_package_makes_the_same_episode(monkeypatch: p
             "'moon' touches the ball, but there is no suc",
         ),
         ("run", tell(touch=lambda step, bodies: (-step, bodies)), "ValueError: on_touch is called for step -"),
-        ("is_as_loaded", None, "what is_as_loaded returns: should be a valid boolean, is None"),
         ("state", None, "what state returns: should be an instance of State, is None"),
         ("state", change_state(touching=frozenset({"cup"})), "'cup' touches the ball, but there is no such tool"),
         ("state", change_state(sample=(0.0,)), "ValueError: a sample should have 28 numbers, has 1"),
@@ -182,26 +181,3 @@ def test_a_failure_outside_of_trials_is_an_error_at_once(monkeypatch: pytest.Mon
     monkeypatch.setattr(Wrong, "run", fail)
     with pytest.raises(MemberError, match="cannot carry out run: ValueError: boom"):
         runner.advance(watched=False)
-
-
-class FewBodies(Bodies):
-    """Bodies of an engine that fails with all of them."""
-
-    __contains__ = add = remove = state = place = boxes = bounds = fail  # type: ignore[assignment]
-
-
-def test_a_failure_of_the_further_bodies_of_an_engine_is_a_fault_of_its_package(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    simulation = Simulation(CONFIG)
-    monkeypatch.setattr(Wrong, "bodies", FewBodies(), raising=False)
-    bodies = simulation.world.engine.bodies
-    assert bodies is not None
-    for ask in (lambda: "box" in bodies, lambda: bodies.remove("box"), lambda: bodies.boxes("box")):
-        with pytest.raises(
-            ThrowcollectError, match=r"the engine ballistic of .* cannot carry out \w+: ValueError: boo"
-        ):
-            ask()
-    monkeypatch.setattr(Wrong, "bodies", [])
-    with pytest.raises(MemberError, match=r"bodies: should be an instance of Bodies, is \[\]"):
-        _ = simulation.world.engine.bodies

@@ -284,16 +284,7 @@ def test_a_reset_or_quitting_interrupts_steps(interrupt, reason: str, simulation
     assert not simulation.running
 
 
-def test_removing_spawned_entities_does_not_end_steps(simulation: Simulation) -> None:
-    simulation.set_state(StateCode.PAUSED)
-    request = simulation.request_steps(30)
-    simulation.reset(Scope.SPAWNED)
-    assert not request.is_over
-    simulation.advance(watched=False)
-    assert request.taken == 30
-
-
-@pytest.mark.parametrize("scope", [Scope.TIME, Scope.STATE, Scope.STATE | Scope.SPAWNED])
+@pytest.mark.parametrize("scope", [Scope.TIME, Scope.STATE])
 def test_only_a_reset_of_time_and_state_together_begins_a_trial(scope: Scope, simulation: Simulation) -> None:
     trial(simulation)
     simulation.advance(watched=True)

@@ -254,7 +254,7 @@ def test_a_throw_that_was_not_released_has_no_points(make_collection: Any, tmp_p
 @pytest.mark.parametrize(
     ("trials", "error", "message"),
     [
-        ([0, 7], ConfigError, r"no trial 7\n  expected: 0 to 6"),
+        ([0, 7], ConfigError, r"no trial 7\n  expected: trials from 0 to 6"),
         ([1, 2], DatasetError, "trial 2 has no episode: lost: two simulations were lost"),
     ],
 )

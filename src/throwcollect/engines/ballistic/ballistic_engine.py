@@ -12,7 +12,6 @@ from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import (
     GROUND,
     BodyState,
-    Box,
     Engine,
     Observer,
     Physics,
@@ -40,7 +39,7 @@ class BallisticEngine(Engine):
       would have to pull the ball back along its opening, the ball is free and keeps the velocity that it had.
     - In each step, gravity and drag accelerate a free ball, which then moves at its new velocity, as in Bullet. It
       touches nothing but solid ground, where it stays.
-    - The ball never spins. There are no other bodies, and nothing touches the robot.
+    - The ball never spins, and nothing touches the robot.
     """
 
     can_be_forked = True
@@ -58,11 +57,6 @@ class BallisticEngine(Engine):
 
     def close(self) -> None:
         """Do nothing: this world holds no resources."""
-
-    @property
-    def is_as_loaded(self) -> bool:
-        """Return True, as no bodies can be added."""
-        return True
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene."""
@@ -119,15 +113,6 @@ class BallisticEngine(Engine):
         self._position, self._velocity = ball.position, ball.linear_velocity
         self._orientation = ball.orientation_xyzw
         self._touching = _FREE
-
-    def ball_boxes(self) -> list[Box]:
-        """Find the box around the ball, along the axes of the world."""
-        radius, (x, y, z) = self._scene.ball_radius_m, self._position
-        return [((x - radius, y - radius, z - radius), (x + radius, y + radius, z + radius))]
-
-    def robot_boxes(self) -> list[Box]:
-        """Return no boxes: this engine knows no shapes."""
-        return []
 
     def _sample(self) -> Sample:
         torques = (0.0,) * len(self._joints)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import pybullet
 
 from throwcollect.engines.body import Vector
-from throwcollect.engines.bullet.bodies import BulletBodies
 from throwcollect.engines.bullet.scenery import (
     BASE,
     Scenery,
     Surface,
-    boxes,
     connect,
     describe_links,
     load_ball,
@@ -24,7 +22,6 @@ from throwcollect.engines.bullet.scenery import (
 )
 from throwcollect.engines.engine import (
     BodyState,
-    Box,
     Engine,
     LoadedLink,
     Observer,
@@ -57,8 +54,6 @@ class BulletEngine(Engine):
 
     def __init__(self) -> None:
         self._client = connect()
-        self._names: dict[Surface, str] = {}
-        self.bodies: BulletBodies = BulletBodies(self._client, self._names)
         self._scene: Scene | None = None
         self._touching: frozenset[str] = frozenset()
         # The surfaces that pressed on the ball in the last step; None if there was no step since the last reset.
@@ -68,24 +63,12 @@ class BulletEngine(Engine):
         """Free the world; it cannot be used afterwards."""
         pybullet.disconnect(self._client)
 
-    @property
-    def is_as_loaded(self) -> bool:
-        """Say whether no body was added since the world was loaded."""
-        return not self.bodies.leave_traces
-
     def load(self, scene: Scene) -> None:
         """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
         # Forget the scene until the world is loaded: if loading fails, the next call must not keep anything of it.
         kept, self._scene = self._scene, None
-        if (
-            kept is None
-            or not self.is_as_loaded
-            or dataclasses.replace(kept, ball_radius_m=scene.ball_radius_m) != scene
-        ):
-            self.bodies.forget()
+        if kept is None or dataclasses.replace(kept, ball_radius_m=scene.ball_radius_m) != scene:
             self._scenery = load_scenery(self._client, scene)
-            self._names.clear()
-            self._names.update(self._scenery.names)
             self._ball = load_ball(self._client, scene.ball_radius_m)
         elif kept.ball_radius_m != scene.ball_radius_m:
             pybullet.removeBody(self._ball, physicsClientId=self._client)
@@ -99,7 +82,6 @@ class BulletEngine(Engine):
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
         set_physics(self._client, self._scenery, self._ball, physics)
-        self.bodies.friction = physics.surface_friction
         self._forces = list(physics.efforts)
         # Bullet divides the error of a position by the time step before it multiplies it by the gain.
         self._position_gains = [physics.position_gain_per_s / physics.hz] * len(physics.efforts)
@@ -137,9 +119,7 @@ class BulletEngine(Engine):
         """Robot and ball now; right after `reset` without torques, as Bullet has none before a step."""
         if self._pressing is None:
             return State(self._sample(), self._touching)
-        # Bodies that were removed since the last step have no names any more.
-        pressing = self._pressing & self._names.keys()
-        return State(self._sample(), frozenset(self._names[surface] for surface in pressing))
+        return State(self._sample(), self._name(self._pressing))
 
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them."""
@@ -188,20 +168,15 @@ class BulletEngine(Engine):
             self._ball, ball.linear_velocity, ball.angular_velocity, physicsClientId=self._client
         )
 
-    def ball_boxes(self) -> list[Box]:
-        """Find the box around the ball, along the axes of the world."""
-        return boxes(self._client, self._ball)
-
-    def robot_boxes(self) -> list[Box]:
-        """Find the boxes around the links of the robot, along the axes of the world."""
-        return boxes(self._client, self._scenery.robot)
-
     def _report_touch(self, step: int, observer: Observer) -> None:
         """Tell the observer which bodies press on the ball now, unless only other surfaces of the same bodies do."""
-        touching = frozenset(self._names[surface] for surface in self._pressing or ())
+        touching = self._name(self._pressing or ())
         if touching != self._touching:
             self._touching = touching
             observer.on_touch(step, touching)
+
+    def _name(self, surfaces: Iterable[Surface]) -> frozenset[str]:
+        return frozenset(self._scenery.names[surface] for surface in surfaces)
 
     def _sample(self) -> Sample:
         client, ball = self._client, self._ball

@@ -41,7 +41,7 @@ class Renderer:
         try:
             with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
                 place = (0.0, 0.0, base_height_m)
-                self._robot = load_urdf(self._client, heavy, Path(directory), place, _UPRIGHT)
+                self._robot = load_urdf(self._client, heavy, Path(directory), place)
         except ConfigError:
             pybullet.disconnect(self._client)
             raise

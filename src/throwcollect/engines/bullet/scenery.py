@@ -1,6 +1,6 @@
 """Sets up a Bullet world: ground, robot with its tool, ball.
 
-As long as no body is added, nothing but the ball collides with other things. Shapes of a robot may overlap each other
+Nothing but the ball collides with other things. Shapes of a robot may overlap each other
 at rest, and with these few pairs the order in which Bullet solves contacts does not depend on earlier trials.
 """
 
@@ -15,7 +15,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import BodyModel, Vector
-from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Quaternion, Scene
+from throwcollect.engines.engine import GROUND, LoadedLink, Physics, Quaternion, Scene
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.native_reading import reading_natively
 
@@ -25,9 +25,9 @@ Surface = tuple[int, int]
 BASE = -1
 """Link number of the first link of a body."""
 
-_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _ADDED_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
-"""Bullet lets a pair collide if the mask of either one has the group of the other: added bodies collide with all, and
-the floor, a ground that is not solid, with them alone."""
+_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _FLOOR_GROUP = 1, 2, 4, 16
+"""Bullet lets a pair collide if the mask of either one has the group of the other; the floor is a ground that is not
+solid."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
     # By default Bullet computes inertias from the collision shapes.
-    robot = load_body(client, scene.robot, (0.0, 0.0, scene.base_height_m))
+    robot = _load_robot(client, scene.robot, (0.0, 0.0, scene.base_height_m))
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
     names = {(ground, BASE): GROUND, (robot, BASE): root}
@@ -75,38 +75,27 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     for body, link in names:
         group, mask = _ROBOT_GROUP, _BALL_GROUP
         if body == ground:
-            group, mask = (_GROUND_GROUP, _BALL_GROUP) if scene.ground_is_solid else (_FLOOR_GROUP, _ADDED_GROUP)
+            group, mask = (_GROUND_GROUP, _BALL_GROUP) if scene.ground_is_solid else (_FLOOR_GROUP, 0)
         pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
     return Scenery(robot=robot, joints=[joints[joint] for joint in scene.moving], tool=tool, names=names)
 
 
-def load_body(
-    client: int,
-    model: BodyModel,
-    position: Vector,
-    turn: Quaternion = (0.0, 0.0, 0.0, 1.0),
-    *,
-    flags: int = pybullet.URDF_USE_INERTIA_FROM_FILE,
-) -> int:
-    """Load a body into a world at a pose in it, and return its number."""
+def _load_robot(client: int, model: BodyModel, position: Vector) -> int:
+    """Load a robot into a world at a place in it, and return its number."""
     # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         for name, content in model.encode_meshes().items():
             Path(directory, name).write_bytes(content)
-        return load_urdf(client, model.write_urdf(), Path(directory), position, turn, fixed=model.is_fixed, flags=flags)
+        return load_urdf(client, model.write_urdf(), Path(directory), position, pybullet.URDF_USE_INERTIA_FROM_FILE)
 
 
-def load_urdf(
-    client: int, urdf: str, directory: Path, position: Vector, turn: Quaternion, *, fixed: bool = True, flags: int = 0
-) -> int:
-    """Load URDF text, whose paths are relative to a directory, and return the number of the body."""
+def load_urdf(client: int, urdf: str, directory: Path, position: Vector, flags: int = 0) -> int:
+    """Load URDF text, whose paths are relative to a directory, with a fixed base; return the number of the body."""
     path = directory / "body.urdf"
     path.write_text(urdf, encoding="utf-8")
     with reading_natively("Bullet cannot load the description"):
         try:
-            return int(
-                pybullet.loadURDF(str(path), position, turn, useFixedBase=fixed, flags=flags, physicsClientId=client)
-            )
+            return int(pybullet.loadURDF(str(path), position, useFixedBase=True, flags=flags, physicsClientId=client))
         except pybullet.error as error:
             raise ConfigError(f"Bullet cannot load the description: {error}") from error
 
@@ -166,25 +155,9 @@ def renew_pairs(client: int, ball: int, *, floor: bool = False) -> None:
     pybullet.setCollisionFilterGroupMask(ball, BASE, _BALL_GROUP, mask, physicsClientId=client)
 
 
-def collide_with_everything(client: int, body: int) -> None:
-    """Let an added body collide with ground, robot, ball and other added bodies."""
-    mask = _GROUND_GROUP | _ROBOT_GROUP | _BALL_GROUP | _ADDED_GROUP | _FLOOR_GROUP
-    for link in links(client, body):
-        pybullet.setCollisionFilterGroupMask(body, link, _ADDED_GROUP, mask, physicsClientId=client)
-
-
 def links(client: int, body: int) -> range:
     """List the link numbers of a body, that of its base included."""
     return range(BASE, pybullet.getNumJoints(body, physicsClientId=client))
-
-
-def boxes(client: int, body: int) -> list[Box]:
-    """Find the boxes around those links of a body that have a shape, along the axes of the world."""
-    return [
-        pybullet.getAABB(body, link, physicsClientId=client)
-        for link in links(client, body)
-        if pybullet.getCollisionShapeData(body, link, physicsClientId=client)
-    ]
 
 
 def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> None:

@@ -8,8 +8,6 @@ begin to hop long before it leaves. So this module gives each contact the veloci
 from __future__ import annotations
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
 _ROWS = 3
 """Rows of a contact with sliding friction alone, without rolling and torsional friction."""
@@ -24,7 +22,7 @@ _LEAST_BOUNCE_MPS = 0.2
 """Contacts with a lower approach speed do not bounce, as in Bullet."""
 
 
-def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float64] | None) -> None:
+def aim_contacts(data: mujoco.MjData, hz: float, restitution: float) -> None:
     """Set the targets of all contacts, between ``mj_step1`` and ``mj_step2``.
 
     - Surfaces with a gap may close it in this step, but not penetrate each other.
@@ -34,8 +32,7 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float6
     Args:
         data: The world, with at least one contact.
         hz: Steps per second.
-        restitutions: One factor for each shape of the model; the restitution of a contact is the product of two. None
-            if nothing bounces.
+        restitution: Restitution of the contacts, which are all contacts of the ball.
     """
     # The last rows are those of contacts, three for each: one along its normal, and two of friction. Contacts of shapes
     # that merely touch have no rows. There are one or two contacts, for which plain numbers take a third of the time of
@@ -44,9 +41,8 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float6
     for row in range(data.ne + data.nf + data.nl, len(gaps), _ROWS):
         away, speed = gaps[row] * hz, speeds[row]
         wanted = max(away, _CORRECTED * away)
-        if restitutions is not None and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:
-            one, other = restitutions[data.contact.geom[data.efc_id[row]]].tolist()
-            wanted = one * other * speed
+        if restitution and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:
+            wanted = restitution * speed
         # Surfaces part at positive speeds. As the solver reaches the share `HARDNESS` of this acceleration, the speed
         # after the step is about `-wanted`.
         targets[row] = (wanted + speed) * (-hz / HARDNESS)

@@ -10,12 +10,10 @@ from operator import itemgetter
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import (
     BodyState,
-    Box,
     Engine,
     LoadedLink,
     Observer,
@@ -26,19 +24,14 @@ from throwcollect.engines.engine import (
     Steps,
     ball_of,
 )
-from throwcollect.engines.mujoco.bodies import MujocoBodies
 from throwcollect.engines.mujoco.contact_targets import aim_contacts
 from throwcollect.engines.mujoco.rotations import turn, turn_back
 from throwcollect.engines.mujoco.scenery import (
-    BALL,
     Surface,
-    boxes,
     describe_links,
-    keep_motion,
     let_ball_hit_floor,
     make_spec,
     resize_ball,
-    restitutions_of,
     set_physics,
 )
 from throwcollect.errors import ConfigError
@@ -60,10 +53,8 @@ class MujocoEngine(Engine):
     _surfaces: list[Surface]
     _model: mujoco.MjModel
     _data: mujoco.MjData
-    _restitutions: NDArray[np.float64] | None
 
     def __init__(self) -> None:
-        self.bodies: MujocoBodies = MujocoBodies(self._compile_anew, lambda: (self._model, self._data))
         self._is_loaded = False
         self._touching: frozenset[str] = frozenset()
 
@@ -73,45 +64,24 @@ class MujocoEngine(Engine):
             self._is_loaded = False
             del self._model, self._data
 
-    @property
-    def is_as_loaded(self) -> bool:
-        """Say whether no body was added since the world was loaded."""
-        return not self.bodies.leave_traces
-
     def load(self, scene: Scene) -> None:
         """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
-        can_keep = self._is_loaded and self.is_as_loaded
-        if can_keep and dataclasses.replace(self._scene, ball_radius_m=scene.ball_radius_m) == scene:
+        if self._is_loaded and dataclasses.replace(self._scene, ball_radius_m=scene.ball_radius_m) == scene:
             resize_ball(self._model, scene.ball_radius_m)
             self._scene = scene
             return
         self._scene, self._is_loaded = scene, False
-        self.bodies.forget()
         try:
-            self._compile()
+            spec, self._surfaces = make_spec(scene)
+            self._model = spec.compile()
         except ValueError as error:
             raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
+        self._data = mujoco.MjData(self._model)
         # Joints of the robot come first in the model, but not in the order of the scene.
         names = [self._model.joint(number).name for number in range(len(scene.moving))]
         self._columns = np.array([scene.moving.index(name) for name in names])
         self._places = [names.index(name) for name in scene.moving]
         self._is_loaded = True
-
-    def _compile(self) -> None:
-        """Compile the world of the scene with all bodies."""
-        spec, surfaces = make_spec(self._scene)
-        surfaces += self.bodies.attach(spec)
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
-        self._surfaces = surfaces
-
-    def _compile_anew(self) -> None:
-        """Compile the world with other bodies; robot, ball and bodies that stay keep their motion."""
-        model, data = self._model, self._data
-        self._compile()
-        self.configure(self._physics)
-        self.bodies.place_fixed()
-        keep_motion(model, data, self._model, self._data)
 
     def describe_robot(self) -> list[LoadedLink]:
         """Describe the robot's links as MuJoCo has them."""
@@ -121,7 +91,6 @@ class MujocoEngine(Engine):
         """Set all numbers of the physics."""
         self._physics = physics
         set_physics(self._model, physics)
-        self._restitutions = restitutions_of(self._model, physics)
         self._pick = _make_sample_picker(self._model, self._places)
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
@@ -137,11 +106,8 @@ class MujocoEngine(Engine):
     def reset(self, state: State) -> None:
         """Put robot and ball into a state, and leave no trace of earlier ones in the world."""
         count, data = len(self._columns), self._data
-        # Bodies that were added stay where they are.
-        added = data.qpos[count + 7 :].copy(), data.qvel[count + 6 :].copy()
         let_ball_hit_floor(self._model, floor=False)
         mujoco.mj_resetData(self._model, data)
-        data.qpos[count + 7 :], data.qvel[count + 6 :] = added
         positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
         data.qpos[:count], data.qvel[:count] = positions[self._columns], velocities[self._columns]
         self.place_ball(ball_of(state.sample))
@@ -151,9 +117,7 @@ class MujocoEngine(Engine):
     @property
     def state(self) -> State:
         """Robot and ball now; right after `reset` without torques, as there are none before a step."""
-        # `_touching` may name bodies that were removed since the last step.
-        names = {surface.name for surface in self._surfaces}
-        return State(self._sample(), self._touching & names)
+        return State(self._sample(), self._touching)
 
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
@@ -181,7 +145,7 @@ class MujocoEngine(Engine):
         multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
         begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
-        restitutions = self._restitutions
+        restitution = physics.ball_restitution
         untouched = presses.tobytes()
         # This equals no state of the surfaces, so the first step compares what presses with what pressed before.
         last_presses, number = b"", 0
@@ -199,7 +163,7 @@ class MujocoEngine(Engine):
             maximum(minimum(work, most, out=work), least, out=torque)
             contacts = data.ncon
             if contacts:
-                aim_contacts(data, hz, restitutions)
+                aim_contacts(data, hz, restitution)
             if drag:
                 self._apply_drag(drag)
             end_step(model, data)
@@ -224,27 +188,15 @@ class MujocoEngine(Engine):
         spin = turn_back(ball.orientation_xyzw, ball.angular_velocity)
         self._data.qvel[first : first + 6] = (*ball.linear_velocity, *spin)
 
-    def ball_boxes(self) -> list[Box]:
-        """Find the box around the ball, along the axes of the world."""
-        return self._find_boxes([self._model.body(BALL).id])
-
-    def robot_boxes(self) -> list[Box]:
-        """Find the boxes around the links of the robot, along the axes of the world."""
-        return self._find_boxes(range(1, self._model.body(BALL).id))
-
     def _compute_contact_forces(self) -> None:
         """Compute the contact forces on the robot that motors need in the first step, as if they had held it before."""
         model, data, count = self._model, self._data, len(self._columns)
         mujoco.mj_step1(model, data)
         data.qfrc_applied[:count] = data.qfrc_bias[:count]
         if data.ncon:
-            aim_contacts(data, self._physics.hz, self._restitutions)
+            aim_contacts(data, self._physics.hz, self._physics.ball_restitution)
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
-
-    def _find_boxes(self, bodies: Sequence[int]) -> list[Box]:
-        mujoco.mj_kinematics(self._model, self._data)
-        return boxes(self._model, self._data, bodies)
 
     def _report_touch(self, step: int, presses: bytes, observer: Observer) -> None:
         """Tell the observer which bodies press on the ball now, if others did before.

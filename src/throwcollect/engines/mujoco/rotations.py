@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
-import numpy as np
-from numpy.typing import NDArray
-
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import Quaternion
 
@@ -25,10 +21,3 @@ def turn_back(orientation_xyzw: Quaternion, vector: Vector) -> Vector:
     """Turn a vector from world into the frame of a body."""
     x, y, z, w = orientation_xyzw
     return turn((-x, -y, -z, w), vector)
-
-
-def rotation(orientation_wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Make the matrix of a unit quaternion, shape ``(3, 3)``."""
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, orientation_wxyz)
-    return matrix.reshape(3, 3)

@@ -1,11 +1,10 @@
 """Sets up a MuJoCo world: ground, robot with its tool, ball.
 
-As in Bullet, nothing but the ball collides with other things as long as no body is added.
+As in Bullet, nothing but the ball collides with other things.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import mujoco
@@ -19,14 +18,13 @@ from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 
 BALL = "ball"
-"""Name of the ball's body and shape; those of added bodies begin with the name of the body and a slash."""
+"""Name of the ball's body and shape."""
 
-_GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT, _ADDED_BIT = 1, 2, 4, 8
+_GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT = 1, 2, 4
 """Bits of ``contype`` and ``conaffinity``: a pair collides if the one's type is among those that the other collides
 with."""
 
-_BALL_HITS = _GROUND_BIT | _ROBOT_BIT | _ADDED_BIT
-_EVERYTHING = _GROUND_BIT | _ROBOT_BIT | _FLOOR_BIT | _ADDED_BIT
+_BALL_HITS = _GROUND_BIT | _ROBOT_BIT
 _REACH_M = 0.02
 """MuJoCo makes a contact of shapes at this distance, so that a fast ball does not get inside of a shape in one step."""
 
@@ -55,8 +53,8 @@ class Surface:
     name: str
 
 
-def read_body(model: BodyModel) -> mujoco.MjSpec:
-    """Read a body, whose links all become bodies of MuJoCo."""
+def _read_robot(model: BodyModel) -> mujoco.MjSpec:
+    """Read the robot, whose links all become bodies of MuJoCo."""
     text = model.write_urdf()
     begin = text.index("<robot")
     at = text.index(_ROOT_TAG_END, begin) + 1
@@ -74,7 +72,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         The world, and its surfaces that can press on the ball.
     """
     try:
-        spec = read_body(scene.robot.rename_links({_WORLD_LINK: _STAND_IN}))
+        spec = _read_robot(scene.robot.rename_links({_WORLD_LINK: _STAND_IN}))
     except ValueError as error:
         raise ConfigError(f"MuJoCo cannot read the robot's description: {error}") from error
     world = spec.worldbody
@@ -94,7 +92,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     )
     _add_ball(spec, scene.ball_radius_m)
     for surface in surfaces:
-        watch(spec, surface)
+        _watch(spec, surface)
     option = spec.option
     # `MujocoEngine.run` relies on damping that acts on the velocity after the step.
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -120,7 +118,7 @@ def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
     )
 
 
-def watch(spec: mujoco.MjSpec, surface: Surface) -> None:
+def _watch(spec: mujoco.MjSpec, surface: Surface) -> None:
     """Add a sensor of the force with which a surface presses on the ball; its first number is the normal force."""
     # The sensor reports the force of one contact: of all between the two bodies, the strongest.
     force, strongest, one = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 2, 1
@@ -132,17 +130,6 @@ def watch(spec: mujoco.MjSpec, surface: Surface) -> None:
         refname=surface.body,
         intprm=(force, strongest, one),
     )
-
-
-def collide_with_everything(spec: mujoco.MjSpec) -> None:
-    """Let the links of an added body collide with everything but each other."""
-    bodies = spec.bodies[1:]
-    for body in bodies:
-        for geom in body.geoms:
-            geom.contype, geom.conaffinity = _ADDED_BIT, _EVERYTHING
-    for number, body in enumerate(bodies):
-        for other in bodies[:number]:
-            spec.add_exclude(bodyname1=other.name, bodyname2=body.name)
 
 
 def resize_ball(model: mujoco.MjModel, radius: float) -> None:
@@ -182,56 +169,23 @@ def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float64] | None:
-    """Find the factor of each shape in the restitution of its contacts with the ball; None if nothing bounces."""
-    if physics.ball_restitution == 0:
+def _find_box(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> Box | None:
+    """Find the box around the shapes of a body, along the axes of the world; None if it has none."""
+    first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
+    if not count:
         return None
-    # The ball does not bounce off added bodies that can move, as in Bullet; it does bounce off the robot.
-    added = model.geom_contype == _ADDED_BIT
-    # Bodies that are attached to the world have the number of the world, which is 0.
-    moves = model.body_weldid[model.geom_bodyid] != 0
-    factors = np.where(added & moves, 0.0, 1.0)
-    factors[model.geom(BALL).id] = physics.ball_restitution
-    return factors
-
-
-def keep_motion(model: mujoco.MjModel, data: mujoco.MjData, other_model: mujoco.MjModel, other: mujoco.MjData) -> None:
-    """Copy the motion of all joints that two worlds have in common from the first to the second."""
-    common = {other_model.joint(number).name for number in range(other_model.njnt)}
-    for name in (model.joint(number).name for number in range(model.njnt)):
-        if name in common:
-            for field in ("qpos", "qvel", "qacc_warmstart", "qfrc_applied", "qfrc_constraint"):
-                setattr(other.joint(name), field, getattr(data.joint(name), field))
-
-
-Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Origin [m], shape ``(3,)``, and orientation, shape ``(3, 3)``, in world."""
-
-WORLD: Frame = (np.zeros(3), np.eye(3))
-
-
-def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int], frame: Frame = WORLD) -> list[Box]:
-    """Find the boxes around those of some bodies that have a shape, along the axes of a frame."""
-    enclosing = []
-    for body in bodies:
-        first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
-        if count:
-            corners = [_find_extent(model, data, geom, frame) for geom in range(first, first + count)]
-            lowest = np.min([low for low, _ in corners], axis=0)
-            highest = np.max([high for _, high in corners], axis=0)
-            enclosing.append((tuple(lowest.tolist()), tuple(highest.tolist())))
-    return enclosing
+    lows, highs = zip(*(_find_extent(model, data, geom) for geom in range(first, first + count)), strict=True)
+    return tuple(np.min(lows, axis=0).tolist()), tuple(np.max(highs, axis=0).tolist())
 
 
 def _find_extent(
-    model: mujoco.MjModel, data: mujoco.MjData, geom: int, frame: Frame
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find the lowest and highest corner of the box around a shape's own box."""
-    origin, axes = frame
-    turned = matmul(axes.T, data.geom_xmat[geom].reshape(3, 3))
+    turned = data.geom_xmat[geom].reshape(3, 3)
     # MuJoCo has the box of a shape as its centre and its half sizes.
     box = model.geom_aabb[geom].reshape(2, 3, 1)
-    centre = matmul(axes.T, (data.geom_xpos[geom] - origin).reshape(3, 1)) + matmul(turned, box[0])
+    centre = data.geom_xpos[geom].reshape(3, 1) + matmul(turned, box[0])
     half = matmul(np.abs(turned), box[1])
     return (centre - half).ravel(), (centre + half).ravel()
 
@@ -246,7 +200,6 @@ def describe_links(model: mujoco.MjModel, robot: BodyModel) -> list[LoadedLink]:
         body = model.body(_STAND_IN if link.name == _WORLD_LINK else link.name).id
         joint = int(model.body_jntadr[body])
         frame = data.ximat[body].reshape(3, 3)
-        around = boxes(model, data, [body])
         found.append(
             LoadedLink(
                 name=link.name,
@@ -254,7 +207,7 @@ def describe_links(model: mujoco.MjModel, robot: BodyModel) -> list[LoadedLink]:
                 centre=data.xipos[body].copy(),
                 inertia=frame * model.body_inertia[body] @ frame.T,
                 shapes=int(model.body_geomnum[body]),
-                box=around[0] if around else None,
+                box=_find_box(model, data, body),
                 axis=data.xaxis[joint].copy() if joint >= 0 else None,
                 range=tuple(model.jnt_range[joint].tolist()) if joint >= 0 else None,
             )

@@ -28,6 +28,7 @@ class Landings:
     """All throws whose ball crossed the landing plane, of any outcome; each array has the shape ``(n,)``.
 
     Attributes:
+        row: Place of the throw in the table.
         trial: Number of the trial.
         x_m: Ball centre in world [m], forward of the robot.
         y_m: Ball centre in world [m], left of the robot.
@@ -38,6 +39,7 @@ class Landings:
         code: Outcome, as index into `Outcomes.names`.
     """
 
+    row: NDArray[np.intp]
     trial: NDArray[np.int64]
     x_m: NDArray[np.float64]
     y_m: NDArray[np.float64]
@@ -63,6 +65,7 @@ def read_landings(throws: pa.Table, outcomes: Outcomes) -> Landings:
     """Read the landings of a table of throws."""
     x, y = read_numbers(throws, "landing_x_m"), read_numbers(throws, "landing_y_m")
     landings = Landings(
+        row=np.arange(len(throws)),
         trial=np.asarray(throws["trial"].to_numpy()),
         x_m=x,
         y_m=y,
@@ -134,7 +137,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
     else:
         if target.height_m is not None:
             # The column has the heights of all trials, but only trials with landings matter here.
-            values["height_m"] = read_numbers(throws, column_of(LANDING_HEIGHT))[landings.trial]
+            values["height_m"] = read_numbers(throws, column_of(LANDING_HEIGHT))[landings.row]
         bins = target.dimensions
         values = {name: column for name, column in values.items() if name in bins}
         edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}

@@ -14,7 +14,9 @@ from throwcollect.report.throw.throw_figures import draw_coverage_map
 def make_landings(distance: list[float], angle: list[float]) -> Landings:
     count, zero = len(distance), np.zeros(len(distance))
     trials = np.arange(count)
-    return Landings(trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0)
+    return Landings(
+        trials, trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0
+    )
 
 
 def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
