@@ -25,7 +25,6 @@ EXTRA_OF = MappingProxyType(
         "pinocchio": "collect",
         "pybullet": "collect",
         "scipy": "collect",
-        "setproctitle": "collect",
         "xxhash": "collect",
         "zenoh": "collect",
         "docker": "docker",

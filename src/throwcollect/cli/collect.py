@@ -20,7 +20,6 @@ from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
 from throwcollect.interruption import count_interruptions
-from throwcollect.own_process import keep_objects
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command
 
@@ -258,13 +257,11 @@ def _collect(
     """
     shown = display(quiet=json, bar=not detach)
     with ExitStack() as held:
-        if (run := prepare_run(ahead=not detach, onlooker=shown)) is not None:
+        if (run := prepare_run(onlooker=shown)) is not None:
             held.enter_context(run)
             _announce(run, token_file, view=view)
             if not detach:
-                # The bar comes only now: while its thread runs, nodes are not forked off this process, and start later.
                 with shown, count_interruptions() as interruptions:
-                    keep_objects()
                     summary = run.collect(interruptions=interruptions)
         if run is not None and detach:
             _start(run, json=json)

@@ -80,7 +80,7 @@ def collect_slice(
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
-    request = RunRequest(config, directory, attempt, started, plan, ahead=True)
+    request = RunRequest(config, directory, attempt, started, plan)
     with ExitStack() as unpublished:
         if scratch is not None:
             unpublished.callback(_keep_recordings, attempt, earlier, directory, slice)

@@ -47,7 +47,6 @@ _PRESS = 3
 class MujocoEngine(Engine):
     """A MuJoCo world in this process."""
 
-    can_be_forked = True
     _scene: Scene
     _physics: Physics
     _surfaces: list[Surface]
