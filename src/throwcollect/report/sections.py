@@ -9,7 +9,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from throwcollect.dataset.directory import CONFIG, JOURNAL, PROVENANCE
+from throwcollect.dataset.directory import CONFIG, FORMAT, JOURNAL, PROVENANCE
 from throwcollect.dataset.inspect import summary
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.provenance import read_provenance
@@ -127,7 +127,7 @@ def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
     return {
         "dataset digest": info.digest,
         "configuration digest": config_digest(dataset.config),
-        "layout": dataset.layout,
+        "layout": FORMAT,
         "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
         **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
     }
