@@ -200,7 +200,7 @@ def begin(run: str, lock: LockOption) -> None:
 
 
 def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
-    from throwcollect.dataset.slice_directory import slice_directory
+    from throwcollect.dataset.slices import slice_directory
     from throwcollect.runs.slices import collect_slice
     from throwcollect.sweep.slice import Slice
 
@@ -237,7 +237,7 @@ def join(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Make one dataset of the slices that `up --slice` has collected."""
     from throwcollect.cli.dataset.info import print_collected
     from throwcollect.dataset.inspect import info
-    from throwcollect.dataset.join import join as join_slices
+    from throwcollect.dataset.slices import join as join_slices
 
     join_slices(directory)
     print_collected(info(directory), directory, as_json=json)
