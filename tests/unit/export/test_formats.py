@@ -26,7 +26,6 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.selection import sample
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.export.export import export
-from throwcollect.export.exporter import Exporter
 from throwcollect.export.signals import unit_of
 from throwcollect.extras import MissingExtraError
 from throwcollect.members import load_member
@@ -270,25 +269,3 @@ def test_an_error_in_a_format_of_another_package_names_the_package(
         f"the exporter csv of csv_export 1.0 cannot write {output}: ValueError: no such column"
     )
     assert not output.exists()
-
-
-@pytest.mark.usefixtures("with_csv")
-@pytest.mark.parametrize(
-    ("files", "said"),
-    [
-        ((), "write should leave files in the directory, which is empty"),
-        (("throws.csv", "README.md"), "write should leave out README.md, which every export has"),
-        (("trials.parquet",), "write should leave out trials.parquet, which every export has"),
-    ],
-)
-def test_a_format_that_writes_nothing_or_the_card_is_refused(
-    files: tuple[str, ...], said: str, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def write(_: object, directory: Path) -> None:
-        for name in files:
-            (directory / name).write_text("mine")
-
-    monkeypatch.setattr("throwcollect.export.export.load_member", lambda *_: Exporter(lambda _: None, write))
-    with pytest.raises(MemberError, match=f"the exporter csv of csv_export 1.0 cannot write .*: {said}"):
-        export(source, tmp_path / "text", to="csv")
-    assert not (tmp_path / "text").exists()

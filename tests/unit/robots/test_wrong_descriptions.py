@@ -95,9 +95,8 @@ def test_a_tool_with_the_name_of_a_link_or_the_ground_is_refused(monkeypatch: py
 
 
 def test_a_function_that_does_not_find_the_files_is_named(tmp_path: Path) -> None:
-    for share, said in ((lambda: 1 / 0, "ZeroDivisionError"), (lambda: str(tmp_path), "should be an instance of Path")):
-        with pytest.raises(MemberError, match=f"the robot arm of .* cannot find its files: .*{said}"):
-            _ = replace(make_arm(tmp_path), share=share).urdf_path
+    with pytest.raises(MemberError, match=r"the robot arm of .* cannot find its files: ZeroDivisionError"):
+        _ = replace(make_arm(tmp_path), share=lambda: 1 / 0).urdf_path
 
 
 INERTIA = '<mass value="2"/><inertia ixx="{}" ixy="0" ixz="0" iyy="{}" iyz="0" izz="{}"/>'
