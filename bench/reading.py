@@ -33,7 +33,7 @@ from throwcollect import load
 from throwcollect.dataset.reader import Dataset
 
 THROWS = 10_000
-COLUMNS = ("stamps_ns", "joints.position", "joints.velocity", "joints.effort", "ball.position", "ball.velocity")
+COLUMNS = ("stamps_ns", "joints_position", "joints_velocity", "joints_effort", "ball_position", "ball_velocity")
 _BY_MESSAGES = 100
 """Throws that the `mcap` library reads; all would take minutes."""
 _RECORD = struct.Struct("<BQ")

@@ -1,7 +1,7 @@
 """The names of rclpy's API that nodes use, and a few of our own; `context.init` begins a session."""
 
-from rclzenoh.action.client import ActionClient
-from rclzenoh.action.graph import (
+from rclzenoh.action.client import (
+    ActionClient,
     get_action_client_names_and_types_by_node,
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,

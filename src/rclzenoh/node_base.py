@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from rclzenoh.clock import ROSClock
 from rclzenoh.context import Context, get_default_context
 from rclzenoh.exceptions import NotInitializedException
 from rclzenoh.keys import EntityKind, Token
 from rclzenoh.logging import Logger
 from rclzenoh.mailbox import Mailbox
 from rclzenoh.names import absolute_namespace, check_node_name, join, resolve
+from rclzenoh.time import ROSClock
 from rclzenoh.timer import Timer
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rclzenoh.clock import ROSClock
+from rclzenoh.time import ROSClock
 
 
 class Timer:

@@ -12,9 +12,8 @@ if TYPE_CHECKING:
     from throwcollect import runs
     from throwcollect.config.loader import load as load_config
     from throwcollect.config.schema import Config
-    from throwcollect.dataset.reader import Dataset
+    from throwcollect.dataset.reader import Dataset, UnfinishedDatasetWarning, load
     from throwcollect.dataset.throw import Throw
-    from throwcollect.dataset.unfinished import UnfinishedDatasetWarning, load
     from throwcollect.derive.selection import filter_trials as filter_dataset
     from throwcollect.derive.selection import merge as merge_datasets
     from throwcollect.derive.selection import sample as sample_dataset
@@ -84,13 +83,13 @@ _PLACES = {
     "Simulator": "simulator:Simulator",
     "Throw": "dataset.throw:Throw",
     "ThrowcollectError": "errors:ThrowcollectError",
-    "UnfinishedDatasetWarning": "dataset.unfinished:UnfinishedDatasetWarning",
+    "UnfinishedDatasetWarning": "dataset.reader:UnfinishedDatasetWarning",
     "WorkerError": "errors:WorkerError",
     "compute_statistics": "derive.statistics:statistics",
     "export_dataset": "export.export:export",
     "filter_dataset": "derive.selection:filter_trials",
     "fit": "learning.model:fit",
-    "load": "dataset.unfinished:load",
+    "load": "dataset.reader:load",
     "load_config": "config.loader:load",
     "load_model": "learning.model:load_model",
     "merge_datasets": "derive.selection:merge",

@@ -29,7 +29,6 @@ from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
-from throwcollect.dataset.trajectory_columns import ThrowInMemory
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
@@ -239,7 +238,7 @@ class Simulator:
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
         # In a dataset, these two values come from a shard; the row was made without one.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
-        return Throw(table.table([row]), 0, keys, ThrowInMemory(episode), self._source)
+        return Throw(table.table([row]), 0, keys, episode, self._source)
 
 
 def _check_that_it_can_be_sent(index: int, point: object) -> None:

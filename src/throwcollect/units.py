@@ -22,6 +22,7 @@ _SUFFIXES = {
     "_m": "m",
     "_s": "s",
 }
+_ASCII = str.maketrans({"²": "^2", "³": "^3"})
 DECIMALS = "decimals are written with a point, as in 1.5"
 _DEGREES = ("°", "deg", "degree", "degrees")
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?)\s*([^-+.,\d\s].*?|)\s*")
@@ -33,6 +34,11 @@ _LEAST_SHOWN = 0.01
 def unit_of_name(name: str) -> str:
     """Find the unit that a name of a key or column ends with, such as ``m/s²`` for ``gravity_mps2``, or empty."""
     return next((unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix)), "")
+
+
+def ascii_unit(unit: str) -> str:
+    """Write a unit in ASCII, such as ``m/s^2``; ``1`` for counts and shares."""
+    return unit.translate(_ASCII) or "1"
 
 
 def explain_number(given: object, unit: str) -> str:

@@ -28,7 +28,9 @@ def list_public_modules() -> list[Path]:
     """The modules whose names `throwcollect` offers to other programs, and those of families."""
     modules = [place.partition(":")[0] for place in throwcollect._PLACES.values()]
     source = ROOT / "src" / "throwcollect"
-    places = [source / module.replace(".", "/") for module in (*modules, *FAMILIES) if module not in ("errors", "extras")]
+    places = [
+        source / module.replace(".", "/") for module in (*modules, *FAMILIES) if module not in ("errors", "extras")
+    ]
     return sorted({place / "__init__.py" if place.is_dir() else place.with_suffix(".py") for place in places})
 
 

@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import sysconfig
-import tarfile
 from pathlib import Path
 
 import pytest
 from docker.client import DockerClient
 
-import throwcollect
 from tests.cluster.conftest import BUILD, SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
-from throwcollect.errors import ConfigError
-from throwcollect.runtimes.apptainer.sif import make_sif
-from throwcollect.runtimes.apptainer.sif_contents import check_sif, read_labels
+from throwcollect.runtimes.apptainer.sif_contents import check_sif
 from throwcollect.runtimes.docker.image import save_image
-from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster
@@ -115,32 +107,6 @@ def test_two_users_on_one_machine_do_not_disturb_each_other(place: Path, expecte
     assert fingerprints(place / USER / "dataset") == fingerprints(place / "nobody" / "dataset") == expected
 
 
-def test_apptainer_does_not_evaluate_arguments_a_second_time(place: Path) -> None:
-    process = start("""apptainer run throwcollect.sif config throws.yaml --set 'name=a$PWD"b'""", place)
-    assert """got 'a$PWD"b'""" in process.communicate(timeout=60)[0]
-
-
-def test_the_labels_of_a_sif_name_its_version(sif: Path) -> None:
-    check_sif(sif)
-    assert read_labels(sif)[VERSION_LABEL] == throwcollect.__version__
-
-
-def test_a_sif_of_an_archive_with_other_sources_is_refused(tmp_path: Path) -> None:
-    layer = pack({"etc/hostname": b""})
-    config = {
-        "architecture": "amd64",
-        "os": "linux",
-        "config": {"Entrypoint": ["throwcollect"], "Labels": {SOURCES_LABEL: "0" * 64}},
-        "rootfs": {"type": "layers", "diff_ids": [f"sha256:{hashlib.sha256(layer).hexdigest()}"]},
-    }
-    manifest = [{"Config": "config.json", "RepoTags": ["throwcollect:old"], "Layers": ["layer.tar"]}]
-    texts = {"config.json": json.dumps(config).encode(), "manifest.json": json.dumps(manifest).encode()}
-    (tmp_path / "image.tar").write_bytes(pack({**texts, "layer.tar": layer}))
-    make_sif(tmp_path / "old.sif", archive=tmp_path / "image.tar", say=lambda _line: None)
-    with pytest.raises(ConfigError, match="was made from other sources than these"):
-        check_sif(tmp_path / "old.sif")
-
-
 @pytest.mark.skipif(
     "THROWCOLLECT_TEST_ALL" not in os.environ, reason="takes a minute of two cores; THROWCOLLECT_TEST_ALL=1"
 )
@@ -169,13 +135,3 @@ def test_a_sif_built_without_an_engine_collects_the_same_files(
     check_sif(place / "own.sif")
     finish(start("apptainer run own.sif up -n 2 throws.yaml --output dataset", place, PYTHONPATH="/nowhere"))
     assert fingerprints(place / "dataset") == expected
-
-
-def pack(files: dict[str, bytes]) -> bytes:
-    packed = io.BytesIO()
-    with tarfile.open(fileobj=packed, mode="w") as archive:
-        for name, content in files.items():
-            info = tarfile.TarInfo(name)
-            info.size = len(content)
-            archive.addfile(info, io.BytesIO(content))
-    return packed.getvalue()

@@ -241,35 +241,6 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
     assert "nothing is left to submit" in call(slurm, "resume", data)
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        (["cluster.partition=nowhere"], "invalid partition specified"),
-        (["cluster.image=/nowhere.sif"], "cluster.image: there is no image /nowhere.sif"),
-        (["until.landed=3"], "until: a plan that grows with its results"),
-        (["record.trials_per_shard=24"], "24 trials are 1 shard of 24, which cannot be 3 slices"),
-        (["cluster.time=soon"], "cluster.time: should be minutes"),
-    ],
-)
-def test_a_refused_submission_leaves_no_directory_and_no_job(
-    slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path, settings: list[str], message: str
-) -> None:
-    data = tmp_path / "data"
-    options = [word for setting in settings for word in ("--set", setting)]
-    assert message in call(slurm, "submit", short[0], "--output", data, "--tasks", str(TASKS), *options, expect=2)
-    assert not data.exists()
-    assert not slurm.run("squeue", "--noheader", "--format=%k").count(str(data))
-
-
-def test_more_array_tasks_than_slurm_takes_are_refused(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=24)
-    said = call(
-        slurm, "submit", config, "--output", tmp_path / "data", "--tasks", "20000", "--trials", "20000",
-        "--set", "record.trials_per_shard=1", expect=2,
-    )  # fmt: skip
-    assert "--tasks 20000: is more than Slurm takes here" in said
-
-
 def test_the_file_of_the_site_gives_defaults_for_cluster_keys(
     slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:
@@ -283,13 +254,6 @@ def test_the_file_of_the_site_gives_defaults_for_cluster_keys(
     site.write_text("partition: low\ntiem: 30\n")
     said = call(slurm, *arguments, "cluster.time=10", expect=2, XDG_CONFIG_HOME=str(tmp_path))
     assert "cluster.yaml:2: tiem: unknown key" in said
-
-
-def test_submit_without_slurm_is_an_error(short: tuple[Path, dict[str, str]], slurm: Slurm, tmp_path: Path) -> None:
-    data = tmp_path / "data"
-    said = call(slurm, "submit", short[0], "--output", data, "--tasks", str(TASKS), expect=2, PATH="/nowhere")
-    assert "this machine cannot submit to Slurm" in said
-    assert not data.exists()
 
 
 def test_an_array_task_near_its_time_limit_goes_on_without_disturbing_others(

@@ -10,17 +10,23 @@ import itertools
 import json
 import os
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import pytest
 
 from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from tests.contract.rig import Rig
+from tests.fast_dds import mark_flaky
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 
 # Above 101, the ports of a domain are among those that any process may be given. Tests at the same time share them out.
 _PROCESS, _PROCESSES = os.environ.get("PYTEST_XDIST_WORKER", "gw0"), os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")
 _domains = itertools.cycle(range(1 + int(_PROCESS.removeprefix("gw")), 102, int(_PROCESSES)))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    mark_flaky(item for item in items if Path(__file__).parent in item.path.parents)
 
 
 @pytest.fixture(scope="session")

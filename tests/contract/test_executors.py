@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from tests.contract.rig import ON_RCLPY, choose_words
+from tests.contract.rig import ON_RCLPY, PATIENCE_S, choose_words
 from throwcollect.ros import ExternalShutdownException, Future, SingleThreadedExecutor, get_message
 
 String = get_message("std_msgs/msg/String")
@@ -24,7 +24,7 @@ def test_spinning_once_without_work_returns_after_the_timeout(executor):
     start = time.monotonic()
     executor.spin_once(timeout_sec=0)
     executor.spin_once(timeout_sec=0.05)
-    assert 0.05 <= time.monotonic() - start < 1.0
+    assert 0.05 <= time.monotonic() - start < PATIENCE_S
 
 
 def test_a_waiting_executor_wakes_when_a_message_arrives(rig, node, executor):
@@ -90,7 +90,7 @@ def test_waiting_for_a_future_ends_at_the_timeout(node, executor):
     start = time.monotonic()
     executor.spin_until_future_complete(future, timeout_sec=0.05)
     assert not future.done()
-    assert 0.05 <= time.monotonic() - start < 1.0
+    assert 0.05 <= time.monotonic() - start < PATIENCE_S
 
 
 def test_an_exception_in_a_task_reaches_its_result_and_the_spinning_caller(node, executor):

@@ -5,7 +5,7 @@ import sys
 
 from tests.contract.rig import ON_RCLPY, SERVER, names_of, start_python
 
-GONE_S = 40.0 if ON_RCLPY else 5.0
+GONE_S = 40.0 if ON_RCLPY else 30.0
 """By default, DDS takes a silent process for living for 20 s."""
 
 

@@ -1,27 +1,21 @@
 """Each mistake of a user gives one clear message and the right exit code, no files and no traceback."""
 
-import contextlib
 import json
 import os
-import pty
-import socket
 import subprocess
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from tests.commands import command, start_command
+from tests.commands import command
 from tests.e2e.collection import FAST, INPROCESS, call, call_here, collect_here, write_config
 from tests.restrictions import Restrictions
-from throwcollect.robots.talos import TALOS
 from throwcollect.runs.records import Records
 
 pytestmark = pytest.mark.e2e
 
-TALOS_DATA = "example-robot-data/robots/talos_data"
 OBEYING = Restrictions(obeys_permissions=True)
 LIST = ["--set", "sweep.sampler=list", "--set", "sweep.parameters={}", "--set"]
 
@@ -167,28 +161,6 @@ def test_a_taken_output_directory_is_left_alone(
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "notes.txt", "small.yaml", "used"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "where"),
-    [
-        (lambda port: ["small.yaml", "--set", f"run.router_port={port}"], ""),
-        (lambda _: ["busy.yaml"], "busy.yaml:10: "),
-    ],
-)
-def test_a_busy_port_is_found_before_anything_is_written(
-    arguments: Callable[[int], list[str]], where: str, say: Callable[..., Said], small: Path, tmp_path: Path
-) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        (tmp_path / "busy.yaml").write_text(small.read_text().replace("{runtime", f"{{router_port: {port}, runtime"))
-        said = say("up", *arguments(port), "--output", "data")
-    assert said.code == 2
-    assert said.err == (
-        f"throwcollect: {where}run.router_port: port {port} of 127.0.0.1 cannot be used: Address already in use\n"
-        "  try: --set run.router_port=0 takes a free one\n"
-    )
-    assert not (tmp_path / "data").exists()
-
-
 def test_a_sweep_that_the_robot_cannot_do_is_refused(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
     said = say("up", "small.yaml", "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}", "--output", "data")
     assert said.code == 2
@@ -207,49 +179,6 @@ def test_up_into_a_directory_without_write_permission_is_refused(directory: str,
     assert said.stderr.startswith(f"throwcollect: {tmp_path / directory}")
     assert "Permission denied" in said.stderr
     assert list((tmp_path / "locked").iterdir()) == []
-
-
-def test_a_configuration_without_read_permission_is_refused(small: Path) -> None:
-    small.chmod(0o000)
-    said = call("plan", small, restrictions=OBEYING)
-    assert (said.returncode, said.stdout) == (2, "")
-    assert said.stderr == f"throwcollect: {small}: no permission to read the file\n"
-
-
-@pytest.mark.parametrize(
-    ("urdf", "message"),
-    [
-        (None, "talos_data: the robot's description is missing"),
-        ("<robot name='talos'><link", "talos_reduced.urdf: cannot be read as robot description"),
-        (
-            "<robot name='talos'><link name='base_link'/></robot>",
-            "talos_reduced.urdf: joint arm_left_1_joint is missing",
-        ),
-    ],
-)
-def test_up_and_doctor_report_a_robot_that_cannot_be_read(
-    urdf: str | None, message: str, small: Path, tmp_path: Path
-) -> None:
-    fake = tmp_path / "fake"
-    metadata = fake / "example_robot_data-6.0.0.dist-info" / "METADATA"
-    metadata.parent.mkdir(parents=True)
-    metadata.write_text("Metadata-Version: 2.1\nName: example-robot-data\nVersion: 6.0.0\n")
-    if urdf is not None:
-        robot = fake / "cmeel.prefix" / "share" / TALOS_DATA
-        (robot / "robots").mkdir(parents=True)
-        (robot / "robots" / "talos_reduced.urdf").write_text(urdf)
-        (robot / "srdf").symlink_to(TALOS.share() / TALOS_DATA / "srdf")
-    environment = {**os.environ, "PYTHONPATH": str(fake)}
-    run = partial(subprocess.run, capture_output=True, text=True, timeout=60, env=environment, check=False)
-    said = run(command("up", small, "--output", tmp_path / "data"))
-    assert said.returncode == 2
-    assert said.stderr.startswith("throwcollect: ")
-    assert message in said.stderr
-    assert "Traceback" not in said.stderr
-    assert not (tmp_path / "data").exists()
-    doctor = run(command("doctor"))
-    assert doctor.returncode == 1
-    assert any(line.startswith("problem robot") and message in line for line in doctor.stdout.splitlines())
 
 
 @pytest.fixture(scope="module")
@@ -333,12 +262,6 @@ def test_json_output_is_one_document_without_messages(
     assert told.items() <= dataset[1].items()
 
 
-def test_simulating_a_trial_outside_the_plan_is_an_error(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
-    assert say("plan", str(small), "--output", "planned").code == 0
-    said = say("simulate", "planned", "0", "999")
-    assert said == (2, "", "throwcollect: planned/plan.parquet: no trial 999\n  expected: 0 to 1\n")
-
-
 @pytest.mark.parametrize("arguments", [["plan", "small.yaml"], ["config", "small.yaml"], ["--help"]])
 def test_a_closed_output_pipe_is_no_error(arguments: list[str], small: Path) -> None:
     reading, writing = os.pipe()
@@ -395,36 +318,3 @@ def test_output_that_cannot_be_written_is_an_error(small: Path) -> None:
         )
     assert said.returncode == 6
     assert said.stderr == "throwcollect: the output cannot be written: No space left on device\n"
-
-
-def test_every_command_has_help(say: Callable[..., Said]) -> None:
-    commands = ["up", "config", "plan", "doctor", "dataset", "router", "sim", "coordinator"]
-    commands += ["ps", "wait", "logs", "events", "scale", "stop", "down"]
-    for arguments in (
-        [],
-        *([name] for name in commands),
-        *(["dataset", verb] for verb in ("info", "verify", "digest")),
-    ):
-        said = say(*arguments, "--help")
-        assert (arguments, said.code, said.err) == (arguments, 0, "")
-        assert "Usage: throwcollect" in said.out
-        assert "\x1b" not in said.out
-    assert say("--version").out.startswith("throwcollect 0.")
-
-
-def test_progress_is_a_bar_on_a_terminal(small: Path, tmp_path: Path) -> None:
-    terminal, own_end = pty.openpty()
-    words = ("up", *INPROCESS, small, "--output", tmp_path / "bar")
-    screen = {"TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1"}
-    running = start_command(*words, stdout=subprocess.DEVNULL, stderr=own_end, **screen)
-    os.close(own_end)
-    shown = b""
-    with contextlib.suppress(OSError):  # on Linux, reading at the end of a terminal is an error
-        while piece := os.read(terminal, 65536):
-            shown += piece
-    os.close(terminal)
-    assert running.wait(60) == 0
-    text = shown.decode()
-    assert "\x1b[?25l" in text
-    assert "2/2 2 landed, 0 failed, 1 simulation," in text
-    assert "throws/s ETA 00:00" in text

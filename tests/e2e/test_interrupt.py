@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import signal
-import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -78,7 +77,7 @@ def in_the_middle(running: Running, share: float = 0.3, *, whole: Path) -> None:
 
 
 def assert_gone(nodes: list[psutil.Process]) -> None:
-    _, alive = psutil.wait_procs(nodes, timeout=10)
+    _, alive = psutil.wait_procs(nodes, timeout=60)
     assert alive == []
 
 
@@ -155,21 +154,6 @@ def test_an_interruption_finishes_the_running_trials(
     assert "the dataset is not finished" in call_here("dataset", "info", tmp_path / "data").stderr
     assert f"try: throwcollect resume {tmp_path / 'data'}" in err
     assert_goes_on(tmp_path / "data", reference)
-
-
-def test_an_interrupted_trial_gets_the_configured_grace_time(
-    config: Path, reference: Path, tmp_path: Path, started: list[Running]
-) -> None:
-    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.grace_s=0.5")
-    in_the_middle(running, whole=reference)
-    # The trial of a suspended simulation never ends.
-    running.node("--name", "sim_0").suspend()
-    running.process.send_signal(signal.SIGTERM)
-    code, _, _ = running.finish()
-    assert code == 130
-    assert_gone(nodes)
-    # The coordinator ended by itself; some seconds later, it would have been killed.
-    assert "interrupted; what is finished is in" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
 
 
 def test_a_second_ctrl_c_does_not_wait_for_trials(
@@ -303,25 +287,3 @@ def throws(directory: Path) -> list[dict[str, object]]:
 
     rows: list[dict[str, object]] = pq.read_table(directory / "throws.parquet").to_pylist()
     return rows
-
-
-@pytest.mark.parametrize(
-    ("physics", "option", "message"),
-    [
-        ("raise ImportError('broken pybullet')", "run.restarts=10", "ended again after 1 restart: exit code 1"),
-        ("import time; time.sleep(600)", "run.start_timeout_s=6", "no simulation was ready within 6 s"),
-    ],
-)
-def test_simulations_that_never_start_end_the_run(
-    physics: str, option: str, message: str, config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "pybullet.py").write_text(physics)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
-    begun = time.monotonic()
-    said = call("up", "-n", "2", config, "--output", tmp_path / "data", "--set", option, "--set", "sim.engine=bullet")
-    assert said.returncode == 3
-    # Six seconds are configured, which may take longer on a busy machine; the default is a minute.
-    assert time.monotonic() - begun < 45
-    assert message in said.stderr
-    assert ("broken pybullet" in said.stderr) == ("broken" in physics)
-    assert "Traceback" not in said.stderr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import os
 import re
 import secrets
@@ -261,48 +260,10 @@ def test_a_machine_without_the_token_cannot_join(tmp_path: Path, machines: list[
     running.finish()
 
 
-def test_joining_with_other_sources_is_refused_with_the_reason(tmp_path: Path) -> None:
-    from throwcollect.runs.token import JoinToken
-
-    token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, "bullet", build="another").encode()
-    done = call_here("join-run", token)
-    assert done.returncode == 2
-    assert "run many-1234: this machine has other sources, another build of the engine bullet" in done.stderr
-
-
-NO_PORT = "tc2." + base64.urlsafe_b64encode(
-    b'{"run": "a-1234", "endpoint": "tls/127.0.0.1", "secret": "11", "domain_id": 0, "engine": "bullet", "build": "b"}'
-).decode().rstrip("=")
-"""A token whose endpoint has lost its port."""
-
-
-@pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!", NO_PORT])
-def test_a_malformed_token_is_refused(word: str) -> None:
-    done = call_here("join-run", word)
-    assert done.returncode == 2
-    assert "this is no token of a run, or only a part of one" in done.stderr
-
-
 def test_a_token_is_read_from_standard_input() -> None:
     done = subprocess.run(command("join-run", "-"), input="tc2.e30\n", capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "this is no token of a run" in done.stderr
-
-
-def test_waiting_for_a_token_can_be_interrupted() -> None:
-    with subprocess.Popen(
-        command("join-run", "-"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as waiting:
-        # Once the process waits at the pipe, it has loaded its libraries.
-        wchan = Path(f"/proc/{waiting.pid}/wchan")
-        deadline = time.monotonic() + 30
-        while "pipe" not in wchan.read_text() and time.monotonic() < deadline:
-            time.sleep(0.02)
-        waiting.send_signal(signal.SIGINT)
-        try:
-            assert waiting.wait(10) == 130
-        finally:
-            waiting.kill()
 
 
 def test_only_the_owner_can_read_the_file_of_the_token(tmp_path: Path) -> None:
@@ -319,20 +280,3 @@ def test_only_the_owner_can_read_the_file_of_the_token(tmp_path: Path) -> None:
     done = call_here("up", path, "--output", tmp_path / "other", "--token-file", tmp_path / "token")
     assert done.returncode == 2
     assert "other machines cannot join the run" in done.stderr
-
-
-def test_a_run_that_is_over_cannot_be_joined_even_if_its_port_is_used_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    from throwcollect.build import build_digest
-    from throwcollect.runs import joining
-    from throwcollect.runs.token import JoinToken
-
-    monkeypatch.setattr(joining, "_ANSWER_S", 0.5)
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        endpoint = f"tls/127.0.0.1:{server.getsockname()[1]}"
-        token = JoinToken("many-1234", endpoint, "11" * 32, 0, "bullet", build_digest("bullet")).encode()
-        done = call_here("join-run", token)
-        assert done.returncode == 3
-        assert f"run many-1234: the router at {endpoint} does not let this machine in" in done.stderr
-    done = call_here("join-run", token)
-    assert done.returncode == 3
-    assert f"run many-1234: no router answers at {endpoint}" in done.stderr

@@ -4,19 +4,14 @@ import json
 import os
 import re
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import replace
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
 
-from tests.commands import command, start_command
 from tests.e2e.collection import (
     FAST,
     call,
@@ -27,7 +22,6 @@ from tests.e2e.collection import (
     write_config,
 )
 from throwcollect.runs.records import Records
-from throwcollect.runs.run_record import Planning, RunRecord
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
@@ -259,61 +253,6 @@ def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, re
     assert "interrupted: finishing the running trials; once more ends at once" in err
 
 
-def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Records, tmp_path: Path) -> None:
-    running = start(config, tmp_path / "data", 1, "--trials", "4")
-    running.wait_until(lambda: bool(records.ids()))
-    in_the_way = tmp_path / "state" / "runs" / f"{records.ids()[0]}.json.new"
-
-    def stands() -> bool:
-        # The launcher may just be writing a record there.
-        with suppress(FileExistsError):
-            in_the_way.mkdir()
-        return in_the_way.is_dir()
-
-    running.wait_until(stands)
-    code, _, err = running.finish()
-    assert code == 0, err
-    assert err.count("the record and the events of this run are no longer written: ") == 1
-
-
-def test_ctrl_c_on_wait_does_not_end_the_run(config: Path, records: Records, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
-    watchers = [start_command("wait") for _ in range(2)]
-    for watcher in watchers:
-        assert watcher.stderr is not None
-        assert f"/{MANY} throws: " in watcher.stderr.readline()
-    for watcher in watchers:
-        watcher.send_signal(signal.SIGINT)
-    for watcher in watchers:
-        out, err = watcher.communicate(timeout=30)
-        assert (watcher.returncode, out) == (130, "")
-        assert f"throwcollect: left; run {run} goes on\n  try: throwcollect wait --run {run}\n" in err
-    assert records.get(run).status == "running"
-
-
-def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "--trials", "12")
-    following = start_command("logs", "-f", stderr=None)
-    documents = start_command("events", "--json", stderr=None)
-    out, _ = following.communicate(timeout=120)
-    assert records.get(run).status == "ended"
-    lines = out.splitlines()
-    assert {line.split(" | ")[0].rstrip() for line in lines} == {"router", "coordinator", "sim_0", "sim_1"}
-    # On a busy machine, one of them may be told to end before it is ready, as the other has done all trials.
-    assert {"sim_0       | sim_0 is ready", "sim_1       | sim_1 is ready"} & set(lines)
-    assert any(line.startswith("coordinator | 12/12 throws: 12 landed") for line in lines)
-    assert sorted(call_here("logs", "--run", run).stdout.splitlines()) == sorted(lines)
-    only = call_here("logs", "sim_1").stdout.splitlines()
-    assert only == [line for line in lines if line.startswith("sim_1 ")]
-    unknown = call_here("logs", "sim_7")
-    assert unknown.returncode == 2
-    assert f"throwcollect: run {run}: no node 'sim_7' has printed anything" in unknown.stderr
-    events = [json.loads(line) for line in documents.communicate(timeout=30)[0].splitlines()]
-    assert {event["run"] for event in events} == {run}
-    assert [event["event"] for event in events if "node" not in event] == ["started", "finished"]
-    assert (tmp_path / "data" / "logs" / "launcher.log").read_text() == ""
-
-
 def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -330,109 +269,6 @@ def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
         assert message in err
     assert list((tmp_path / "state" / "runs").iterdir()) == []
     assert not (tmp_path / "datasets").exists()
-
-
-def test_up_detached_reports_a_launcher_that_cannot_start_its_nodes(
-    config: Path, records: Records, tmp_path: Path
-) -> None:
-    # The router cannot be started, because a directory is in the place of its log.
-    site = tmp_path / "site"
-    site.mkdir()
-    (site / "sitecustomize.py").write_text(
-        "import sys\nif 'launch' in sys.argv:\n    import pathlib\n"
-        f"    pathlib.Path({str(tmp_path / 'data')!r}, 'logs', 'router.log').mkdir(parents=True, exist_ok=True)\n"
-    )
-    said = subprocess.run(
-        command("up", "-d", config, "--output", tmp_path / "data"),
-        env={**os.environ, "PYTHONPATH": str(site)},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert (said.returncode, said.stdout) == (3, "")
-    assert "throwcollect: router: cannot be started: [Errno 21] Is a directory" in said.stderr
-    (run,) = records.all()
-    assert (run.status, run.record.exit_code) == ("ended", 3)
-
-
-def test_wait_reports_the_failure_of_a_run(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # The failure comes so late that the starting command has ended by then.
-    (tmp_path / "pybullet.py").write_text("import time\ntime.sleep(1)\nraise ImportError('broken pybullet')")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    detach(config, tmp_path / "data", "--set", "run.restarts=0", "--set", "sim.engine=bullet")
-    waited = call_here("wait")
-    assert (waited.returncode, waited.stdout) == (3, "")
-    assert "throwcollect: no simulation can be kept alive; the last, sim_" in waited.stderr
-    assert "broken pybullet" in waited.stderr
-
-
-def test_ctrl_c_during_the_start_ends_a_detached_run(config: Path, records: Records, tmp_path: Path) -> None:
-    starting = start_command("up", "-d", config, "--output", tmp_path / "data")
-    log = tmp_path / "data" / "logs" / "launcher.log"
-    until(log.exists)
-    starting.send_signal(signal.SIGINT)
-    out, err = starting.communicate(timeout=60)
-    assert (starting.returncode, out) == (130, "")
-    assert "throwcollect: interrupted" in err
-    assert [run.status for run in records.all() if run.lives] == []
-
-
-def test_commands_need_the_name_of_a_run_when_there_are_several(records: Records, tmp_path: Path) -> None:
-    started = datetime.now(timezone.utc)
-    runs = [records.new(name) for name in ("first", "second")]
-    for run in runs:
-        run.write(RunRecord(run.run, run.run, "local", "/data", None, "/data/logs", 0, started, os.getpid(), 2))
-    for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
-        code, out, err = say(*verb)
-        assert (verb, code, out) == (verb, 2, "")
-        assert all(run.run in err for run in runs)
-        assert "name one of them with --run" in err
-    for run in runs:
-        run.close()
-
-
-def test_commands_report_that_there_is_no_run() -> None:
-    for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
-        code, out, err = say(*verb)
-        assert (verb, code, out) == (verb, 2, "")
-        assert err.startswith("throwcollect: no run lives")
-        assert say(*verb, "--run", "none") == (2, "", "throwcollect: no run 'none'\n")
-    code, out, _ = say("ps")
-    assert (code, out.split()) == (0, ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"])
-
-
-def test_ps_shows_the_progress_of_planning(records: Records) -> None:
-    run, started = records.new("large"), datetime.now(timezone.utc)
-    record = RunRecord(run.run, "large", "", "/data", None, "/data/logs", 0, started, os.getpid(), 2)
-    run.write(replace(record, planning=Planning(1200, 30000)))
-    assert "planning for 0 s, 1200 of 30000 trials checked" in say("ps")[1]
-    run.forget()
-
-
-def test_a_damaged_record_is_named_and_can_be_forgotten(tmp_path: Path) -> None:
-    path = tmp_path / "state" / "runs" / "small-0000.json"
-    path.write_text('{"run": "small-0000"')
-    message = f"throwcollect: {path}: the record of the run is damaged\n  try: throwcollect down --run small-0000"
-    for verb in (["wait"], ["stop"], ["scale", "2"], ["logs"], ["events"]):
-        code, _, err = say(*verb, "--run", "small-0000")
-        assert (verb, code, err.startswith(message)) == (verb, 2, True)
-    code, _, err = say("ps")
-    assert (code, err.startswith(message)) == (0, True)
-    assert say("down", "--run", "small-0000") == (0, "small-0000: ended and forgotten\n", "")
-    assert not path.exists()
-
-
-def test_an_unusable_state_directory_is_an_error_that_names_it(
-    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "file"))
-    for arguments in (["ps"], ["wait"], ["up", config, "--output", tmp_path / "data"]):
-        code, out, err = say(*arguments)
-        assert (arguments, code, out) == (arguments, 2, "")
-        assert err.startswith(f"throwcollect: {tmp_path / 'file'}: runs cannot be remembered there: ")
-    assert not (tmp_path / "data").exists()
 
 
 @pytest.fixture
@@ -457,13 +293,3 @@ def test_ps_lists_the_server_that_view_begins_and_stop_ends_it_if_no_run_lives(
     assert say("stop") == (0, f"server: stopped; it was at {viewed}\n", "")
     assert list_runs() == []
     assert say("stop", "--run", "server")[0] == 2
-
-
-@pytest.mark.usefixtures("viewed")
-def test_down_ends_a_server_by_its_name_even_if_it_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("throwcollect.serve.finding._END_S", 0.5)
-    server = psutil.Process(list_runs()[0]["pid"])
-    server.suspend()
-    assert say("down", "--run", "server")[0] == 0
-    assert not server.is_running() or server.status() == psutil.STATUS_ZOMBIE
-    assert list_runs() == []

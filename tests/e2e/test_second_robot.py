@@ -35,14 +35,14 @@ import throwcollect
 
 dataset = throwcollect.load(directory)
 throw = dataset[4]
-every, elbow = dataset.trajectories(["joints.position"]), dataset.trajectories(joints=["elbow_joint"])
+every, elbow = dataset.trajectories(["joints_position"]), dataset.trajectories(joints=["elbow_joint"])
 with throwcollect.Simulator(directory / "config.yaml") as simulator:
     simulated = simulator.throw(throw.parameters, trial=4)
 found = {
     "joints": [dataset.joints, throw.joints.names, simulated.joints.names, dataset.moving_joints],
     "digests": [throw.row["digest"], simulated.row["digest"]],
     "end": throw.joints.position[-1].tolist(),
-    "ends": every[4]["joints.position"][-1].tolist() + elbow[4]["joints.position"][-1].tolist(),
+    "ends": every[4]["joints_position"][-1].tolist() + elbow[4]["joints_position"][-1].tolist(),
     "statistics": {group: [*signals] for group, signals in throwcollect.compute_statistics(directory).signals.items()},
     "same": bool((throw.joints.effort == simulated.joints.effort).all()),
 }
@@ -143,7 +143,7 @@ def test_a_dataset_of_the_second_robot_can_be_reported_and_viewed(say: Say, arm:
     assert (tmp_path / "view" / "throws.mcap").stat().st_size > 0
 
 
-def test_a_damaged_dataset_of_the_second_robot_can_be_repaired(say: Say, arm: Path, tmp_path: Path) -> None:
+def test_a_damaged_dataset_of_the_second_robot_can_be_mended(say: Say, arm: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     shutil.copytree(arm, broken)
     (shard,) = broken.glob("*.mcap")
@@ -151,9 +151,9 @@ def test_a_damaged_dataset_of_the_second_robot_can_be_repaired(say: Say, arm: Pa
     shard.write_bytes(shard.read_bytes()[:-1000])
     (broken / "throws.parquet").unlink()
     assert say("dataset", "verify", broken).returncode != 0
-    repaired = say("dataset", "repair", broken, tmp_path / "repaired")
-    assert repaired.returncode == 0, repaired.stderr
-    assert fingerprints(tmp_path / "repaired") == fingerprints(arm)
+    mended = say("resume", broken, "--no-simulate")
+    assert mended.returncode == 0, mended.stderr
+    assert fingerprints(broken) == fingerprints(arm)
 
 
 def test_reading_a_dataset_without_the_package_of_its_robot_is_an_error(arm: Path) -> None:

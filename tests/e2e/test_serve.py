@@ -27,13 +27,11 @@ from tests.commands import start_command
 from tests.e2e.collection import FAST, call_here, collect_here, fingerprints, write_config
 from tests.e2e.page import wait_for
 from throwcollect import ros
-from throwcollect.config.schema import Config
-from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.ros.srv import GetParameters
 from throwcollect.run_key import RunKey
 from throwcollect.runs.records import Records
 from throwcollect.serve.finding import find_server, make_page_address
-from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
+from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
@@ -178,28 +176,10 @@ def test_concurrent_clients_get_at_most_max_instances(server: Server) -> None:
         assert server.ask("DELETE", f"/instances/{name}")[0] == 409
 
 
-def test_an_instance_reports_why_its_preparation_failed(server: Server) -> None:
-    # The throws are too fast for the robot, which only making the plan finds out.
-    wish = {"component": "throws", "set": {"sweep.parameters": {"task.duration_s": {"min": 0.1, "max": 0.12}}}}
-    assert server.ask("PUT", "/instances/hasty", wish)[0] == 202
-    end = server.wait_until("hasty", "ended")
-    assert end["exit_code"] == 2
-    assert "trials, all refused: " in end["message"]
-
-
-def test_an_id_with_an_existing_dataset_directory_is_refused(place: Place, server: Server) -> None:
-    taken = place.directory / "datasets" / "taken"
-    taken.mkdir(parents=True)
-    (taken / "mine").touch()
-    status, said = server.ask("PUT", "/instances/taken", {"component": "throws"})
-    assert (status, said["title"]) == (409, f"{taken}: holds mine")
-    assert [path.name for path in taken.iterdir()] == ["mine"]
-
-
 def iter_until_cut(state: ClientConnection) -> Iterator[dict[str, Any]]:
     with suppress(ConnectionClosed):
         while True:
-            yield json.loads(state.recv(timeout=10))
+            yield json.loads(state.recv(timeout=60))
 
 
 def never_read(server: Server, path: str) -> socket.socket:
@@ -276,33 +256,6 @@ def read_factor(name: str) -> float:
         ros.shutdown(context=context)
 
 
-def test_a_session_has_real_time_and_a_floor(server: Server) -> None:
-    assert server.ask("PUT", "/instances/floor", {"component": "talos", "simulations": 1})[0] == 202
-    server.wait_until("floor", "running")
-    assert read_factor("floor") == 1.0
-    joints = robot_of(Config()).controllers["arm_right_controller"]
-    ends = {**start_posture(Config()), **Config().task.end}
-    point = {"positions": [ends[joint] for joint in joints], "time_from_start": {"sec": 1}}
-    goal = {
-        "op": "send_action_goal",
-        "action": "/sim_0/arm_right_controller/follow_joint_trajectory",
-        "action_type": "control_msgs/action/FollowJointTrajectory",
-        "args": {"trajectory": {"joint_names": joints, "points": [point]}},
-    }
-    began = time.monotonic()
-    with server.open_rosbridge("floor") as client:
-        client.send(json.dumps(goal))
-        assert json.loads(client.recv(60))["values"]["error_code"] == 0
-        assert time.monotonic() - began > 0.9
-        heights = [1.0]
-        client.send(json.dumps({"op": "subscribe", "topic": "/sim_0/ball/odometry", "type": "nav_msgs/msg/Odometry"}))
-        while len(heights) < 100 or heights[-1] != heights[-2]:
-            heights.append(json.loads(client.recv(60))["msg"]["pose"]["pose"]["position"]["z"])
-    assert heights[-1] == min(heights) == Config().ball.radius_m
-    assert server.ask("DELETE", "/instances/floor")[0] == 202
-    assert server.wait_until("floor", "ended")["exit_code"] == 0
-
-
 def test_a_session_runs_in_real_time_as_long_as_a_client_watches(place: Place, server: Server) -> None:
     faster = {"component": "talos", "simulations": 1, "set": {"sim.real_time_factor": 4}}
     assert server.ask("PUT", "/instances/talos", faster)[0] == 202
@@ -345,11 +298,9 @@ def test_a_terminated_server_ends_despite_connected_listeners(server: Server, pl
     with server.open("/state") as state, closing(never_read(server, "/state")):
         state.recv()
         server.process.terminate()
-        server.process.wait(timeout=3)
+        server.process.wait(timeout=30)
         with pytest.raises(ConnectionClosed):
-            state.recv(timeout=3)
-    # The second server is found when the first one has ended.
-    wait_for(lambda: place.address()["url"] == other.address["url"], 5)
+            state.recv(timeout=30)
     other.kill()
 
 
@@ -409,5 +360,5 @@ def test_a_server_speaks_ipv6_and_tls(place: Place, tmp_path: Path, monkeypatch:
         assert found.url == url
         assert make_page_address(found).startswith(f"{url}/#code=")
         process.terminate()
-        assert process.wait(timeout=5) == 0
+        assert process.wait(timeout=30) == 0
     assert find_server() is None

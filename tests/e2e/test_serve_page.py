@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from tests.e2e.chromium import browse, chromium
-from tests.e2e.collection import FAST, collect_here, write_config
+from tests.e2e.collection import FAST, write_config
 from tests.e2e.page import CHANGED, find_own_errors, load, press, serve
 from tests.unit.serve.made_model import make_model
 from throwcollect.runs.records import Records
@@ -112,31 +112,6 @@ def test_the_page_shows_the_run_that_its_address_names(address: str, over: tuple
         tab.ask("Page.navigate", url=make_page_address(server, over[1]))
         tab.wait_for(f"{watched} === {json.dumps(over[1])}")
         assert tab.evaluate("location.hash") == ""
-        assert find_own_errors(tab) == []
-
-
-@pytest.fixture
-def died(tmp_path: Path) -> Iterator[tuple[str, str]]:
-    """Two runs whose launchers died: with a complete dataset, and with one that is not finished."""
-    runs, now = [Records().new(name) for name in ("whole", "left")], datetime.now(timezone.utc)
-    for run, name in zip(runs, ("whole", "left"), strict=True):
-        directory = tmp_path / name
-        collect_here(write_config(tmp_path, trials=2, sim=FAST), directory)
-        run.write(RunRecord(run.run, "small", "local", str(directory), None, str(directory / "logs"), 0, now, 1, 1))
-        run.close()
-    (tmp_path / "left" / "metadata.yaml").unlink()
-    yield runs[0].run, runs[1].run
-    for run in runs:
-        run.forget()
-
-
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
-def test_the_page_offers_to_resume_only_incomplete_collections(died: tuple[str, str], address: str) -> None:
-    with browse(address, width=800, height=600) as tab:
-        load(tab)
-        button = "document.querySelector('[aria-label=\"Resume {}\"]')"
-        tab.wait_for(" && ".join(f"{button.format(each)} !== null" for each in died))
-        assert [tab.evaluate(f"{button.format(each)}.hidden") for each in died] == [True, False]
         assert find_own_errors(tab) == []
 
 

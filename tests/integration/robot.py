@@ -121,7 +121,7 @@ def running_simulation(
         robot.wait_until_ready(process)
         yield robot
         process.terminate()
-        output, _ = process.communicate(timeout=20)
+        output, _ = process.communicate(timeout=60)
         assert process.returncode == 0, output
     finally:
         # The process is killed even after a failure, so that it does not outlive the tests.

@@ -205,17 +205,6 @@ def test_after_a_reset_the_start_posture_is_held(robot: Robot) -> None:
     assert heard[-1].feedback.positions[TALOS.controllers[ARM].index(ELBOW)] == pytest.approx(POSTURE[ELBOW], abs=1e-3)
 
 
-def test_a_refused_goal_is_one_line_in_the_log_of_its_controller(robot: Robot) -> None:
-    with robot.listening("rcl_interfaces/msg/Log", "/rosout") as log:
-        robot.send(goal(ARM, arm_right_4_joint=float("inf")))
-        robot.wait_until(lambda: bool(log), "a line")
-        robot.state()
-    (line,) = log
-    assert line.name == f"{robot.name}.{ARM}"
-    assert line.level == 40
-    assert line.msg == f"{ARM}: Position of joint {ELBOW} at point #1 is not finite: inf"
-
-
 @pytest.fixture(scope="module")
 def other(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
     """A simulation in which every configurable behaviour of controllers differs from its default."""

@@ -144,14 +144,6 @@ def test_joint_states_have_velocity_and_effort_of_every_joint(talos: Robot) -> N
     assert abs(states["arm_right_2_joint"][2]) > 0.1
 
 
-def test_a_robot_at_rest_still_publishes_its_joint_states(talos: Robot) -> None:
-    talos.reset()
-    before = talos.now_ns()
-    with talos.listening(*JOINT_STATES) as heard:
-        talos.wait_until(lambda: len(heard) > 3, "joint states")
-    assert talos.now_ns() == before
-
-
 @pytest.mark.parametrize(
     ("motion", "goals"), [(HOME, 6), (HOME_LEGS, 2), (WAVE_LEFT, 5)], ids=["home", "home_legs", "wave_left"]
 )

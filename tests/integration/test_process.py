@@ -11,7 +11,7 @@ pytestmark = pytest.mark.parametrize("running", ["by itself"], indirect=True)
 
 
 def assert_ends_well(process: Command) -> None:
-    output, _ = process.communicate(timeout=10)
+    output, _ = process.communicate(timeout=60)
     assert process.returncode == 0, output
     assert "Traceback" not in output
     assert "rror" not in output

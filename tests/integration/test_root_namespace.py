@@ -27,7 +27,7 @@ def talos(endpoint: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[R
         robot.wait_until_ready(process)
         yield robot
     process.terminate()
-    output, _ = process.communicate(timeout=20)
+    output, _ = process.communicate(timeout=60)
     assert process.returncode == 0, output
 
 
@@ -57,7 +57,7 @@ def test_a_node_with_simulated_time_follows_the_simulation(talos: Robot) -> None
 @pytest.mark.usefixtures("talos")
 def test_a_second_simulation_in_the_root_namespace_is_refused(endpoint: str, tmp_path: Path) -> None:
     process = start_simulation(tmp_path, endpoint, "sim_2", options=("--namespace", "/"))
-    output, _ = process.communicate(timeout=20)
+    output, _ = process.communicate(timeout=60)
     assert process.returncode == 2
     assert f"namespace /: the simulation {OWN} lives there" in output
     assert "Traceback" not in output

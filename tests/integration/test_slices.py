@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import shutil
 import subprocess
@@ -14,7 +13,7 @@ from typing import Any
 import pytest
 
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
-from throwcollect import progress_log, runs
+from throwcollect import runs
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.directory import METADATA
@@ -128,26 +127,6 @@ def test_joined_slices_give_the_files_of_one_collection(frozen: Path, whole: Pat
     assert not (frozen / SLICES).exists()
 
 
-def test_joining_tells_how_many_slices_are_joined(
-    frozen: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    collect(frozen, "0/2", "1/2")
-    monkeypatch.setattr(progress_log, "_EVERY_S", 0.0)
-    with caplog.at_level("INFO", logger=progress_log.LOGGER):
-        join(frozen)
-    assert caplog.messages == ["1 of 2 slices joined"]
-
-
-def test_a_finished_slice_has_few_files(frozen: Path) -> None:
-    collect(frozen, "0/6")
-    assert sorted(path.name for path in (frozen / SLICES).rglob("*")) == [
-        "0-of-6",
-        "datapackage.json",
-        "small_00000.mcap",
-        "throws.parquet",
-    ]
-
-
 def test_an_interrupted_slice_goes_on_with_its_recordings(frozen: Path, whole: Path) -> None:
     interrupt_after(frozen, "0/2", 50_000)
     assert not find_finished(frozen)
@@ -233,21 +212,6 @@ def test_joining_can_be_repeated_after_a_kill_at_any_point(frozen: Path, whole: 
         assert not (each / SLICES).exists()
 
 
-def test_slices_of_different_numbers_are_not_joined(frozen: Path) -> None:
-    collect(frozen, "0/2")
-    # Two tasks that begin at once can still do this, as neither sees a finished slice of the other.
-    shutil.copytree(frozen / SLICES / "0-of-2", frozen / SLICES / "1-of-3")
-    with pytest.raises(ConfigError, match="slices of 2 and of 3"):
-        join(frozen)
-
-
-def test_a_slice_that_could_never_be_joined_is_not_collected(frozen: Path) -> None:
-    collect(frozen, "0/2")
-    with pytest.raises(ConfigError, match="slice 1/3 cannot be joined with those there, which are slices of 2"):
-        collect_slice(frozen, Slice(1, 3), overrides=INPROCESS)
-    assert find_finished(frozen) == {Slice(0, 2)}
-
-
 def test_slices_of_another_plan_are_not_joined(frozen: Path, config: Path, tmp_path: Path) -> None:
     other = tmp_path / "other"
     prepare(load(config, ["seed=8"]), other, sweep_directory=tmp_path)
@@ -256,37 +220,6 @@ def test_slices_of_another_plan_are_not_joined(frozen: Path, config: Path, tmp_p
     shutil.copytree(other / SLICES, frozen / SLICES, dirs_exist_ok=True)
     with pytest.raises(DatasetError, match=r"1-of-2: was collected with another plan"):
         join(frozen)
-
-
-def test_a_recording_that_was_cut_off_is_not_joined(frozen: Path) -> None:
-    collect(frozen, "0/2", "1/2")
-    recording = frozen / SLICES / "1-of-2" / "small_00005.mcap"
-    recording.write_bytes(recording.read_bytes()[:-1])
-    with pytest.raises(DatasetError, match=r"small_00005.mcap: has \d+ bytes"):
-        join(frozen)
-
-
-def test_overrides_that_would_change_the_dataset_are_refused(frozen: Path) -> None:
-    with pytest.raises(ConfigError, match="seed"):
-        collect_slice(frozen, Slice(0, 2), overrides=["seed=9"])
-    with pytest.raises(ConfigError, match=r"run.open: should be false"):
-        collect_slice(frozen, Slice(0, 2), overrides=["run.open=true"])
-
-
-def test_slices_need_no_locks(config: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some file systems of clusters have no locks; slices work without them, but a run of one collection does not."""
-
-    def refuse(descriptor: int, _: int) -> None:
-        if str(tmp_path) in os.readlink(f"/proc/self/fd/{descriptor}"):
-            raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    prepare(load(config), tmp_path / "data", sweep_directory=tmp_path)
-    collect(tmp_path / "data", "0/2", "1/2")
-    join(tmp_path / "data")
-    assert fingerprints(tmp_path / "data") == fingerprints(whole)
-    with pytest.raises(DatasetError, match=r"cannot be locked[\s\S]*has locks"):
-        runs.prepare(config, overrides=INPROCESS, output=tmp_path / "one")
 
 
 def test_a_full_disk_ends_the_attempt_and_a_later_one_goes_on_with_its_episodes(
@@ -364,12 +297,7 @@ def test_a_slice_is_collected_on_a_disk_of_the_node_and_handed_over(
         collect_slice(frozen, Slice(0, 3), overrides=[*INPROCESS, "cluster.scratch=$MISSING"])
 
 
-def test_a_directory_without_a_plan_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"holds no plan[\s\S]*throwcollect plan CONFIG --output"):
-        collect_slice(tmp_path, Slice(0, 2))
-
-
-def test_a_plan_that_grows_is_refused(config: Path, tmp_path: Path) -> None:
+def test_a_dataset_whose_end_depends_on_results_is_refused(config: Path, tmp_path: Path) -> None:
     prepare(load(config, ["until.landed=3", "trials=200"]), tmp_path / "data", sweep_directory=tmp_path)
-    with pytest.raises(ConfigError, match=r"until: a plan that grows"):
+    with pytest.raises(ConfigError, match=r"until: a dataset whose end"):
         collect_slice(tmp_path / "data", Slice(0, 2))

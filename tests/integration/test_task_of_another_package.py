@@ -138,11 +138,11 @@ def test_the_table_has_the_measures_of_the_task(process: ProcessPoolExecutor, re
     assert found["reason"] == f"torso_1_joint ended {found['end_error_rad']:.3g} rad away from its end"
 
 
-def test_a_dataset_of_the_task_can_be_verified_rebuilt_and_replayed(throwcollect: Command, reached: Path) -> None:
+def test_a_dataset_of_the_task_can_be_verified_mended_and_replayed(throwcollect: Command, reached: Path) -> None:
     assert "nothing wrong" in throwcollect("dataset", "verify", reached)
     table = (reached / "throws.parquet").read_bytes()
     (reached / "throws.parquet").unlink()
-    throwcollect("dataset", "rebuild", reached)
+    throwcollect("resume", reached, "--no-simulate")
     assert (reached / "throws.parquet").read_bytes() == table
     throwcollect("dataset", "replay", reached, "--trial", "3")
 
@@ -232,8 +232,6 @@ def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: 
             {
                 "up {config} --runtime inprocess --output {new}": 3,
                 "dataset verify {data}": 1,
-                "dataset rebuild {data}": 1,
-                "dataset repair {data} {new}": 1,
                 "dataset replay {data} --trial 1": 1,
             },
             "cannot judge trial {trial}: ZeroDivisionError: division by zero",

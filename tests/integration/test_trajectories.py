@@ -99,15 +99,6 @@ def test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on(
     assert elapsed == sorted(elapsed)
 
 
-def test_a_feedback_callback_is_called(robot: Robot) -> None:
-    heard: list[Any] = []
-    assert robot.set({"sim.real_time_factor": 4.0}).successful
-    handle = robot.result(robot.action().send_goal_async(goal(ARM, 1.0), heard.append))
-    assert robot.outcome(handle) == REACHED
-    assert heard
-    assert bytes(heard[0].goal_id.uuid) == bytes(handle.goal_id.uuid)
-
-
 def test_feedback_is_sent_only_when_time_goes_on(robot: Robot) -> None:
     robot.put_into(PAUSED)
     topic = f"{ARM}/follow_joint_trajectory/_action/feedback"

@@ -74,20 +74,6 @@ def test_endpoints_of_a_node_are_its_own_and_go_with_it(rig):
     assert rig.spin(lambda: list_topics("first") == [of_both])
 
 
-def test_an_endpoint_that_is_announced_twice_counts_once(rig):
-    asker, other = rig.node("asker"), rig.node("other")
-    # Both questions are answered from now on, one by the tokens of the topic, and the other by those of all topics.
-    assert asker.get_publishers_info_by_topic("/t") == []
-    assert asker.count_publishers("/t") == 0
-    before = asker.context.graph.changes
-    publisher = other.create_publisher(String, "/t", 10)
-    assert rig.spin(lambda: asker.context.graph.changes == before + 2)
-    assert len(asker.get_publishers_info_by_topic("/t")) == asker.count_publishers("/t") == 1
-    other.destroy_publisher(publisher)
-    assert rig.spin(lambda: asker.context.graph.changes == before + 4)
-    assert len(asker.get_publishers_info_by_topic("/t")) == asker.count_publishers("/t") == 0
-
-
 def test_tokens_of_a_node_are_unique_and_carry_its_session(rig):
     node = rig.node("a")
     domain = node.context.get_domain_id()

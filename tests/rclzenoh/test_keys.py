@@ -1,8 +1,6 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rclzenoh.keys import EntityKind, Token, data_key, dds_type, parse_token, ros_type
 
@@ -51,10 +49,6 @@ def test_an_enclave_is_part_of_the_token():
     assert parse_token(token.key()) == token
 
 
-def test_chunks_that_later_versions_append_are_ignored():
-    assert parse_token(PUBLISHER.key() + "/more") == PUBLISHER
-
-
 @pytest.mark.parametrize(
     "key",
     [
@@ -72,11 +66,6 @@ def test_chunks_that_later_versions_append_are_ignored():
 )
 def test_malformed_tokens_are_ignored(key):
     assert parse_token(key) is None
-
-
-@given(st.text(alphabet="@ros2_lv/0aNMP%:,", max_size=80))
-def test_parsing_never_fails(text):
-    parse_token("@ros2_lv/" + text)
 
 
 def test_a_data_key_has_domain_name_type_and_hash():

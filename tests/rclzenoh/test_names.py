@@ -1,7 +1,7 @@
 import pytest
 
 from rclzenoh.exceptions import NameValidationException
-from rclzenoh.names import absolute_namespace, check_node_name, resolve
+from rclzenoh.names import resolve
 
 
 @pytest.mark.parametrize(
@@ -21,15 +21,3 @@ def test_names_in_the_root_namespace_have_one_slash():
 def test_invalid_names_are_refused(name):
     with pytest.raises(NameValidationException, match="invalid topic or service name"):
         resolve(name, "/", "node")
-
-
-@pytest.mark.parametrize("name", ["", "a/b", "1a", "a-b"])
-def test_invalid_node_names_are_refused(name):
-    with pytest.raises(NameValidationException, match="invalid node name"):
-        check_node_name(name)
-
-
-def test_a_relative_namespace_becomes_absolute():
-    assert [absolute_namespace(name) for name in ("", "/", "a/b", "/a")] == ["/", "/", "/a/b", "/a"]
-    with pytest.raises(NameValidationException, match="invalid namespace"):
-        absolute_namespace("a//b")

@@ -1,6 +1,4 @@
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rclzenoh import qos
 from rclzenoh.duration import Duration, Infinite
@@ -77,11 +75,6 @@ def test_a_profile_is_read_with_the_defaults_of_the_middleware():
 )
 def test_decode_returns_none_for_a_malformed_profile(text):
     assert decode(text) is None
-
-
-@given(st.text(alphabet="0129:,x-", max_size=40))
-def test_reading_a_profile_never_fails(text):
-    decode(text)
 
 
 def test_history_or_depth_is_required():

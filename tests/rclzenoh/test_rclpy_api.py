@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from rclzenoh import api as embedded
-from rclzenoh import client, clock, service, subscription, timer
+from rclzenoh import client, service, subscription, time, timer
 from rclzenoh.action.client import ClientGoalHandle
 from rclzenoh.action.server import ServerGoalHandle
 from rclzenoh.logging import Logger
-from rclzenoh.topic_endpoint_info import TopicEndpointInfo
+from rclzenoh.node_graph import TopicEndpointInfo
 from throwcollect.ros import embedded as ros
 
 API = Path(__file__).with_name("rclpy_api.txt")
@@ -30,7 +30,7 @@ CLASSES: dict[str, Any] = {
     "Client": client.Client,
     "ClientGoalHandle": ClientGoalHandle,
     "Logger": Logger,
-    "ROSClock": clock.ROSClock,
+    "ROSClock": time.ROSClock,
     "ServerGoalHandle": ServerGoalHandle,
     "Service": service.Service,
     "Subscription": subscription.Subscription,

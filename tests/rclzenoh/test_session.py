@@ -6,7 +6,7 @@ import zenoh
 
 from rclzenoh import context
 from rclzenoh.context import open_session
-from rclzenoh.exceptions import ConfigurationError, NoRouterError
+from rclzenoh.exceptions import NoRouterError
 from rclzenoh.session_config import environment_config, router_config
 
 
@@ -36,20 +36,6 @@ def test_a_session_waits_for_its_router_as_long_as_its_configuration_says(enviro
         routers[0].close()
 
 
-@pytest.mark.parametrize(
-    ("override", "match"),
-    [
-        ("mode", "has no '='"),
-        ('mode="nonsense"', r"mode cannot be \"nonsense\": unknown variant"),
-        ("no/such/key=1", "no/such/key cannot be 1: unknown key$"),
-    ],
-)
-def test_overrides_that_zenoh_does_not_understand_are_refused(environment, monkeypatch, override, match):
-    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", override)
-    with pytest.raises(ConfigurationError, match=match):
-        open_session(environment_config())
-
-
 def test_a_configuration_file_replaces_the_defaults(environment, endpoint, monkeypatch, tmp_path):
     path = tmp_path / "session.json5"
     path.write_text(
@@ -62,9 +48,3 @@ def test_a_configuration_file_replaces_the_defaults(environment, endpoint, monke
         assert len(list(opened.info.routers_zid())) == 1
     finally:
         opened.close()
-
-
-def test_a_missing_configuration_file_is_refused(environment, monkeypatch, tmp_path):
-    monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", str(tmp_path / "absent.json5"))
-    with pytest.raises(ConfigurationError, match=r"ZENOH_SESSION_CONFIG_URI: .*absent.json5"):
-        open_session(environment_config())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rclzenoh.exceptions import ConfigurationError, UnreadableKeyError
+from rclzenoh.exceptions import UnreadableKeyError
 from rclzenoh.session_config import (
     CONFIG_FILE_VARIABLE,
     LISTENS_OF_RMW,
@@ -55,27 +55,9 @@ def test_the_router_is_that_of_the_mode_in_the_environment(mode, endpoint, monke
     assert connect_endpoint() == endpoint
 
 
-def test_without_a_mode_the_router_is_that_of_a_peer(monkeypatch, tmp_path):
-    endpoints = '{client: ["tcp/192.0.2.7:1"], peer: ["tcp/192.0.2.7:2"]}'
-    (tmp_path / "session.json5").write_text(f"{{connect: {{endpoints: {endpoints}}}}}")
-    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
-    assert connect_endpoint() == "tcp/192.0.2.7:2"
-
-
-def test_an_empty_list_of_endpoints_names_no_router(monkeypatch):
-    monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints=[]")
-    assert connect_endpoint() is None
-
-
 @pytest.mark.parametrize("make", [environment_config, lambda: client_config(ENDPOINT), lambda: router_config(ENDPOINT)])
 def test_a_session_needs_no_shared_memory(make):
     assert make().get_json("transport/shared_memory/enabled") == "false"
-
-
-def test_a_malformed_environment_is_refused(monkeypatch):
-    monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints")
-    with pytest.raises(ConfigurationError, match="has no '='"):
-        connect_endpoint()
 
 
 def test_an_unreadable_key_is_an_error_that_names_it(key):
@@ -94,11 +76,6 @@ def test_a_client_listens_nowhere_whatever_the_configuration_file_says(monkeypat
     monkeypatch.setenv(OVERRIDE_VARIABLE, client_override("tcp/192.0.2.7:1"))
     config = environment_config()
     assert (config.get_json("mode"), config.get_json("listen/endpoints")) == ('"client"', "[]")
-
-
-def test_a_malformed_endpoint_is_refused():
-    with pytest.raises(ConfigurationError, match="endpoint: connect/endpoints cannot be"):
-        client_config("nowhere")
 
 
 @pytest.mark.parametrize("defaults", ["{}", '{mode: "peer", listen: {endpoints: ["tcp/localhost:0"]}}'])
@@ -138,10 +115,3 @@ def test_default_listeners_make_a_session_unprotected_unless_replaced(listen, pr
     (tmp_path / "session.json5").write_text("{}")
     monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
     assert is_protected(LISTENS_OF_RMW)
-
-
-def test_a_session_of_an_empty_environment_is_not_protected(monkeypatch, tmp_path):
-    assert not is_protected()
-    (tmp_path / "session.json5").write_text("{}")
-    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
-    assert not is_protected()

@@ -1,7 +1,6 @@
 import pytest
 
-from rclzenoh.clock import ROSClock
-from rclzenoh.time import Time
+from rclzenoh.time import ROSClock, Time
 from rclzenoh.timer import Timer
 
 

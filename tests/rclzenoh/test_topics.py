@@ -111,7 +111,7 @@ def test_a_discovered_subscriber_gets_the_next_message(rig):
         assert seen.wait_for(publisher.get_subscription_count, 10, talker.context.ok)
         publisher.publish(String(data="first"))
         thread.join()
-        assert rig.spin(lambda heard=heard: heard, timeout=2), f"the first message of {publisher.topic_name} is lost"
+        assert rig.spin(lambda heard=heard: heard), f"the first message of {publisher.topic_name} is lost"
 
 
 def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsys):
@@ -161,7 +161,7 @@ def test_all_messages_arrive_whole_before_a_session_closes(rig):
             publisher.publish(message)
         node.destroy_node()
         talking.shutdown()
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 60
         while heard[-1] != messages[-1] and time.monotonic() < deadline:
             time.sleep(0.01)
         assert heard[-len(messages) :] == messages

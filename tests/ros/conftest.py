@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.fast_dds import mark_flaky
 from throwcollect.ros.middleware import EMBEDDED_RMW, RMW_VARIABLE
 
 HERE = Path(__file__).parent
@@ -17,6 +18,8 @@ collect_ignore = [] if _MEETS else ["test_ros2cli.py"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    # `test_backends.py` starts what failed again: a pass goes on where the one before has stopped.
+    mark_flaky(item for item in items if HERE in item.path.parents and item.path.name != "test_backends.py")
     missing = pytest.mark.skip(reason="rclpy cannot be imported")
     for item in items:
         if HERE in item.path.parents:

@@ -76,7 +76,7 @@ def test_a_slow_subscriber_gets_every_episode(tmp_path):
 
         with start(LISTEN) as listener, start(TALK) as talker:
             said, _ = listener.communicate(timeout=60)
-            sent, _ = talker.communicate("\n", timeout=20)
+            sent, _ = talker.communicate("\n", timeout=60)
     # Zenoh prints to standard output when it is closed, so only the first line counts.
     assert sent.splitlines()[0] == f"sent {SMALL + LARGE}"
     assert said.splitlines()[0] == f"True {LARGE} {SMALL + LARGE}"

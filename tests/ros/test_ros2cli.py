@@ -40,7 +40,7 @@ def ros2(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2]:
         assert "SimulationState(state=1)" in call("service", "call", "/sim_0/get_simulation_state", state)
         yield call
         simulation.terminate()
-        output, _ = simulation.communicate(timeout=20)
+        output, _ = simulation.communicate(timeout=60)
         assert simulation.returncode == 0, output
 
 

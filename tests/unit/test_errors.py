@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.named_array import refuse_name
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem, RequestError, ThrowcollectError
 from throwcollect.extras import MissingExtraError, MissingLibraryError
 
@@ -39,7 +38,6 @@ def test_an_error_has_its_message_and_its_hint_in_one_line() -> None:
         MissingExtraError("pinocchio"),
         MissingLibraryError("pinocchio"),
         RequestError("NAME_INVALID", "no such name", expected="another", hint="try it"),
-        refuse_name("no joint", "elbow", ["elbow_1"]),
         ForeignPlanError("differs", path=Path("a"), place="trial 3", evidence="6"),
         ConfigError([Problem("is missing", "a.b")], expected="a number", more=3),
     ],

@@ -1,4 +1,4 @@
-"""Action clients."""
+"""Action clients, and the actions of the ROS graph, which are found by their feedback topics."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ import weakref
 from collections.abc import Callable
 from typing import Any
 
+from rclzenoh.graph import group_types
 from rclzenoh.interfaces import Action, AnyMessage, Message
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray, Time
 from rclzenoh.interfaces.srv import CancelGoal
 from rclzenoh.keys import EntityKind, dds_type
 from rclzenoh.node_endpoints import NodeEndpoints
+from rclzenoh.node_graph import NamesAndTypes, NodeGraph
 from rclzenoh.qos import QoSProfile, qos_profile_action_status_default
 from rclzenoh.subscription import Subscription
 from rclzenoh.task import Future
+
+_TOPIC, _TYPE = "/_action/feedback", "_FeedbackMessage"
+
 
 FeedbackCallback = Callable[[Any], Any]
 
@@ -167,3 +172,31 @@ class ActionClient:
             goal_handle = self._handles.get(bytes(status.goal_info.goal_id.uuid))
             if goal_handle is not None:
                 goal_handle.update(status.status)
+
+
+def get_action_names_and_types(node: NodeGraph) -> NamesAndTypes:
+    """All actions that somebody offers or uses."""
+    return _list_actions(node.get_topic_names_and_types())
+
+
+def get_action_server_names_and_types_by_node(
+    node: NodeGraph, remote_node_name: str, remote_node_namespace: str
+) -> NamesAndTypes:
+    """Actions that one node offers."""
+    return _list_actions(node.get_publisher_names_and_types_by_node(remote_node_name, remote_node_namespace))
+
+
+def get_action_client_names_and_types_by_node(
+    node: NodeGraph, remote_node_name: str, remote_node_namespace: str
+) -> NamesAndTypes:
+    """Actions that one node has clients of."""
+    return _list_actions(node.get_subscriber_names_and_types_by_node(remote_node_name, remote_node_namespace))
+
+
+def _list_actions(topics: NamesAndTypes) -> NamesAndTypes:
+    return group_types(
+        (name.removesuffix(_TOPIC), type_name.removesuffix(_TYPE))
+        for name, types in topics
+        for type_name in types
+        if name.endswith(_TOPIC) and type_name.endswith(_TYPE)
+    )

@@ -128,26 +128,44 @@ def resume(
     settings: SetOption = None,
     runtime: RuntimeOption = None,
     trials: TrialsOption = None,
-    check: Annotated[
-        bool, typer.Option("--check", help="If it is finished, compare every byte of its files, not only their sizes.")
-    ] = False,
+    simulate: Annotated[
+        bool,
+        typer.Option("--simulate/--no-simulate", help="Run missing trials, or finish without them: they are lost."),
+    ] = True,
     detach: DetachOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Go on with a dataset, whatever has ended its collection, or add more trials to it."""
+    """Go on with a dataset, whatever has ended its collection or damaged its files, or add more trials to it."""
     from throwcollect.cluster.submission import is_submitted
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
     if is_submitted(directory):
-        for name, value in {"-n": simulations, "--runtime": runtime, "--check": check}.items():
+        for name, value in {"-n": simulations, "--runtime": runtime, "--no-simulate": not simulate}.items():
             if value:
                 raise ConfigError(f"{name}: should be left out, as tasks of a cluster collect {directory}")
         _resume_tasks(directory, changes, json=json)
         return
+    if not simulate:
+        _finish(directory, changes, json=json)
+        return
     from throwcollect.runs.preparation import resume as go_on
 
-    prepare_run = partial(go_on, directory, overrides=changes, processes=count_cores(), check=check)
+    prepare_run = partial(go_on, directory, overrides=changes, processes=count_cores())
     _collect(prepare_run, directory=directory, detach=detach, json=json)
+
+
+def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
+    """Finish a dataset with what is whole; `runs` would need the libraries of the nodes."""
+    from throwcollect.cli.dataset.info import print_collected
+    from throwcollect.coordinator.salvage import finish_without_simulating
+    from throwcollect.dataset.configuration import reading_config
+    from throwcollect.dataset.inspect import info
+
+    with reading_config(directory, overrides=changes) as config:
+        shown = display(quiet=json, bar=False)
+        finish_without_simulating(config, directory, sweep_directory=directory, onlooker=shown)
+    again = command("resume", directory)
+    print_collected(info(directory), directory, as_json=json, hint=f"{again} runs them again")
 
 
 def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:

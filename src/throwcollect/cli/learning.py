@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from throwcollect.learning.model import Model
     from throwcollect.learning.score import Score
 
-_MOST_PRINTED = 20
-"""Largest number of targets out of reach that are printed; further ones are only counted."""
-
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
 ModelOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="MODEL", help="Directory to write; must be new or empty.")
@@ -234,14 +231,13 @@ def adapt(
 ) -> None:
     """Correct a model by a few throws of another robot or simulation."""
     from throwcollect.learning.adapting import FarThrowError
-    from throwcollect.learning.lists import read_table, refuse_large_targets
+    from throwcollect.learning.lists import read_table
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
 
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
     rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))
-    refuse_large_targets(rows, model.targets)
     try:
         adapted = model.adapt(
             [{key: row.numbers[key] for key in keys} for row in rows],
@@ -291,6 +287,7 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
 
 def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Row]:
     """Read the throws of a dataset that succeeded: the keys and the targets of each."""
+    from throwcollect.config.values import column_of
     from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.lists import Row
 
@@ -302,25 +299,24 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
             expected=f"{trained.task} of {trained.robot}, as the model has it",
         )
     throws = dataset.select(f"outcome == '{dataset.config.task.success}'").throws
-    if missing := [name for name in (*keys, *model.targets) if name not in throws.column_names]:
+    names = [*keys, *model.targets]
+    if missing := [name for name in names if column_of(name) not in throws.column_names]:
         raise ConfigError(
             f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
         )
-    rows = throws.select([*keys, *model.targets]).to_pylist()
+    rows = throws.select([*map(column_of, names)]).rename_columns(names).to_pylist()
     return [
         Row(f"{directory}: trial {trial}", row) for trial, row in zip(throws["trial"].to_pylist(), rows, strict=True)
     ]
 
 
 def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
-    """Print which targets are out of reach, and why; only count those beyond the first `_MOST_PRINTED`."""
-    from throwcollect.learning.reach import explain_reach
+    """Print which targets are out of reach, and why."""
+    from throwcollect.learning.aiming import explain_reach
 
-    far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]
-    for number, aim in far[:_MOST_PRINTED]:
-        tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
-    if len(far) > _MOST_PRINTED:
-        tell(f"and {len(far) - _MOST_PRINTED} more; {len(far)} of {len(aims)} targets are out of reach")
+    for number, aim in enumerate(aims, start=1):
+        if not aim.reachable:
+            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
 
 
 def _describe_score(score: Score) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from throwcollect.cli import cluster_commands, collect, image_commands, learning, node_commands, runs, serve, show
-from throwcollect.cli.dataset import derive, info, repair_commands, replay, verify_command, writing
+from throwcollect.cli.dataset import derive, info, replay, verify_command, writing
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
 from throwcollect.version import __version__
@@ -51,8 +51,6 @@ image_app.command("build")(image_commands.build)
 image_app.command("sif")(image_commands.sif)
 dataset_app.command("info")(info.show_info)
 dataset_app.command("verify")(verify_command.verify_dataset)
-dataset_app.command("rebuild")(repair_commands.rebuild_dataset)
-dataset_app.command("repair")(repair_commands.repair_dataset)
 dataset_app.command("digest")(info.show_digest)
 dataset_app.command("export")(writing.export_dataset)
 dataset_app.command("merge")(derive.merge_datasets)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
@@ -19,6 +20,21 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.members import load_member
 
 AnySection = TypeVar("AnySection", bound=Section)
+_NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_]")
+
+
+def column_of(key: str) -> str:
+    """Name the column of a swept key in tables of throws: the key with underscores, such as ``task_duration_s``.
+
+    Such a name needs no quotes in SQL and formulas. The name of any other column is returned as it is.
+    """
+    return _NOT_IN_NAMES.sub("_", key)
+
+
+def keys_by_column(config: Config, columns: Iterable[str]) -> dict[str, str]:
+    """Map those of some columns that belong to swept keys to these keys, in the order of the columns."""
+    keys = {column_of(key): key for key in sweepable_keys(config)}
+    return {column: keys[column] for column in columns if column in keys}
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
@@ -46,18 +62,16 @@ class Leaf:
         name: Dotted key.
         value: The value.
         key: Annotation that holds for the key.
-        is_default: Whether the value is the default of the key.
     """
 
     name: str
     value: Any
     key: Key
-    is_default: bool
 
 
 def leaves(config: Config) -> Iterator[Leaf]:
     """List the leaves of a configuration, in the order in which their keys are declared."""
-    return _list_leaves(config, (), Key(), Config())
+    return _list_leaves(config, (), Key())
 
 
 def values_by_key(config: Config) -> dict[str, Any]:
@@ -159,22 +173,15 @@ def _find_operator_keys(section: type[Section]) -> Iterator[str]:
         yield from (f"{name}.{key}" for key in inner)
 
 
-def _list_leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:
+def _list_leaves(value: Any, location: Location, key: Key) -> Iterator[Leaf]:
     if isinstance(value, Section):
         for name, inner in value.__dict__.items():
-            own = overlay(key, type(value), name)
-            # The default may be another task or another family, which need not have this key.
-            yield from _list_leaves(inner, (*location, name), own, getattr(default, name, None))
-    elif isinstance(value, dict) and value:
-        for name, inner in value.items():
-            yield from _list_leaves(
-                inner, (*location, name), key, default.get(name) if isinstance(default, dict) else None
-            )
-    elif isinstance(value, list) and value:
-        for index, inner in enumerate(value):
-            yield from _list_leaves(inner, (*location, index), key, None)
+            yield from _list_leaves(inner, (*location, name), overlay(key, type(value), name))
+    elif isinstance(value, dict | list) and value:
+        for part, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _list_leaves(inner, (*location, part), key)
     else:
-        yield Leaf(join_key(location), value, key, is_default=value == default)
+        yield Leaf(join_key(location), value, key)
 
 
 def _change(section: AnySection, changes: Mapping[str, Any], location: Location) -> AnySection:

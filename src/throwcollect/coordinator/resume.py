@@ -11,7 +11,7 @@ import numpy as np
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
-from throwcollect.config.values import differences, leaves
+from throwcollect.config.values import differences
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.prepare import (
     check_room,
@@ -21,22 +21,21 @@ from throwcollect.coordinator.prepare import (
     prepare,
     read_listed_points,
 )
-from throwcollect.dataset.configuration import read_config, unfitting_plan
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
+from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_as_written, is_begun
+from throwcollect.dataset.manifest import entry_of, entry_of_file, find_damage, is_begun
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
-from throwcollect.dataset.verify import find_damage
-from throwcollect.dataset.verify_tables import find_wrong_trials
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
+from throwcollect.dataset.verify_tables import find_wrong_trials, read_list
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
-from throwcollect.wording import command
 
+_NO_EPISODE = "no whole episode of it was left"
 _MUCH_BYTES = 50_000_000
 """Size of recordings from which on the search is announced: a core takes a second to look through so many bytes."""
 
@@ -47,42 +46,39 @@ def resume(
     *,
     sweep_directory: Path,
     processes: int = 1,
-    check: bool = False,
     before_writing: Callable[[], object] = lambda: None,
     onlooker: Onlooker = SILENT,
 ) -> Plan:
     """Write a configuration and its plan into a dataset's directory; some of its trials may have run already.
 
-    A finished dataset of which a file is missing or damaged counts as unfinished from then on.
+    The files of a finished dataset are compared byte for byte with its manifest. If one is missing or damaged, the
+    dataset counts as unfinished from then on.
 
     Args:
         config: The configuration to go on with. It may differ in how it is run, and have more trials.
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
         processes: How many processes may check the trials of a large plan, as for `draw_plan`.
-        check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
         before_writing: Is called before anything is written, unless every trial has ended; what it raises leaves the
             dataset as it is.
         onlooker: Is warned of what is missing or damaged in a finished dataset, and told how much there is to look
             through.
     """
     with hold_lock(directory):
+        if is_there(directory / SOURCES):
+            raise DatasetError(
+                "was derived from other datasets, so nothing is collected into it",
+                path=directory,
+                hint="derive it again if it is damaged",
+            )
+        given = make_self_contained(config)
         stored = _read_stored_config(directory)
         if stored is not None:
-            refuse_changes(directory, stored, make_self_contained(config))
-        old = _read_stored_plan(directory, stored, make_self_contained(config))
-        damaged = _find_damaged(directory, old, check=check, onlooker=onlooker)
+            refuse_changes(directory, stored, given)
+        damaged = _find_damaged(directory, onlooker)
+        old = None if PLAN in damaged else _read_stored_plan(directory, stored, given)
         # The list may be read and written below, and a link in its place could lead to any file of the user.
         check_regular(directory / TRIALS)
-        # A configuration from another directory names a list of its own, from which the damaged one is made again.
-        if TRIALS in damaged and sweep_directory.samefile(directory):
-            raise DatasetError(
-                f"{directory / TRIALS}: is missing or damaged, and nothing else holds the list of trials",
-                hint=f"{command('up', 'CONFIG', '--resume', directory)}, with the file that sweep.file of CONFIG names",
-            )
-        if old is not None and PLAN in damaged and (not config.grows or find_wrong_trials(old)):
-            # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
-            old = None
         plan, listed = _make_plan(config, directory, sweep_directory, old, damaged, processes, onlooker)
         # The dataset may be finished only by its earlier configuration, or by files that are gone.
         changes = bool(damaged) or (stored is not None and stored.without_run() != plan.config.without_run())
@@ -94,8 +90,7 @@ def resume(
             write_file(directory / TRIALS, encode_points(listed))
         if changes:
             remove(directory / METADATA)
-        _write(plan, directory, stored, old, replan=PLAN in damaged, ended=ended)
-        _announce_search(directory, onlooker)
+        _write(plan, directory, stored, ended=ended)
         return plan
 
 
@@ -124,66 +119,65 @@ def _make_plan(
     own_list = given.sweep.file is not None and sweep_directory.samefile(directory)
     if (
         old is not None
-        and TRIALS not in damaged
         and old.config.without_run() == config.without_run()
         and (given.sweep.file is None or own_list or _has_list(directory, given, sweep_directory))
     ):
         # The digest of the plan also depends on the order of keys, which may have been changed in the file.
-        return replace(old, config=old.config.run_as(config)), None
+        lost_list = own_list and (TRIALS in damaged or not _has_own_list(directory, old))
+        return replace(old, config=old.config.run_as(config)), old.trials.points if lost_list else None
     check_room(directory, count_before(given))
-    try:
-        drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
-    except PlanError as error:
-        if own_list:
-            longer = f"{command('up', 'CONFIG', '--resume', directory)} takes further rows of the list of CONFIG"
-            error.hint = error.hint or longer
-        raise
+    drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
     plan = _extend(directory, old, replace(drawn, config=config))
     return plan, read_listed_points(given, directory=sweep_directory)
 
 
+def _has_own_list(directory: Path, plan: Plan) -> bool:
+    """Whether the list of trials in a dataset is that of its plan."""
+    try:
+        read_list(directory, plan)
+    except DatasetError:
+        return False
+    return True
+
+
 def _has_list(directory: Path, config: Config, elsewhere: Path) -> bool:
     """Whether a dataset has the list of trials that a configuration names, which may have more rows by now."""
-    path = directory / TRIALS
-    return is_there(path) and read_points(path, config) == read_listed_points(config, directory=elsewhere)
+    try:
+        return read_points(directory / TRIALS, config) == read_listed_points(config, directory=elsewhere)
+    except ConfigError:
+        return False
 
 
-def _write(plan: Plan, directory: Path, stored: Config | None, old: Plan | None, *, replan: bool, ended: bool) -> None:
+def _write(plan: Plan, directory: Path, stored: Config | None, *, ended: bool) -> None:
     """Write configuration and plan if they differ from the stored ones, or the plan is damaged."""
     # A finished dataset stays as it is, without the keys that say how it is run.
     kept = plan.config.without_run() if ended else plan.config
-    replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
+    replanned = not _has_contents(directory / PLAN, plan.encode())
     if stored != kept:
         if replanned:
             # Were this process killed here, the plan must not lie beside another configuration. If it is empty, it is
             # made again, and the directory still holds a dataset.
             write_file(directory / PLAN, b"")
         write_file(directory / CONFIG, dump_yaml(kept).encode())
-    if replanned or replan:
+    if replanned:
         plan.write(directory / PLAN)
 
 
-def _announce_search(directory: Path, onlooker: Onlooker) -> None:
-    """Report the size of what an earlier collection has left, if looking through it takes long."""
-    if is_there(directory / METADATA):
-        return
-    size = sum(path.lstat().st_size for path in directory.glob(f"*{SHARD_SUFFIX}*"))
-    if size >= _MUCH_BYTES:
-        onlooker.say(f"{directory}: looks through {size / 1e6:.0f} MB of recordings first; whole episodes stay")
+def _has_contents(path: Path, contents: bytes) -> bool:
+    """Whether a file is there and holds these bytes."""
+    try:
+        return entry_of_file(path) == entry_of(path.name, contents)
+    except DatasetError:
+        return False
 
 
-def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, onlooker: Onlooker) -> frozenset[str]:
+def _find_damaged(directory: Path, onlooker: Onlooker) -> frozenset[str]:
     """Find the names of files of a finished dataset that are missing or damaged; none if it is not finished."""
     if not is_there(directory / METADATA):
         return frozenset()
-    findings = find_damage(directory, plan, in_full=check)
+    findings = find_damage(directory, in_full=True)
     for finding in findings:
         onlooker.warn(f"{directory}: {finding}")
-    if any(finding.file == SOURCES for finding in findings):
-        raise DatasetError(
-            f"{directory / SOURCES}: is missing or damaged, and nothing else says where the trials come from",
-            hint="derive the dataset again",
-        )
     return frozenset(finding.file for finding in findings)
 
 
@@ -202,7 +196,7 @@ def is_complete(directory: Path) -> bool:
     """Whether a directory holds a dataset in which nothing is left to collect, and no file of it is missing."""
     try:
         plan = Plan.read(directory / PLAN, read_config(directory))
-        return has_all_trials(directory, plan) and not find_damage(directory, plan, in_full=False)
+        return has_all_trials(directory, plan) and not find_damage(directory, in_full=False)
     except (ConfigError, DatasetError):
         return False
 
@@ -213,77 +207,63 @@ def _read_stored_config(directory: Path) -> Config | None:
         path = config_path(directory)
         config = load(path)
         # Compare the whole text: one that a power cut has cut off may still be valid, with defaults for missing keys.
-        # A finished dataset of an earlier version has fewer keys, and counts as complete if its manifest says so.
-        complete = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
+        return config if path.read_text(encoding="utf-8") == dump_yaml(config) else None
     except (ConfigError, DatasetError, OSError):
         return None
-    return config if complete else None
 
 
 def _read_stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan | None:
+    """Read the plan; None if it is missing or damaged, and the configuration is there, from which it is drawn again."""
     try:
-        return Plan.read(directory / PLAN, stored or config)
-    except DatasetError as error:
-        if stored is not None and isinstance(error, ForeignPlanError) and not is_as_written(directory, CONFIG):
-            raise unfitting_plan(error) from error
+        plan = Plan.read(directory / PLAN, stored or config)
+    except ForeignPlanError:
+        raise
+    except DatasetError:
+        # Without the stored configuration, nothing tells whether the given one is that of the dataset.
         if stored is None:
-            # The configuration is missing, too, so nothing tells whether the given one is that of the dataset.
-            hint = f"{command('up', 'CONFIG', '--resume', directory)}, with the CONFIG that the dataset was begun with"
-            raise DatasetError(error.message, hint=hint) from error
+            raise
         return None
+    return None if find_wrong_trials(plan) else plan
 
 
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     """Refuse a configuration that differs from the stored one, with which a dataset was begun."""
     changed = differences(stored.without_run(), config.without_run())
-    may_grow = {leaf.name for config in (stored, config) for leaf in leaves(config) if leaf.key.grows}
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key not in may_grow or not _is_growth(before, after, config)
+        if not (key == "trials" or key.startswith("until.")) or not _is_growth(before, after, config)
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
-        compare = command("dataset", "replay", directory, "--all", "--engine", config.sim.engine)
-        hint = f"{compare} tells by how much its throws differ" if "sim.engine" in changed else None
-        raise ConfigError(problems, expected=same, hint=hint)
+        raise ConfigError(problems, expected=same)
 
 
 def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials may replace an earlier one; None stands for no limit."""
-    if not config.grows:
-        # `_extend` compares the trials of a plan that does not grow.
+    if config.until is None:
+        # `_extend` compares the trials.
         return True
     return after is None or (before is not None and after >= before)
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
-    """Check that the new plan begins with the trials of the old one, and keep those that results have added."""
+    """Check that the new plan begins with the trials of the old one."""
     if old is None:
         return new
     count = min(len(old.trials), len(new.trials))
-    if count < len(old.trials) and not new.config.grows:
+    if count < len(old.trials) and new.config.until is None:
         raise ConfigError(
             [Problem(f"{directory} has {len(old.trials)} already, got {count}", key="trials")],
             expected=f"{len(old.trials)} or more",
-            hint="throwcollect dataset sample takes some of them into a new dataset",
         )
     before, after = old.trials[:count], new.trials[:count]
-    are_same = np.array_equal(before.digests, after.digests) and before.refused.keys() == after.refused.keys()
-    if new.config.sweep.file is not None and not (are_same and before.targets == after.targets):
+    are_same = np.array_equal(before.digests, after.digests) and before.targets == after.targets
+    # With `until`, the collection checks most of the trials.
+    if not are_same or (new.config.until is None and before.refused.keys() != after.refused.keys()):
+        drawn = "the list" if new.config.sweep.file is not None else f"the sampler {new.config.sweep.sampler}"
         raise ConfigError(
-            [Problem(f"the list begins with other trials or targets than {directory} has", key="sweep.file")],
-            expected="the same rows, and further ones below them",
+            [Problem(f"{drawn} begins with other trials or targets than {directory} has", key="sweep")],
+            expected="a list with further rows below, or a sampler that goes on where it ended: sobol, uniform",
         )
-    if not are_same:
-        raise ConfigError(
-            [Problem(f"the sampler {new.config.sweep.sampler} draws other trials when there are more", key="trials")],
-            expected=f"{len(old.trials)}, as {directory} was begun with",
-            hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
-        )
-    # Of a plan that grows, only the first rounds are drawn again. What results have added is kept.
-    if count < len(old.trials):
-        trials = new.trials[:]
-        trials.extend(old.trials[count:])
-        new = replace(new, trials=trials)
     return new

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from throwcollect.config.loader import load
+from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, SOURCES, config_path, has_files
-from throwcollect.dataset.manifest import was_changed
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
-from throwcollect.files import is_there
+from throwcollect.dataset.directory import CONFIG, config_path, describe_other, has_files
+from throwcollect.dataset.manifest import is_begun, was_changed
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import is_there, refuse_pointers
 from throwcollect.wording import command
 
 
@@ -22,12 +24,28 @@ def read_config(directory: Path) -> Config:
         raise
 
 
-def unfitting_plan(error: ForeignPlanError) -> ForeignPlanError:
-    """The error for a plan of another configuration than the one beside it, where nothing says which was changed."""
-    return ForeignPlanError(
-        f"{error.message} than {CONFIG}; one of the two was changed, and nothing says which",
-        hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
-    )
+@contextmanager
+def reading_config(directory: Path, file: Path | None = None, overrides: Sequence[str] = ()) -> Iterator[Config]:
+    """Read the configuration by which a dataset goes on, its own or that of a file, whose places errors name.
+
+    The overrides are ``key=value`` pairs, as ``--set`` takes them.
+    """
+    if not is_begun(directory):
+        refuse_lost_config(directory)
+        raise ConfigError(
+            f"{directory}: {describe_other(directory)}", expected="a directory that throwcollect up has made"
+        )
+    refuse_pointers(directory)
+    with ExitStack() as places:
+        try:
+            config = places.enter_context(load_locating_errors(file or config_path(directory), overrides))
+        except ConfigError as error:
+            # A problem without a place in a file is a problem of the overrides, which another file would not solve.
+            if file or all(problem.path is None for problem in error.problems):
+                raise
+            refuse_damaged_config(directory, error)
+            raise
+        yield config
 
 
 def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
@@ -36,20 +54,15 @@ def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
     # Without a key, it is the file itself that is wrong.
     if not first.key or was_changed(directory, CONFIG):
         place = ": ".join(filter(None, [f"line {first.line}" if first.line else "", first.key]))
-        hint = _say_how_to_restore(directory)
-        raise DatasetError(first.message, path=directory / CONFIG, place=place, hint=hint) from error
+        raise DatasetError(first.message, path=directory / CONFIG, place=place, hint=_restore(directory)) from error
 
 
 def refuse_lost_config(directory: Path) -> None:
     """Refuse a directory that holds files of a dataset, but no configuration."""
     if has_files(directory) and not is_there(directory / CONFIG):
-        raise DatasetError("no such file", path=directory / CONFIG, hint=_say_how_to_restore(directory))
+        raise DatasetError("no such file", path=directory / CONFIG, hint=_restore(directory))
 
 
-def _say_how_to_restore(directory: Path) -> str:
+def _restore(directory: Path) -> str:
     """Say how to get the configuration of a dataset back; nothing else in the directory holds it."""
-    if (directory / SOURCES).exists():
-        return "derive the dataset again"
-    if (directory / PLAN).exists():
-        return f"{command('up', 'CONFIG', '--resume', directory)}, with the configuration that it was collected with"
-    return f"copy the configuration that it was collected with to {directory / CONFIG}"
+    return f"{command('up', 'CONFIG', '--resume', directory)}, with the configuration that it was collected with"

@@ -36,7 +36,7 @@ JOURNAL = "logs/journal.jsonl"
 ATTEMPT = ".attempt-"
 """Part of the name of the directory of each attempt at a slice, and of no dataset."""
 
-FORMAT = "1"
+FORMAT = "2"
 """Version of the layout that ``docs/dataset.md`` describes."""
 
 
@@ -46,14 +46,21 @@ def shard_name(collection: str, number: int) -> str:
 
 
 def shard_of(plan: Plan, trial: int) -> str:
-    """Name the file that holds the episode of a trial, if it has one."""
-    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)
+    """Name the file that holds the episode of a trial, if it has one; each of joined plans begins with a new file."""
+    size, before = plan.config.record.trials_per_shard, 0
+    for count in plan.joined:
+        if trial < count:
+            break
+        trial, before = trial - count, before + -(-count // size)
+    return shard_name(plan.config.name, before + trial // size)
 
 
 def list_shards(plan: Plan) -> list[str]:
     """List the names of the files that a plan's trials may have, in order."""
     numbers, size = plan.trials.numbers, plan.config.record.trials_per_shard
-    return [shard_of(plan, trial) for trial in range(numbers.start // size * size, numbers.stop, size)]
+    begin = numbers.start // size
+    count = sum(-(-part // size) for part in plan.parts)
+    return [shard_name(plan.config.name, number) for number in range(begin, begin + count)]
 
 
 def path_of_part(path: Path) -> Path:

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.journal import measure_collected_s
-from throwcollect.dataset.misses import summarise_misses
+from throwcollect.dataset.misses import read_targets, summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.dataset.summary_files import combine_digests
@@ -83,20 +83,19 @@ def check_recordings_are_there(directory: Path) -> None:
 def digest(directory: Path) -> str:
     """Compute the digest of a dataset again from the bytes of its episodes, and from targets if there are some."""
     dataset = Dataset.open(directory)
-    stated = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["digest"].to_pylist(), strict=True))
+    recorded = dataset.recorded.throws
+    stated = zip(recorded["trial"].to_pylist(), recorded["digest"].to_pylist(), strict=True)
     digests = []
-    for episode in log_progress(dataset.episodes(), len(dataset.recorded), "episode", "checked"):
-        trial = episode.header.trial
+    for episode in log_progress(dataset.episodes(), len(recorded), "episode", "checked"):
+        trial, expected = next(stated)
         try:
             episode.check_records()
         except DatasetError as error:
             raise error.locate(directory, f"trial {trial}") from error
-        if episode.digest != stated[trial]:
-            raise DatasetError(
-                f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=f"{stated[trial]}"
-            )
+        if episode.digest != expected:
+            raise DatasetError(f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=expected)
         digests.append(episode.digest)
-    combined = combine_digests(digests, dataset.plan.trials.targets)
+    combined = combine_digests(digests, read_targets(dataset.throws))
     if combined != dataset.digest:
         raise DatasetError(f"digest {combined}", path=directory, expected=f"{dataset.digest} as metadata.yaml says")
     return combined

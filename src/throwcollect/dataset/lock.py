@@ -1,6 +1,6 @@
 """Keeps two processes from changing one dataset: a lock on its directory, on whatever machine the second process runs.
 
-A process that prepares a dataset, resumes it or rebuilds files of it holds the lock alone, before it reads anything.
+A process that prepares or resumes a dataset holds the lock alone, before it reads anything.
 The launcher and the coordinator of a run hold it together as long as they live. So nobody can prepare the dataset while
 it is collected into, not even while a coordinator that was lost is started again.
 

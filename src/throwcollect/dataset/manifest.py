@@ -17,11 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.directory import (
+    CARD,
     CONFIG,
     JOURNAL,
     MANIFEST,
     METADATA,
     PLAN,
+    PROVENANCE,
     SHARD_SUFFIX,
     SOURCES,
     THROWS,
@@ -146,7 +148,7 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     """Read the name of the collection that a manifest has, and its entries; see `read_manifest`."""
     path = directory / MANIFEST
     if not is_there(path):
-        raise DatasetError("is missing", path=path, hint=command("dataset", "rebuild", directory))
+        raise DatasetError("is missing", path=path, hint=command("resume", directory, "--no-simulate"))
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
         document = json.loads(text)
@@ -169,14 +171,6 @@ def is_begun(directory: Path) -> bool:
         return False
 
 
-def is_as_written(directory: Path, name: str) -> bool:
-    """Whether there is a manifest, and a file of the dataset is as the manifest says."""
-    try:
-        return entry_of_file(directory / name) in read_manifest(directory)
-    except DatasetError:
-        return False
-
-
 def was_changed(directory: Path, name: str) -> bool:
     """Whether there is a manifest, and a file of the dataset is not as the manifest says."""
     try:
@@ -192,8 +186,7 @@ def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Findin
     The name of the collection is compared, too, unless it is unknown (None).
     """
     if not (directory / MANIFEST).exists():
-        rebuild = command("dataset", "rebuild", directory)
-        yield Finding(MANIFEST, "", f"is missing, so changed bytes may go unnoticed; {rebuild} writes it")
+        yield Finding(MANIFEST, "", "is missing, so changed bytes may go unnoticed")
         return
     try:
         name_there, entries = read_named_manifest(directory)
@@ -207,6 +200,15 @@ def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Findin
     yield from (
         Finding(path, "", f"is not in {MANIFEST}") for path in list_promised_names(directory) if path not in covered
     )
+
+
+def find_damage(directory: Path, *, in_full: bool) -> list[Finding]:
+    """Find the files of a finished dataset that are missing, or not as its manifest says; see `find_changed_files`."""
+    try:
+        damage = list(find_changed_files(directory, read_manifest(directory), in_full=in_full))
+    except DatasetError as error:
+        return [Finding.of(MANIFEST, error)]
+    return damage + [Finding(name, "", "is missing") for name in (CARD, PROVENANCE) if not is_there(directory / name)]
 
 
 def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:

@@ -10,33 +10,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.errors import ConfigError
-from throwcollect.wording import suggest
-
 Bounds = tuple[float, float]
 """Smallest and largest value."""
 
 
-class UnknownNameError(ConfigError, KeyError):
-    """A column or joint was asked for that does not exist."""
-
-    # `KeyError` would quote the message.
-    __str__ = ConfigError.__str__
-
-
-def refuse_name(what: str, name: object, known: Iterable[str], *, page: str = "docs/dataset.md") -> UnknownNameError:
-    """Make the error for an unknown name, by the known names and the page that lists them.
-
-    Its sentence begins with `what`, such as ``no column``.
-    """
-    return UnknownNameError(f"{what} {name!r}{suggest(name, known, page)}")
-
-
-def refuse_attribute(owner: object, name: str, parts: Iterable[str] = ()) -> AttributeError:
-    """Make the error for an attribute that `owner` lacks; `parts` are attributes of its attributes, with a dot."""
-    public = [each for each in dir(type(owner)) if not each.startswith("_")]
-    meant = "" if name.startswith("_") else suggest(name, (*public, *parts), "docs/reading.md")
-    return AttributeError(f"a {type(owner).__name__} has no {name!r}{meant}")
+def unknown_name(what: str, name: object, known: Iterable[str]) -> KeyError:
+    """Make the error for a name of a column or a joint that does not exist, with those that do."""
+    return KeyError(f"no {what} {name!r}; there are {', '.join(known)}")
 
 
 def read_column(column: pa.ChunkedArray) -> NDArray[Any]:
@@ -80,7 +60,7 @@ class NamedArray:
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """Return one column."""
         if name not in self.names:
-            raise refuse_name("no column", name, self.names)
+            raise unknown_name("column", name, self.names)
         return self.values[:, self.names.index(name)]
 
     def __contains__(self, name: object) -> bool:

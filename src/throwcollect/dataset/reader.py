@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,23 +17,25 @@ from throwcollect.arguments import check_whole_number, read_list, read_path
 from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
-from throwcollect.dataset.bag import read_bag_metadata
+from throwcollect.config.values import column_of
+from throwcollect.dataset.bag import find_next_command, read_bag_metadata
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.directory import METADATA, PLAN, THROWS
+from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS, list_shards, path_of_part
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_attribute, refuse_name
-from throwcollect.dataset.selected_throws import select_throws
+from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, unknown_name
+from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import name_alias, read_throws
+from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
 from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there
+from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import find_range, find_trial
+from throwcollect.sweep.arrow_column import count_values, find_range, find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
 
@@ -44,12 +47,17 @@ pd = lazily("pandas")
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
+class UnfinishedDatasetWarning(UserWarning):
+    """A dataset was opened whose collection has not come to its end."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Dataset(Sequence[Throw]):
     """Throws of a dataset, in order of trials unless they were selected in another one.
 
-    ``dataset[i]`` is the throw of row i of `throws`. A dataset as it is loaded has every trial of the plan, so there i
-    is the number of the trial; trials that were refused or lost have a row, too, but no trajectory (see `recorded`).
+    ``dataset[i]`` is the throw of row i of `throws`. A dataset that was collected has every trial of the plan, so i is
+    the number of the trial; trials that were refused or lost have a row, too, but no trajectory (see `recorded`). A
+    dataset that was derived has only the trials that were taken, with their numbers.
 
     May be shared by threads and sent to other processes. No file stays open.
 
@@ -75,20 +83,18 @@ class Dataset(Sequence[Throw]):
             ConfigError: If its ``config.yaml`` is wrong.
         """
         path = read_path("directory", directory)
-        # Metadata and table follow from the recordings, and the plan follows from the table or the configuration.
-        rebuild, repair = command("dataset", "rebuild", path), command("dataset", "repair", path, "OUTPUT")
-        remedies: Mapping[Path | None, str] = {path / METADATA: rebuild, path / PLAN: repair, path / THROWS: rebuild}
         try:
             bag = read_bag_metadata(path)
+            if (found := _find_custom(bag, "throwcollect.format")) != FORMAT:
+                raise DatasetError(f"has the format {found}", path=path, expected=FORMAT)
             plan = Plan.read(path / PLAN, read_config(path))
             if not is_there(path / THROWS):
                 raise DatasetError("is missing", path=path / THROWS)
             return cls(path, plan, read_throws(path, plan), bag)
-        except ForeignPlanError:
-            # The configuration may be what is wrong, so the plan should not be made again from it.
-            raise
         except DatasetError as error:
-            error.hint = error.hint or remedies.get(error.path)
+            # All of these follow from the configuration and the recordings.
+            if error.path in (path / METADATA, path / PLAN, path / THROWS):
+                error.hint = error.hint or command("resume", path)
             raise
 
     def __len__(self) -> int:
@@ -107,12 +113,12 @@ class Dataset(Sequence[Throw]):
 
         Raises:
             IndexError: If there is no throw at this position.
-            ConfigError: If there is no such column; it is also a `KeyError`.
+            KeyError: If there is no such column.
             TypeError: If it is none of these.
         """
         if isinstance(which, str):
             if which not in self.throws.column_names:
-                raise refuse_name("no column", which, self.throws.column_names)
+                raise unknown_name("column", which, self.throws.column_names)
             return read_column(self.throws[which])
         if isinstance(which, slice):
             return replace(self, throws=self.throws.take(pa.array(range(len(self))[which], pa.int64())))
@@ -139,12 +145,6 @@ class Dataset(Sequence[Throw]):
         """Its configuration; that of a single trial has `Throw.parameters` in it."""
         return self.plan.config
 
-    # Type checkers would take any attribute for known if they saw this function.
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            raise refuse_attribute(self, name)
-
     @property
     def parameters(self) -> NamedArray:
         """Swept values of all throws, in the units of their keys; the names are dotted configuration keys.
@@ -161,12 +161,8 @@ class Dataset(Sequence[Throw]):
                 case _:
                     values = self.plan.trials.values[:, index]
                     bounds.append((values.min(), values.max()))
-        return NamedArray.of(self.throws, self.plan.keys, bounds)
-
-    @property
-    def aliases(self) -> Mapping[str, str]:
-        """Name without dots and with its unit of each swept key, such as ``task_end_arm_right_4_joint_rad``."""
-        return {key: name_alias(key) for key in self.plan.keys}
+        columns = self.throws.select([*map(column_of, self.plan.keys)])
+        return NamedArray.of(columns.rename_columns(list(self.plan.keys)), self.plan.keys, bounds)
 
     @property
     def landings(self) -> NamedArray:
@@ -196,34 +192,21 @@ class Dataset(Sequence[Throw]):
         """Hash over all episodes in order of trials, as it was written.
 
         Raises:
-            DatasetError: If the metadata do not have it.
+            DatasetError: If the metadata do not have it, as those of an unfinished dataset.
         """
-        return self._read_custom("throwcollect.digest")
-
-    @property
-    def layout(self) -> str:
-        """Number of the format of its files, as it was written.
-
-        Raises:
-            DatasetError: If the metadata do not have it.
-        """
-        return self._read_custom("throwcollect.format")
+        digest = _find_custom(self._bag, "throwcollect.digest")
+        if not isinstance(digest, str):
+            raise DatasetError("throwcollect.digest is missing", path=self.directory / METADATA)
+        return digest
 
     @property
     def shards(self) -> tuple[str, ...]:
-        """Names of its recordings.
-
-        Raises:
-            DatasetError: If the metadata do not have them.
-        """
-        names = self._bag.get("relative_file_paths")
-        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise self._make_missing_error("relative_file_paths")
-        return tuple(names)
+        """Names of the recordings that its throws are in, in order."""
+        return tuple(sorted(count_values(self.throws["shard"].drop_null())))
 
     @property
     def topics(self) -> Mapping[str, int]:
-        """Number of messages of each topic.
+        """Number of messages of each topic in the whole dataset, as it was written.
 
         Raises:
             DatasetError: If the metadata do not have them.
@@ -232,18 +215,7 @@ class Dataset(Sequence[Throw]):
             counts = self._bag["topics_with_message_count"]
             return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in counts}
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise self._make_missing_error("topics_with_message_count") from error
-
-    def _make_missing_error(self, name: str) -> DatasetError:
-        return DatasetError(f"{name} is missing", path=self.directory / METADATA)
-
-    def _read_custom(self, name: str) -> str:
-        """Return what the product itself wrote into the metadata."""
-        custom = self._bag.get("custom_data")
-        value = custom.get(name) if isinstance(custom, dict) else None
-        if not isinstance(value, str):
-            raise self._make_missing_error(name)
-        return value
+            raise DatasetError("topics_with_message_count are missing", path=self.directory / METADATA) from error
 
     @property
     def recorded(self) -> Dataset:
@@ -258,8 +230,8 @@ class Dataset(Sequence[Throw]):
         """
         position = find_trial(self.throws["trial"], trial)
         if position < 0:
-            raise DatasetError(f"no trial {trial}", path=self.directory, expected=f"0 to {len(self.plan.trials) - 1}")
-        return self[position].episode.read()
+            raise DatasetError(f"no trial {trial}", path=self.directory)
+        return self[position].read_episode()
 
     def robot_description(self) -> str | None:
         """Read the URDF text of the robot from the first recording; None if there is no recording.
@@ -293,9 +265,13 @@ class Dataset(Sequence[Throw]):
                 for each throw; or numbers of trials, in the order in which they are wanted.
 
         Raises:
-            ConfigError: If it is none of these.
+            ConfigError: If the condition cannot be evaluated.
+            ValueError: If Arrow takes it for none of these, such as a mask that is too short.
             DatasetError: If a trial is not among the throws.
         """
+        # Arrow's functions take long to import, and most programs that open a dataset select nothing.
+        from throwcollect.dataset.selection import select_throws
+
         return replace(self, throws=select_throws(self.throws, which, self.directory))
 
     def trajectories(
@@ -340,8 +316,60 @@ class Dataset(Sequence[Throw]):
         columns = (self.throws[name].to_pylist() for name in ("trial", "shard", "chunk_offset", "samples"))
         rows = list(zip(*columns, strict=True))
         paths = {name: self.directory / name for name in {shard for _, shard, *_ in rows} if name is not None}
-        start_ns, joints = self.config.trial_start_ns, self.joints
-        return [
-            None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)
-            for trial, shard, offset, samples in rows
-        ]
+        start_ns, joints, first = self.config.trial_start_ns, self.joints, self.plan.first_of_part
+
+        def place(trial: int, shard: str, offset: int, samples: int) -> StoredThrow:
+            own = trial - first(trial)
+            return StoredThrow(own, start_ns(own), paths[shard], offset, samples, joints)
+
+        return [None if row[1] is None else place(*row) for row in rows]
+
+
+def load(directory: StrPath) -> Dataset:
+    """Open a dataset for reading.
+
+    Its tables are read and checked against each other; recordings are opened when they are looked at. If the dataset is
+    not finished, its recordings are read through, and its rows are the trials that have ended so far: row i need not be
+    trial i, and `Dataset.digest` raises an error.
+
+    Raises:
+        DatasetError: If the directory holds no dataset, or its tables or plan are damaged.
+        ConfigError: If its ``config.yaml`` is wrong.
+
+    Warns:
+        UnfinishedDatasetWarning: If it is not finished.
+    """
+    path = read_path("directory", directory)
+    # If the directory is no dataset at all, `open` says what is wrong.
+    if is_there(path / METADATA) or not is_there(path / PLAN):
+        return Dataset.open(path)
+    plan = Plan.read(path / PLAN, read_config(path))
+    rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
+    found = find_next_command(path)
+    warnings.warn(
+        f"{path} {found.state}: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
+        f"`{found.command}` {found.purpose}",
+        UnfinishedDatasetWarning,
+        stacklevel=2,
+    )
+    return Dataset(path, plan, ThrowsTable.of(plan).table(rows), {})
+
+
+def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
+    """Make the rows of the refused trials, and of those whose episodes are on disk as `resume` would keep them."""
+    table = ThrowsTable.of(plan)
+    yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
+    names = list_shards(plan)
+    for name in log_progress(names, len(names), "recording", "looked through"):
+        final = directory / name
+        # The unfinished file comes first: when it vanishes in this moment, the final one is there.
+        episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)
+        # An episode whose records are damaged can be saved, and not read in place.
+        for found in (each for each in episodes.values() if each.run is not None):
+            yield table.row(plan.trial(found.trial), found.result, found.place)
+
+
+def _find_custom(bag: Mapping[str, Any], name: str) -> object:
+    """Find what the product itself wrote into the metadata of a bag under a name; None if it is not there."""
+    custom = bag.get("custom_data")
+    return custom.get(name) if isinstance(custom, dict) else None

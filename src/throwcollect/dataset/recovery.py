@@ -1,4 +1,4 @@
-"""Takes in what an interrupted collection left of a shard: every intact episode stays, the other trials run again.
+"""Takes in what an interrupted collection left of a shard: every whole episode stays, the other trials run again.
 
 Afterwards, one of two things holds. Either the shard's final file is there and is, byte for byte, what the writer makes
 of its episodes; or all that is left of it lies in the file with the ending ``.part``, to which the writer can append as
@@ -8,10 +8,11 @@ if it had never stopped.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -31,11 +32,14 @@ from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
 from throwcollect.dataset.throws_table import EpisodePlace
 from throwcollect.episode.channels import Channels
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import remove, unwritable
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
+
+Judge = Callable[[Config, Episode], Result]
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that look through files side by side saves time."""
@@ -45,13 +49,14 @@ _MANY_EPISODES = 1000
 class RecoveredEpisode:
     """An episode on disk that is as a new simulation of its trial would record it, so the trial need not run again.
 
-    It lies at `place` now, and `run` has its records without their bytes.
+    It lies at `place` now. `run` has its records without their bytes; None if they are not byte for byte what the
+    writer writes, so that the episode has to be written anew.
     """
 
     trial: int
     result: Result
     place: EpisodePlace
-    run: RecordGroup
+    run: RecordGroup | None
 
 
 @dataclass(frozen=True)
@@ -69,28 +74,34 @@ class LeftOfShard:
     begun: Mapping[int, RecoveredEpisode]
     finished: FinishedShard | None
 
+    def without(self, dropped: Collection[int]) -> LeftOfShard:
+        """Leave out the episodes of some trials, which are of no use any more."""
+        if not dropped:
+            return self
+        final, begun = (
+            {trial: found for trial, found in episodes.items() if trial not in dropped}
+            for episodes in (self.final, self.begun)
+        )
+        return LeftOfShard(final, begun, None)
+
 
 @dataclass(frozen=True)
 class LeftShard:
-    """A shard of which something may be left: its final path, its trials, and whether no trial will be added to it.
-
-    If it is settled, its final file may stay if it has an episode of each trial.
-    """
+    """A shard of which something may be left: its final path and its trials."""
 
     path: Path
     plan: Plan
-    settled: bool
 
 
 def remove_unfinished(directory: Path) -> None:
     """Remove half-written files that a killed process left beside the recordings; the files themselves stay."""
     for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
         remove(directory / f"{name}.new")
-    # Earlier versions gave this name to an unfinished plan.
-    remove(directory / f"{PLAN}.part")
 
 
-def find_left(parts: Sequence[LeftShard], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
+def find_left(
+    parts: Sequence[LeftShard], channels: Channels, *, judge: Judge = judge_episode, processes: int = 1
+) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, in several of them at a time if there are many episodes. Changes nothing.
 
     If there is more than one process, they may import the program that calls this, as those of `multiprocessing` do.
@@ -101,19 +112,20 @@ def find_left(parts: Sequence[LeftShard], channels: Channels, *, processes: int 
     if sum(len(part.plan.trials) for part in parts) < _MANY_EPISODES:
         processes = 1
     return work_side_by_side(
-        parts, _look_with, (channels,), processes=processes, doing="looks through recordings", fork=True
+        parts, _look_with, (channels, judge), processes=processes, doing="looks through recordings", fork=True
     )
 
 
-def _look_with(channels: Channels) -> Callable[[LeftShard], LeftOfShard]:
+def _look_with(channels: Channels, judge: Judge) -> Callable[[LeftShard], LeftOfShard]:
     def look(part: LeftShard) -> LeftOfShard:
-        final = find_episodes(part.path, part.plan, channels)
+        final = find_episodes(part.path, part.plan, channels, judge=judge)
         # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
-        if part.settled and final and final.keys() == set(part.plan.trials.numbers_to_run):
+        if final and final.keys() == set(part.plan.trials.numbers_to_run):
             finished = _check_finished(part.path, channels, final)
             if finished is not None:
                 return LeftOfShard(final, {}, finished)
-        return LeftOfShard(final, find_episodes(path_of_part(part.path), part.plan, channels), None)
+        begun = find_episodes(path_of_part(part.path), part.plan, channels, judge=judge)
+        return LeftOfShard(final, begun, None)
 
     return look
 
@@ -129,52 +141,66 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
     if left.finished is not None:
         remove(shard.part)
         return [final[trial] for trial in sorted(final)]
-    # `adopt` cuts off what follows the last episode, so a final file can become the unfinished one as it is.
-    if final and not begun:
-        try:
-            os.replace(shard.path, shard.part)
-        except OSError as error:
-            raise unwritable(shard.part, error) from error
+    # `adopt` cuts off what follows the last episode, so a final file can become the unfinished one as it is. A file in
+    # which an episode has to be written anew becomes the final one, from which all are copied.
+    if final and not begun and None not in (each.run for each in final.values()):
+        _rename(shard.path, shard.part)
         final, begun = {}, final
-    if begun:
-        shard.adopt({trial: (found.place.chunk_offset, found.run) for trial, found in begun.items()})
+    elif begun and not final and None in (each.run for each in begun.values()):
+        _rename(shard.part, shard.path)
+        final, begun = begun, {}
+    # Both files have episodes if an earlier process was killed before it had removed one of them.
+    runs = {trial: (each.place.chunk_offset, each.run) for trial, each in begun.items() if each.run is not None}
+    if runs:
+        shard.adopt(runs)
     else:
         remove(shard.part)
-    # Both files have episodes if an earlier process was killed before it had removed one of them.
-    only_final = {trial: found for trial, found in final.items() if trial not in begun}
+    only_final = {each.place.chunk_offset: each for trial, each in final.items() if trial not in runs}
     if only_final:
-        with map_file(shard.path) as contents:
-            for found in only_final.values():
-                shard.append(contents.episode(contents.record(found.place.chunk_offset)).episode)
+        for found in scan_whole(shard.path):
+            if found.stored.offset in only_final:
+                shard.append(found.stored.episode)
     # The final file goes last: if this process is killed before, the next one finds these episodes in it again.
     remove(shard.path)
-    episodes = {**begun, **only_final}
+    episodes = {**{trial: begun[trial] for trial in runs}, **{each.trial: each for each in only_final.values()}}
     return [episodes[trial] for trial in sorted(episodes)]
 
 
-def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> dict[int, RecoveredEpisode]:
-    """Find the episodes of a file that are as new simulations would record them, by trial.
+def _rename(path: Path, target: Path) -> None:
+    try:
+        os.replace(path, target)
+    except OSError as error:
+        raise unwritable(target, error) from error
+
+
+def find_episodes(
+    path: Path, plan: Plan, channels: Channels | None = None, *, judge: Judge = judge_episode
+) -> dict[int, RecoveredEpisode]:
+    """Find the whole episodes of a file, by trial.
 
     Args:
         path: The file; if it is missing, it has none.
         plan: The trials; episodes of others, and of refused ones, are left out.
         channels: What is recorded; None if the file is only read, and then channels are not compared.
+        judge: Finds the result of an episode of a trial with this configuration.
     """
     episodes: dict[int, RecoveredEpisode] = {}
     trials_to_run = frozenset(plan.trials.numbers_to_run)
     for found in scan_whole(path):
         episode = found.stored.episode
         trial = episode.header.trial
-        if not found.intact or trial not in trials_to_run or trial in episodes:
+        if trial not in trials_to_run or (trial in episodes and episodes[trial].run is not None):
             continue
         try:
-            result = judge_episode(plan.config_of(plan.trial(trial)), episode)
+            result = judge(plan.config_of(plan.trial(trial)), episode)
         except DatasetError:
             continue
         recorded = channels is None or channels.fit(episode.channels())
         if recorded and episode.header.start_ns == plan.config.trial_start_ns(trial):
             place = EpisodePlace(path.name, found.stored.offset, episode.header.samples, episode.digest)
-            episodes[trial] = RecoveredEpisode(trial, result, place, replace(found.stored.intact_run, data=b""))
+            run = replace(found.stored.intact_run, data=b"") if found.intact else None
+            if run is not None or trial not in episodes:
+                episodes[trial] = RecoveredEpisode(trial, result, place, run)
     return episodes
 
 
@@ -193,6 +219,8 @@ def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, Recov
         def read(offset: int, length: int) -> bytes:
             return contents.slice(offset, offset + length)
 
-        runs = {trial: (each.place.chunk_offset, each.run) for trial, each in episodes.items()}
+        runs = {trial: (each.place.chunk_offset, each.run) for trial, each in episodes.items() if each.run is not None}
+        if len(runs) < len(episodes):
+            return None
         finished = write_in_order(compare, channels, runs, read, name=path.name)
         return finished if same and written == len(contents) else None

@@ -3,8 +3,8 @@
 It relies neither on the order of records nor on their lengths: it finds chunks by the bytes that every header of theirs
 holds, wherever they lie. So damage costs the damaged episodes, and never those behind them.
 
-All commands find episodes with `scan`: recovery takes the intact ones, repair the whole ones, and verify reports what
-lies between the readable ones.
+All commands find episodes with `scan`: recovery takes the whole ones, and verify reports what lies between the
+readable ones.
 """
 
 from __future__ import annotations

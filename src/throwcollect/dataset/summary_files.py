@@ -19,8 +19,6 @@ from throwcollect.files import replacing, write_all, write_file
 from throwcollect.sweep.parquet_file import encode_pieces
 from throwcollect.sweep.points import Targets
 
-WRITTEN = (THROWS, MANIFEST, METADATA)
-"""Names of the files, in the order in which they are written: ``metadata.yaml`` marks a finished dataset."""
 _ROWS_AT_ONCE = 1 << 16
 _BYTES_AT_ONCE = 1 << 20
 
@@ -34,7 +32,7 @@ def write_description(
     *,
     on_piece: Callable[[], object] = lambda: None,
 ) -> None:
-    """Write the files; they follow from those that are there already.
+    """Write the files, ``metadata.yaml`` last; they follow from those that are there already.
 
     Args:
         directory: Directory of the dataset, with its configuration, plan and recordings.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,11 +13,21 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.target_columns import is_target
-from throwcollect.dataset.named_array import refuse_attribute, refuse_name
-from throwcollect.dataset.recorded_motion import Ball, Joints, LazyRows
+from throwcollect.config.values import column_of
+from throwcollect.dataset.motion import Ball, Joints
+from throwcollect.dataset.named_array import unknown_name
 from throwcollect.dataset.throws_table import Row, ball_state
-from throwcollect.dataset.trajectory_columns import COLUMNS, TIMES, Recorded, name_components
-from throwcollect.episode.trajectory_rows import STAMPS
+from throwcollect.dataset.trajectory_columns import (
+    BALL_COLUMNS,
+    TIMES,
+    Column,
+    StoredThrow,
+    empty_columns,
+    fill,
+    name_components,
+)
+from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.trajectory_rows import JOINT_COLUMNS, STAMPS, trajectory_rows
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 
@@ -24,13 +35,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 pd = lazily("pandas")
-
-_PARTS = (
-    *(f"events.{name}" for name in ("release", "apex", "landing", "contacts")),
-    *("joints.names", "ball.time_s", "joints.time_s"),
-    *(column for column in COLUMNS if "." in column),
-)
-"""Attributes of the attributes of a throw, which are easily looked for in the throw itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +91,7 @@ class Events:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        header = self._throw.episode.read().header
+        header = self._throw.read_episode().header
         return tuple(
             ContactInterval(
                 contact.body,
@@ -110,12 +114,17 @@ class Throw:
         table: Table of throws.
         position: Its row there.
         parameters: Swept keys.
-        episode: Its episode; None if it has none.
+        episode: Where its episode lies, or the episode itself; None if it has none.
         source: Directory of its dataset, or its configuration, for messages.
     """
 
     def __init__(
-        self, table: pa.Table, position: int, parameters: tuple[str, ...], episode: Recorded | None, source: str
+        self,
+        table: pa.Table,
+        position: int,
+        parameters: tuple[str, ...],
+        episode: StoredThrow | Episode | None,
+        source: str,
     ) -> None:
         self._table = table
         self._position = position
@@ -130,22 +139,16 @@ class Throw:
         if (landing := self.events.landing) is not None:
             x, y, _ = landing.position
             text += f" at x = {x:.3f} m, y = {y:.3f} m after {landing.time_s:.3f} s"
-        return f"{text}; {self._episode.samples} samples)" if self._episode else f"{text}; not recorded)"
-
-    # Type checkers would take any attribute for known if they saw this function.
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            raise refuse_attribute(self, name, _PARTS)
+        return f"{text}; {self.row['samples']} samples)" if self.recorded else f"{text}; not recorded)"
 
     def __getitem__(self, column: str) -> Any:
         """Return its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.
 
         Raises:
-            ConfigError: If there is no such column; it is also a `KeyError`.
+            KeyError: If there is no such column.
         """
         if column not in self._table.column_names:
-            raise refuse_name("no column", column, self._table.column_names)
+            raise unknown_name("column", column, self._table.column_names)
         return self.row[column]
 
     def __contains__(self, column: object) -> bool:
@@ -172,8 +175,8 @@ class Throw:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Value of each swept key, in the key's unit."""
-        return {key: self.row[key] for key in self._keys}
+        """Value of each swept key, in the key's unit; by dotted key, as `Simulator.throw` takes them."""
+        return {key: self.row[column_of(key)] for key in self._keys}
 
     @property
     def target(self) -> dict[str, float]:
@@ -207,13 +210,16 @@ class Throw:
         """Release, apex and landing, and the contacts of the ball."""
         return Events(self.row, self)
 
-    @property
-    def episode(self) -> Recorded:
-        """Its episode.
+    def read_episode(self) -> Episode:
+        """Read its episode, with everything that was recorded.
 
         Raises:
-            DatasetError: If it has none.
+            DatasetError: If it has none, or it is damaged.
         """
+        episode = self._require_episode()
+        return episode.read() if isinstance(episode, StoredThrow) else episode
+
+    def _require_episode(self) -> StoredThrow | Episode:
         if self._episode is None:
             why = self.outcome if self.reason is None else f"{self.outcome}: {self.reason}"
             raise DatasetError(
@@ -224,26 +230,38 @@ class Throw:
         return self._episode
 
     @cached_property
-    def _recording(self) -> LazyRows:
-        return LazyRows(self.episode)
+    def _rows(self) -> tuple[int, tuple[str, ...], NDArray[np.void]]:
+        """Start of the trial [ns], the joints that are recorded, and the rows of its samples; see `trajectory_rows`."""
+        episode = self._require_episode()
+        if isinstance(episode, StoredThrow):
+            return episode.start_ns, episode.joints, episode.read_rows()
+        header, joints = episode.header, episode.table.joints
+        return header.start_ns, joints, trajectory_rows(episode.state.contents, header.samples, joints)
+
+    def _read_columns(self, names: Iterable[str]) -> list[Column]:
+        """Read columns into arrays of their own, after those of times and stamps."""
+        start_ns, joints, rows = self._rows
+        columns = empty_columns([TIMES, STAMPS, *names], len(rows), len(joints))
+        fill(columns, [(start_ns, len(rows))], [rows], joints, joints)
+        return list(columns.values())
 
     @cached_property
     def ball(self) -> Ball:
         """The ball over time.
 
         Raises:
-            DatasetError: If the throw has no episode; its columns raise it if the episode is damaged.
+            DatasetError: If the throw has no episode, or it is damaged.
         """
-        return Ball(self._recording)
+        return Ball(*self._read_columns(BALL_COLUMNS))
 
     @cached_property
     def joints(self) -> Joints:
         """The joints over time.
 
         Raises:
-            DatasetError: If the throw has no episode; its columns raise it if the episode is damaged.
+            DatasetError: If the throw has no episode, or it is damaged.
         """
-        return Joints(self._recording)
+        return Joints(self._rows[1], *self._read_columns(JOINT_COLUMNS))
 
     def to_pandas(self) -> DataFrame:
         """Make a DataFrame of the motion of ball and joints: one row a sample, by time since the start of the trial.
@@ -255,10 +273,9 @@ class Throw:
             DatasetError: If the throw has no episode, or it is damaged.
             MissingExtraError: If pandas is not installed.
         """
-        parts = {name: self._recording.column(name) for name in COLUMNS if name not in (TIMES, STAMPS)}
-        columns = {
-            component: values[:, index]
-            for name, values in parts.items()
-            for index, component in enumerate(name_components(name, self._recording.joints))
-        }
-        return pd.DataFrame(columns, index=pd.Index(self._recording.column(TIMES), name=TIMES))
+        columns: dict[str, NDArray[np.float64]] = {}
+        for name in (*JOINT_COLUMNS, *BALL_COLUMNS):
+            series, _, quantity = name.partition("_")
+            values = getattr(getattr(self, series), quantity)
+            columns |= dict(zip(name_components(name, self.joints.names), values.T, strict=True))
+        return pd.DataFrame(columns, index=pd.Index(self.ball.time_s, name=TIMES))

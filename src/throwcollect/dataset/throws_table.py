@@ -14,9 +14,11 @@ import pyarrow as pa
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.config.target_columns import TARGET_PREFIX, is_target
-from throwcollect.dataset.directory import THROWS, list_shards
+from throwcollect.config.values import column_of
+from throwcollect.dataset.directory import SOURCES, THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import is_there
 from throwcollect.members import explain_failure
 from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
@@ -26,7 +28,7 @@ from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
 from throwcollect.tasks.result_columns import ball_columns, join_ball
 from throwcollect.tasks.task import Task, task_of
-from throwcollect.units import unit_of_name
+from throwcollect.units import ascii_unit, unit_of_name
 
 Row = dict[str, Any]
 """A row of the table, by column; what is null there is None."""
@@ -50,23 +52,17 @@ class EpisodePlace:
     digest: str
 
 
-def make_field(name: str, kind: pa.DataType, description: str) -> pa.Field:
-    """Make a column of a table, with its description for people."""
-    return pa.field(name, kind, metadata={"description": description})
+def make_field(name: str, kind: pa.DataType, description: str, *, unit: str | None = None) -> pa.Field:
+    """Make a column of a table, with its description for people; numbers have a unit, by default that of the name."""
+    metadata = {"description": description}
+    if kind != pa.string():
+        metadata["unit"] = ascii_unit(unit_of_name(name) if unit is None else unit)
+    return pa.field(name, kind, metadata=metadata)
 
 
 def _describe_swept(key: str) -> pa.Field:
     unit = unit_of_key(key)
-    description = f"Swept value of {key} [{unit or '-'}]."
-    return pa.field(key, pa.float64(), metadata={"description": description, "unit": unit, "alias": name_alias(key)})
-
-
-def name_alias(key: str) -> str:
-    """Make the name of a swept key without dots and with its unit at the end, for SQL and formulas."""
-    name = key.replace(".", "_")
-    # The unit is written as names of keys have it: m/s² is mps2.
-    unit = unit_of_key(key).replace("/", "p").replace("²", "2").replace("³", "3").replace(" ", "")
-    return name if not unit or unit_of_name(key) else f"{name}_{unit.lower()}"
+    return make_field(column_of(key), pa.float64(), f"Swept value of {key} [{unit or '-'}].", unit=unit)
 
 
 def ball_state(row: Row, name: str) -> BallState | None:
@@ -86,9 +82,8 @@ def _check_task(task: Task[Any], columns: Sequence[str]) -> None:
         raise ConfigError(f"task.name: outcomes of the task {name} lack {', '.join(missing)}")
     if twice := [column for column, count in Counter(columns).items() if count > 1]:
         raise ConfigError(
-            f"task.name: results of the task {name} have columns of the same name as others of the table: "
-            f"{', '.join(twice)}",
-            hint="rename the fields of its results",
+            f"task.name: two columns of the table of throws of the task {name} have the same name: {', '.join(twice)}",
+            hint="rename the fields of its results; a swept key has underscores in place of dots",
         )
     # Whoever reads the table takes columns of these names for targets that the trials were given.
     if targets := [each.name for each in task.columns.columns if is_target(each.name)]:
@@ -104,7 +99,6 @@ class ThrowsTable:
 
     Attributes:
         schema: Columns with their types and descriptions.
-        later: Names of the columns that datasets of earlier versions lack.
 
     The parameters are the swept keys, and the targets columns of targets, in their order.
 
@@ -120,7 +114,6 @@ class ThrowsTable:
         self._outcomes = task.outcomes
         with explain_failure("tasks", config.task.name, "declare its results"):
             self._columns = task.columns
-        self.later = frozenset(each.name for each in self._columns.columns if each.later)
         self.schema = pa.schema(
             [
                 make_field("trial", pa.int64(), "Number of the trial."),
@@ -162,7 +155,7 @@ class ThrowsTable:
         return result
 
     def _start_row(self, trial: Trial, outcome: str, reason: str | None) -> Row:
-        values = {key: trial.values[key] for key in self._parameters}
+        values = {column_of(key): trial.values[key] for key in self._parameters}
         return {"trial": trial.number, **values, **trial.target, "outcome": outcome, "reason": reason}
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
@@ -172,14 +165,9 @@ class ThrowsTable:
 
 
 def read_throws_table(path: Path, plan: Plan) -> pa.Table:
-    """Read a table of throws with the columns of a plan, whatever trials its rows are of.
-
-    The table of an earlier version lacks the columns that came later.
-    """
+    """Read a table of throws with the columns of a plan, whatever trials its rows are of."""
     table = read_parquet(path)
-    expected = ThrowsTable.of(plan)
-    lacking = expected.later - set(table.schema.names)
-    schema = pa.schema([field for field in expected.schema if field.name not in lacking])
+    schema = ThrowsTable.of(plan).schema
     # Metadata are not compared: descriptions of columns may have been worded otherwise when the table was written.
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
@@ -215,10 +203,14 @@ class RowsByTrial(Mapping[int, Row]):
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:
-    """Read the table of throws of a dataset, whose rows are the trials of its plan in order."""
+    """Read the table of throws of a dataset: the trials of its plan in order, or some of them if it was derived."""
     path = directory / THROWS
     table = read_throws_table(path, plan)
-    if table["trial"].to_pylist() != list(plan.trials.numbers):
+    numbers, planned = table["trial"].to_pylist(), plan.trials.numbers
+    if is_there(directory / SOURCES):
+        if numbers != sorted({number for number in numbers if number in planned}):
+            raise DatasetError("its rows are not trials of the plan in order", path=path)
+    elif numbers != list(planned):
         raise DatasetError(f"its rows are not the {len(plan.trials)} trials of the plan in order", path=path)
     if problem := _explain_unusable(table, plan):
         raise DatasetError(problem, path=path)

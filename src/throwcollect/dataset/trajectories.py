@@ -12,7 +12,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.named_array import refuse_name
+from throwcollect.dataset.named_array import unknown_name
 from throwcollect.dataset.trajectory_columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
 from throwcollect.errors import ConfigError
 from throwcollect.wording import format_count, suggest
@@ -27,7 +27,7 @@ _MOST_THREADS = 4
 class Trajectories:
     """Trajectories of many throws, one after the other.
 
-    ``trajectories["ball.position"]`` is the column of all throws, ``trajectories[i]`` all columns of one, as views.
+    ``trajectories["ball_position"]`` is the column of all throws, ``trajectories[i]`` all columns of one, as views.
 
     Attributes:
         trials: Numbers of the trials, shape ``(n_throws,)``.
@@ -61,12 +61,14 @@ class Trajectories:
         """Return a column of all throws by its name, or all columns of one throw by its position.
 
         Raises:
-            ConfigError: If the column was not read; it is also a `KeyError`.
+            KeyError: If the column was not read.
             IndexError: If there is no throw at this position.
             TypeError: If it is neither.
         """
         if isinstance(which, str):
-            return self._find_column(which)
+            if which not in self.columns:
+                raise unknown_name("column", which, self.columns)
+            return self.columns[which]
         if not isinstance(which, int | np.integer):
             raise TypeError(f"a position or the name of a column, not {type(which).__name__}")
         if not -len(self) <= which < len(self):
@@ -92,20 +94,14 @@ class Trajectories:
             Shape ``(n_throws, n_longest)`` or ``(n_throws, n_longest, n)``.
 
         Raises:
-            ConfigError: If the column was not read; it is also a `KeyError`.
+            KeyError: If the column was not read.
         """
-        values, lengths = self._find_column(column), self.lengths
+        values, lengths = self[column], self.lengths
         longest = int(lengths.max(initial=0))
         padded = np.full((len(self), longest, *values.shape[1:]), fill)
         # The chosen places are filled row by row, and in this order the samples lie in `values`.
         padded[np.arange(longest) < lengths[:, np.newaxis]] = values
         return padded
-
-    def _find_column(self, name: str) -> Column:
-        # A list can be looked for in a tuple, but not in a mapping.
-        if name not in tuple(self.columns):
-            raise refuse_name("no column", name, self.columns)
-        return self.columns[name]
 
 
 def read_trajectories(
@@ -135,7 +131,9 @@ def read_trajectories(
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 
     def read(block: Sequence[StoredThrow], start: int, stop: int) -> None:
-        fill({name: column[start:stop] for name, column in found.items()}, block, read_stored_rows(block), joints)
+        throws = [(place.start_ns, place.samples) for place in block]
+        parts = {name: column[start:stop] for name, column in found.items()}
+        fill(parts, throws, read_stored_rows(block), block[0].joints, joints)
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:

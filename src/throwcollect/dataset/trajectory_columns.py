@@ -32,14 +32,8 @@ from throwcollect.errors import DatasetError
 from throwcollect.units import NS_PER_S
 
 TIMES = "time_s"
-COLUMNS = (
-    TIMES,
-    STAMPS,
-    *JOINT_COLUMNS,
-    "ball.position",
-    BALL_ORIENTATION,
-    *BALL_VELOCITIES,
-)
+BALL_COLUMNS = ("ball_position", BALL_ORIENTATION, *BALL_VELOCITIES)
+COLUMNS = (TIMES, STAMPS, *JOINT_COLUMNS, *BALL_COLUMNS)
 """All columns of a trajectory; ``docs/reading.md`` describes them."""
 
 _JOINT_COMPONENTS = {"position": "position_rad", "velocity": "velocity_radps", "effort": "effort_nm"}
@@ -91,46 +85,12 @@ class StoredThrow:
         return rows
 
 
-@dataclass(frozen=True)
-class ThrowInMemory:
-    """The episode of a throw that is in no file; its attributes are those of a `StoredThrow`."""
-
-    episode: Episode
-
-    @property
-    def start_ns(self) -> int:
-        """Simulated time at which the trial starts [ns]."""
-        return self.episode.header.start_ns
-
-    @property
-    def samples(self) -> int:
-        """Number of samples."""
-        return self.episode.header.samples
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joints that are recorded, in the order of their columns."""
-        return self.episode.table.joints
-
-    def read(self) -> Episode:
-        """Return the episode."""
-        return self.episode
-
-    def read_rows(self) -> NDArray[np.void]:
-        """View the rows of its samples; see `trajectory_rows`."""
-        return trajectory_rows(self.episode.state.contents, self.samples, self.joints)
-
-
-Recorded = StoredThrow | ThrowInMemory
-"""The episode of a throw, in a file or in memory."""
-
-
 def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
     """Name the components of a column, with units, for a table in which each has a column of its own.
 
     The column is any of `COLUMNS` but times and stamps. A column of joints has the joints `joints`.
     """
-    series, _, quantity = column.partition(".")
+    series, _, quantity = column.partition("_")
     if series == "joints":
         return tuple(f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints)
     return tuple(f"ball_{component}" for component in _BALL_COMPONENTS[quantity])
@@ -177,20 +137,22 @@ def _read_rows(place: StoredThrow, contents: McapContents) -> NDArray[np.void]:
 
 def fill(
     columns: Mapping[str, Column],
-    throws: Sequence[Recorded],
+    throws: Sequence[tuple[int, int]],
     tables: Iterable[NDArray[np.void]],
+    known: tuple[str, ...],
     joints: tuple[str, ...],
 ) -> None:
     """Fill columns with those of some throws, one after the other.
 
     Args:
         columns: Arrays with as many rows as the throws have samples, by name, as `empty_columns` makes them.
-        throws: The throws, at least one; all have the same joints.
+        throws: Start [ns] and number of samples of each, at least one.
         tables: Their rows, as `read_stored_rows` gives them.
-        joints: Joints that the columns of joints have; some of those of the throws.
+        known: Joints that are recorded.
+        joints: Joints that the columns of joints have; some of those that are recorded.
     """
     # Times follow from stamps, and velocities in world from orientations, so these are read even if nobody asks.
-    lengths, known = [place.samples for place in throws], throws[0].joints
+    starts_ns, lengths = zip(*throws, strict=True)
     velocities = [name for name in BALL_VELOCITIES if name in columns]
     needed = {TIMES: STAMPS, **dict.fromkeys(velocities, BALL_ORIENTATION)}
     missing = {source for name, source in needed.items() if name in columns} - columns.keys()
@@ -212,7 +174,7 @@ def fill(
             np.take(every[: len(rows)], indexes, axis=1, out=columns[name][span], mode="clip")
         filled += len(rows)
         del rows  # the next ones then take its place in the caches
-    _derive(columns, recorded, velocities, np.repeat([place.start_ns for place in throws], lengths))
+    _derive(columns, recorded, velocities, np.repeat(starts_ns, lengths))
 
 
 def _derive(

@@ -6,7 +6,7 @@ A file that cannot be read is reported, and everything that does not depend on i
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,28 +23,25 @@ from throwcollect.dataset.bag import (
 from throwcollect.dataset.data_card import HEADER, read_card
 from throwcollect.dataset.directory import (
     CARD,
-    CONFIG,
     FORMAT,
-    MANIFEST,
     METADATA,
-    PLAN,
     PROVENANCE,
     SHARD_SUFFIX,
+    SOURCES,
     THROWS,
     TRIALS,
     shard_of,
 )
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.manifest import find_changed_files, find_manifest_problems, read_manifest
-from throwcollect.dataset.mcap_file import MAGIC
-from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.manifest import find_manifest_problems
+from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.provenance import load_provenance
 from throwcollect.dataset.summary_files import combine_digests
-from throwcollect.dataset.throws_table import read_throws_table
+from throwcollect.dataset.throws_table import Row
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
+from throwcollect.dataset.verify_plan import CheckOf, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardReport, check_shard
-from throwcollect.dataset.verify_tables import Tables, check_tables
+from throwcollect.dataset.verify_tables import Tables, check_tables, find_wrong_trials
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
 from throwcollect.progress_log import log_progress
@@ -52,7 +49,6 @@ from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import is_digest
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import command
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
@@ -116,32 +112,9 @@ def verify(
 
 def find_unchecked(config: Config) -> tuple[str, ...]:
     """List what `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if nothing."""
-    left_out: tuple[str, ...] = () if can_draw(config) else ("whether the configuration draws these trials",)
-    if not robot_is_available(config):
-        left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")
-    return left_out
-
-
-def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Finding]:
-    """Find the files of a finished dataset that are not as they were written.
-
-    Files are compared with the manifest. Earlier versions wrote none: then the recordings that the table of throws
-    names have to begin and end as MCAP files do, or, in full, the dataset is verified.
-
-    Args:
-        directory: Its directory.
-        plan: Its trials; None if they cannot be read.
-        in_full: Whether all bytes are compared, and not only the sizes.
-    """
-    if not is_there(directory / MANIFEST):
-        if plan is None:
-            return [Finding(PLAN, "", "is missing or damaged")]
-        return list(_find_damage_without_manifest(directory, plan, in_full=in_full))
-    try:
-        entries = read_manifest(directory)
-    except DatasetError as error:
-        return [Finding.of(MANIFEST, error)]
-    return list(find_changed_files(directory, entries, in_full=in_full))
+    if robot_is_available(config):
+        return ()
+    return "whether the robot can do the trials", "how its joints moved", "what came of the throws"
 
 
 def _find_plan_problems(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
@@ -178,9 +151,24 @@ def _make_file_check(
 
     def check_file(name: str) -> ShardReport:
         trials = None if expected is None else expected[name]
+        if tables.plan is not None and tables.plan.joined and tables.rows and trials:
+            return _check_file_of_part(directory / name, tables.plan, tables.rows, trials, robot=robot)
         return check_shard(directory / name, tables.config, trials, check.find_problems)
 
     return check_file
+
+
+def _check_file_of_part(
+    path: Path, plan: Plan, rows: Mapping[int, Row], trials: Sequence[int], *, robot: bool
+) -> ShardReport:
+    """Check a file of a merged dataset, whose episodes have the numbers of the plan that they were collected by."""
+    first = plan.first_of_part(trials[0])
+    part = plan.part_from(first)
+    own = {trial - first: {**rows[trial], "trial": trial - first} for trial in trials if trial in rows}
+    check = EpisodeCheck(part, own, doubtful=find_wrong_trials(part), robot=robot)
+    report = check_shard(path, plan.config, [trial - first for trial in trials], check.find_problems)
+    report.digests = {first + trial: digest for trial, digest in report.digests.items()}
+    return report
 
 
 def _list_trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
@@ -188,9 +176,11 @@ def _list_trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]
     if tables.plan is None or tables.rows is None:
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
+    # A derived dataset has some trials of its plan.
+    planned = () if is_there(directory / SOURCES) else range(len(tables.plan.trials))
     refused = tables.plan.trials.refused
     # The table may have rows of trials that the plan does not have, and lack others.
-    for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
+    for trial in sorted({*planned, *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
         # If the row of a trial is missing, its episode is most likely in its file nevertheless.
         if (trial not in refused and name in names) if row is None else row["shard"] == name:
@@ -258,7 +248,7 @@ def _find_digest_problems(
             return
         # For episodes that cannot be read, the digests are taken from the table.
         digests = {trial: row["digest"] for trial, row in tables.rows.items() if is_digest(row["digest"])} | digests
-    targets = None if tables.plan is None else tables.plan.trials.targets
+    targets = None if tables.throws is None else read_targets(tables.throws)
     written = entries.get("throwcollect.digest")
     digest = combine_digests((digests[trial] for trial in sorted(digests)), targets)
     if written != digest:
@@ -291,28 +281,6 @@ def _find_problems_beside(directory: Path) -> Iterator[Finding]:
         return
     try:
         if not read_card(directory / CARD).startswith(HEADER):
-            rebuild = command("dataset", "rebuild", directory)
-            yield Finding(CARD, "", f"has no YAML header, which dataset hubs read; {rebuild} writes a missing file")
+            yield Finding(CARD, "", "has no YAML header, which dataset hubs read")
     except DatasetError as error:
         yield Finding.of(CARD, error)
-
-
-def _find_damage_without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:
-    try:
-        shards = set(read_throws_table(directory / THROWS, plan)["shard"].drop_null().to_pylist())
-    except DatasetError as error:
-        yield Finding.of(THROWS, error)
-        return
-    if in_full:
-        # The manifest and the data card follow from these, and a dataset without them counts as whole.
-        promised = {CONFIG, PLAN, THROWS, METADATA, *shards}
-        yield from (finding for finding in verify(directory) if finding.file in promised)
-        return
-    for name in sorted(shards):
-        try:
-            with open_mcap(directory / Path(name).name) as contents:
-                # An MCAP file begins and ends with the same bytes, and the end is written last.
-                if contents.slice(len(contents) - len(MAGIC), len(contents)) != MAGIC:
-                    yield Finding(name, "", "is cut off")
-        except DatasetError as error:
-            yield Finding.of(name, error)

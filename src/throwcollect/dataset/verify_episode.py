@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from throwcollect.config.schema import Config
+from throwcollect.config.values import column_of
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.recorded_trial import RecordedTrial
@@ -85,7 +86,8 @@ class EpisodeCheck:
             expected = vars(_place_of(stored, shard))
             if self._robot:
                 # The row made here takes the swept values from the plan, with which the table was compared already.
-                expected = {name: value for name, value in self.row(stored, shard).items() if "." not in name}
+                swept = set(map(column_of, self._need_trials().plan.keys))
+                expected = {name: value for name, value in self.row(stored, shard).items() if name not in swept}
             yield from _find_row_problems(expected, row)
 
     def row(self, stored: StoredEpisode, shard: str) -> Row:
@@ -163,8 +165,7 @@ def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> I
             f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_NAMED]
         )
         more = f"; {len(wrong) - _MOST_NAMED} more columns differ" if len(wrong) > _MOST_NAMED else ""
-        hint = "; to judge it again: throwcollect dataset rebuild" if "outcome" in wrong else ""
-        yield f"throws.parquet has {told}{more}{hint}"
+        yield f"throws.parquet has {told}{more}"
 
 
 def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str]:

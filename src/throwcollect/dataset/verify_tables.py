@@ -11,12 +11,13 @@ import pyarrow as pa
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.config.shape import unit_of_key
-from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_of
+from throwcollect.config.values import column_of
+from throwcollect.dataset.directory import CONFIG, PLAN, SOURCES, THROWS, TRIALS, config_path, shard_of
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.recorded_trial import shorten
-from throwcollect.dataset.throws_table import Row, RowsByTrial, read_throws_table
+from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
+from throwcollect.files import is_there
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
@@ -31,13 +32,15 @@ class Tables:
     Attributes:
         config: The configuration; None if it cannot be read or is not the plan's.
         plan: The trials; None if they cannot be read or are not the configuration's.
-        rows: Rows of the table of throws, by trial; None if it cannot be read.
+        throws: The table of throws; None if it cannot be read.
+        rows: Its rows, by trial.
         doubtful: Trials whose values or seed in the plan do not fit their digest.
         findings: What is wrong.
     """
 
     config: Config | None = None
     plan: Plan | None = None
+    throws: pa.Table | None = None
     rows: Mapping[int, Row] | None = None
     doubtful: set[int] = field(default_factory=set)
     findings: list[Finding] = field(default_factory=list)
@@ -80,18 +83,19 @@ def check_tables(directory: Path) -> Tables:
         except DatasetError as error:
             tables.findings.append(Finding.of(THROWS, error))
         else:
-            tables.findings += _find_unit_problems(throws.schema)
-            tables.findings += _find_row_problems(tables.plan, throws["trial"].to_pylist())
-            tables.rows = RowsByTrial(throws)
+            tables.findings += _find_unit_problems(throws.schema, ThrowsTable.of(tables.plan).schema)
+            derived = is_there(directory / SOURCES)
+            tables.findings += _find_row_problems(tables.plan, throws["trial"].to_pylist(), derived=derived)
+            tables.throws, tables.rows = throws, RowsByTrial(throws)
             tables.findings += _find_plan_problems(tables.plan, tables.rows, tables.doubtful)
     return tables
 
 
-def _find_unit_problems(schema: pa.Schema) -> Iterator[Finding]:
+def _find_unit_problems(schema: pa.Schema, expected: pa.Schema) -> Iterator[Finding]:
     """Find units of columns that are not theirs; exports take them over, while descriptions are for people alone."""
     for column in schema:
-        stated, unit = (column.metadata or {}).get(b"unit"), unit_of_key(column.name)
-        if stated not in (None, unit.encode()):
+        stated, unit = ((each.metadata or {}).get(b"unit") for each in (column, expected.field(column.name)))
+        if stated != unit:
             yield Finding(THROWS, column.name, f"has the unit {shorten(stated)}, should be {unit!r}")
 
 
@@ -120,13 +124,13 @@ def find_wrong_trials(plan: Plan) -> dict[int, str]:
     return {trials.first + row: digests[row].tobytes().hex() for row in wrong}
 
 
-def _find_row_problems(plan: Plan, trials: list[int | None]) -> Iterator[Finding]:
-    """Find what is wrong with the trials that the rows name, in their order."""
+def _find_row_problems(plan: Plan, trials: list[int | None], *, derived: bool) -> Iterator[Finding]:
+    """Find what is wrong with the trials that the rows name, in their order; a derived dataset has some of the plan."""
     numbers = [trial for trial in trials if trial is not None]
     if len(numbers) < len(trials):
         yield Finding(THROWS, "", f"{len(trials) - len(numbers)} rows are of no trial")
     known = set(numbers)
-    for trial in plan.trials:
+    for trial in () if derived else plan.trials:
         if trial.number not in known:
             yield Finding(THROWS, f"trial {trial.number}", "has no row")
     seen: set[int] = set()
@@ -149,8 +153,8 @@ def _find_plan_problems(plan: Plan, rows: Mapping[int, Row], doubtful: Collectio
         place = f"trial {trial.number}"
         for key, value in trial.values.items():
             # The plan itself is known to be wrong about a doubtful trial.
-            if row[key] != value and trial.number not in doubtful:
-                yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
+            if row[column := column_of(key)] != value and trial.number not in doubtful:
+                yield Finding(THROWS, place, f"has {column} = {row[column]!r}, the plan {value!r}")
         for name in plan.trials.target_names:
             if row[name] != (planned := trial.target.get(name)):
                 yield Finding(THROWS, place, f"has {name} = {row[name]!r}, the plan {planned!r}")

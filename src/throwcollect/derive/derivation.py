@@ -1,43 +1,38 @@
-"""Writes a derived dataset: the one that a collection of its list of trials would have given."""
+"""Writes a derived dataset: copies of episodes of other datasets, with the rows and the plan that belong to them."""
 
 from __future__ import annotations
 
-import os
 import time
-from collections import Counter, deque
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import closing
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import chain, islice
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from throwcollect.config.schema import Config
+import pyarrow as pa
+
+from throwcollect.config.values import column_of
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.damage import locating_damage
-from throwcollect.dataset.directory import CARD, SOURCES
-from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.data_card import data_card
+from throwcollect.dataset.directory import CARD, SOURCES, shard_of
+from throwcollect.dataset.manifest import FileEntry, RunningHash
+from throwcollect.dataset.mcap_file import McapFile, episode_run
+from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throws_table import Row, ThrowsTable
-from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.origins import encode_sources, sources_section
-from throwcollect.derive.source import Source
-from throwcollect.derive.trial_list import list_of_trials
+from throwcollect.dataset.shard import Recording
+from throwcollect.dataset.summary_files import write_description
+from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, make_field
+from throwcollect.derive.joined_plan import join_plans
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
-from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import new_directory, write_file
+from throwcollect.files import new_directory, replacing, write_all, write_file
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
-from throwcollect.sweep.digest import trial_digests
-from throwcollect.sweep.plan import Plan, make_trials
-from throwcollect.sweep.points import Points
-
-_ROWS_AT_ONCE = 256
-_MOST_THREADS = 4
-"""Only compressing and hashing run side by side; the rest holds the interpreter's lock, so more threads do not help."""
+from throwcollect.sweep.parquet_file import encode_table
+from throwcollect.sweep.plan import Plan
 
 
 @dataclass(frozen=True)
@@ -49,107 +44,170 @@ class Derived:
         offered: Number of trials of its sources.
         without_episode: Number of trials that were asked for but have no episode, by outcome; they are left out.
         digest: Its digest.
-        repeated: Number of trials that more than one of its sources has, so that the dataset has them several times.
     """
 
     trials: int
     offered: int
     without_episode: Mapping[str, int]
     digest: str
-    repeated: int
 
     def as_dict(self) -> dict[str, Any]:
         """Return the same as a dictionary, for JSON."""
         return asdict(self)
 
 
-def derive(sources: Sequence[Source], output: Path, *, name: str | None = None) -> Derived:
-    """Make the dataset that consists of the trials of some others, at least one, in their order, renumbered from 0.
+class Copy(NamedTuple):
+    """A trial of the new dataset: its number there, the place of its source among all sources, and its number there."""
 
-    Its directory must be new or empty, and nothing is left there after an error. Without `name`, it has the name of the
-    first source.
+    number: int
+    source: int
+    trial: int
+
+
+def derive(sources: Sequence[Dataset], output: Path, *, offered: int) -> Derived:
+    """Make the dataset that consists of copies of the throws of some others, at least one, that have an episode.
+
+    Args:
+        sources: Those throws of each source that are wanted.
+        output: Directory of the new dataset, new or empty; nothing is left there after an error.
+        offered: Number of all trials of the sources.
     """
     with new_directory(output) as directory:
-        return _write(sources, directory, name)
+        copied, digest = _write(sources, directory)
+    without = sum((Counter(count_without_episode(source)) for source in sources), Counter[str]())
+    return Derived(copied, offered, dict(sorted(without.items())), digest)
 
 
-def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Derived:
+def count_without_episode(dataset: Dataset) -> dict[str, int]:
+    """Count the throws that have no episode, by outcome."""
+    throws = dataset.throws
+    return dict(sorted(Counter(throws.filter(throws["shard"].is_null())["outcome"].to_pylist()).items()))
+
+
+def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
+    """Write the dataset; returns the number of its trials, and its digest."""
     began = time.monotonic()
-    config, points = list_of_trials(sources)
-    if not len(points.values):
-        raise ConfigError("no trial with an episode is left", expected="at least one")
-    if name is not None:
-        config = config.model_copy(update={"name": name})
-    # Every trial has been run before, so the plan need not check any.
-    plan = Plan(config, make_trials(config, points))
-    # The sources hold the description of their robot, so its package need not be installed.
-    channels = Channels(config, sources[0].dataset.robot_description() or full_description(config))
-    create(directory, plan, listed=points)
-    with closing(DatasetWriter(directory, plan, channels=channels)) as writer:
-        write_file(directory / SOURCES, encode_sources(sources))
-        table = ThrowsTable.of(plan)
-        restamped = _restamp_episodes(sources, Restamper(config, channels))
-        for episode, row in log_progress(restamped, len(plan.trials), "trial", "written"):
-            if table.later <= row.keys():
-                result = table.result(row)
-            else:
-                # An earlier version wrote the row, and did not measure all columns.
-                result = judge_episode(plan.config_of(plan.trial(episode.header.trial)), episode)
-            writer.append(episode, result)
-        writer.finish(wall_s=time.monotonic() - began)
-    # The manifest does not cover the card, so it may grow after the dataset is finished.
-    card = (directory / CARD).read_text(encoding="utf-8")
-    write_file(directory / CARD, (card + sources_section(sources)).encode())
-    without = sum((Counter(each.without_episode) for each in sources), Counter[str]())
-    return Derived(
-        trials=len(plan.trials),
-        offered=sum(len(each.dataset.throws) for each in sources),
-        without_episode=dict(sorted(without.items())),
-        digest=Dataset.open(directory).digest,
-        repeated=_count_repeated(sources, config, points),
+    plan, firsts = join_plans([source.plan for source in sources])
+    copies = sorted(
+        Copy(first + trial, number, trial)
+        for number, (source, first) in enumerate(zip(sources, firsts, strict=True))
+        for trial in source.recorded.throws["trial"].to_pylist()
     )
+    _check_copies(copies, plan)
+    channels = _read_channels(sources)
+    create(directory, plan, listed=plan.trials.points)
+    table, rows = ThrowsTable.of(plan), [RowsByTrial(source.throws) for source in sources]
+    tables, recordings = [], []
+    progress = log_progress(copies, len(copies), "trial", "written")
+    for name, members in groupby(progress, key=lambda copy: shard_of(plan, copy.number)):
+        held = list(members)
+        episodes = (_read(sources[copy.source], rows[copy.source][copy.trial]) for copy in held)
+        recording, offsets = _write_shard(directory / name, episodes, channels)
+        recordings.append(recording)
+        tables.append(
+            table.table(
+                _make_row(plan, copy.number, rows[copy.source][copy.trial]) | {"shard": name, "chunk_offset": offset}
+                for copy, offset in zip(held, offsets, strict=True)
+            )
+        )
+    throws = pa.concat_tables(tables)
+    provenance = Provenance.of_this_machine(
+        simulations=None, wall_s=time.monotonic() - began, was_open=False, robot=channels.robot
+    )
+    write_provenance(directory, provenance)
+    write_file(directory / SOURCES, encode_table(_tabulate_sources(copies, sources)))
+    write_file(directory / CARD, (data_card(plan.config, throws, provenance) + _describe_sources(sources)).encode())
+    write_description(directory, plan.config.name, throws, channels, recordings)
+    return len(copies), Dataset.open(directory).digest
 
 
-def _count_repeated(sources: Sequence[Source], config: Config, points: Points) -> int:
-    """Count the trials that more than one source has; the points are those of all sources, one after the other."""
-    if len(sources) == 1:
-        return 0
-    # All seeds are taken as 0, as they follow from the numbers of trials, which differ between datasets.
-    digests = iter(trial_digests(config, points, [0] * len(points.values)))
-    held = [{digest.tobytes() for digest in islice(digests, len(source.trials))} for source in sources]
-    return sum(count > 1 for count in Counter(chain.from_iterable(held)).values())
+def _check_copies(copies: Sequence[Copy], plan: Plan) -> None:
+    """Refuse a dataset without a trial, and one that would have a trial twice, whatever its numbers in the sources."""
+    if not copies:
+        raise ConfigError("no trial with an episode is left", expected="at least one")
+    different = {plan.trials.digests[copy.number].tobytes() for copy in copies}
+    if len(different) < len(copies):
+        raise ConfigError(
+            f"{len(copies) - len(different)} of {len(copies)} trials are in more than one of the datasets",
+            expected="datasets that have no trial in common",
+        )
 
 
-def _restamp_episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple[Episode, Row]]:
-    """Restamp episodes to their new numbers, in order, each with its row in the table of its source."""
-    threads = min(_MOST_THREADS, os.cpu_count() or 1)
-    pending: deque[tuple[Future[Episode], Row]] = deque()
-    with ThreadPoolExecutor(threads) as pool:
-        for number, (dataset, row) in enumerate(_list_rows(sources)):
-            pending.append((pool.submit(_restamp, restamper, dataset, row, number), row))
-            # More episodes than this would only wait in memory, as they are written in order by one thread.
-            if len(pending) > 2 * threads:
-                yield _take_result(pending)
-        while pending:
-            yield _take_result(pending)
+def _read_channels(sources: Sequence[Dataset]) -> Channels:
+    """Find what is recorded; recordings hold the description of their robot, so its package need not be installed."""
+    robots = dict.fromkeys(source.robot_description() or full_description(source.config) for source in sources)
+    if len(robots) > 1:
+        raise ConfigError("the recordings of the datasets describe different robots or tools")
+    return Channels(sources[0].config, *robots)
 
 
-def _take_result(pending: deque[tuple[Future[Episode], Row]]) -> tuple[Episode, Row]:
-    future, row = pending.popleft()
-    return future.result(), row
-
-
-def _list_rows(sources: Sequence[Source]) -> Iterator[tuple[Dataset, Row]]:
-    for each in sources:
-        for start in range(0, len(each.trials), _ROWS_AT_ONCE):
-            numbers = each.trials[start : start + _ROWS_AT_ONCE]
-            for row in each.dataset.throws.take(numbers).to_pylist():
-                yield each.dataset, row
-
-
-def _restamp(restamper: Restamper, dataset: Dataset, row: Row, number: int) -> Episode:
-    with locating_damage(dataset, row["trial"]):
-        episode = dataset.episode(row["trial"])
+def _read(source: Dataset, row: Row) -> Episode:
+    with locating_damage(source, row["trial"]):
+        episode = source.episode(row["trial"])
+        # The copy gets hashes of its own, which would make damage look as if it had been recorded.
+        episode.check_records()
         if episode.digest != row["digest"]:
             raise DatasetError(f"digest {episode.digest}", expected=f"{row['digest']} as throws.parquet says")
-        return restamper.restamp(episode, number)
+        return episode
+
+
+def _write_shard(path: Path, episodes: Iterable[Episode], channels: Channels) -> tuple[Recording, list[int]]:
+    """Write a recording of some episodes, at least one; returns also where each begins [bytes]."""
+    sha256, file, offsets = RunningHash(), None, []
+    with replacing(path) as descriptor:
+
+        def put(data: bytes) -> None:
+            write_all(descriptor, data)
+            sha256.update(data)
+
+        for episode in episodes:
+            file = file or McapFile(put, channels, start_ns=episode.chunk.start_ns)
+            offsets.append(file.size)
+            file.append(episode_run(episode))
+        if file is None:
+            raise ValueError(path)
+        summary = file.finish(path.name)
+    return (summary, FileEntry(path.name, file.size, sha256.hexdigest())), offsets
+
+
+def _make_row(plan: Plan, number: int, row: Row) -> Row:
+    """Make the row of a copy: keys that its source does not sweep, but the new plan does, are columns here, too."""
+    trial = plan.trial(number)
+    values = {column_of(key): value for key, value in trial.values.items()}
+    return {**row, **values, **trial.target, "trial": number}
+
+
+def _tabulate_sources(copies: Sequence[Copy], sources: Sequence[Dataset]) -> pa.Table:
+    """Make a table with one row a trial: the dataset and trial that it comes from."""
+    facts = [(source.config.name, str(source.directory), source.digest) for source in sources]
+    rows = [(copy.number, *facts[copy.source], copy.trial) for copy in copies]
+    return pa.Table.from_pylist([dict(zip(_SOURCES.names, row, strict=True)) for row in rows], schema=_SOURCES)
+
+
+def _describe_sources(sources: Sequence[Dataset]) -> str:
+    """Write the section of the data card on the datasets that the trials come from."""
+    lines = [
+        "",
+        "## Sources",
+        "",
+        "Derived from other datasets, in whose data cards the provenance of the simulations is; `sources.parquet` says "
+        "which trial and episode of them each trial is.",
+        "",
+        "| dataset | directory | trials taken | digest |",
+        "|---|---|---|---|",
+    ]
+    for source in sources:
+        cells = (source.config.name, source.directory, len(source.recorded), source.digest)
+        lines.append(f"| {' | '.join(str(cell).replace('|', chr(92) + '|') for cell in cells)} |")
+    return "\n".join([*lines, ""])
+
+
+_SOURCES = pa.schema(
+    [
+        make_field("trial", pa.int64(), "Number of the trial here."),
+        make_field("source_name", pa.string(), "Name of the dataset that the trial comes from."),
+        make_field("source_directory", pa.string(), "Directory of that dataset, as it was given."),
+        make_field("source_digest", pa.string(), "Digest of that dataset."),
+        make_field("source_trial", pa.int64(), "Number of the trial there."),
+    ]
+)

@@ -7,43 +7,46 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from throwcollect.arguments import check_whole_number, is_whole, read_list, read_path, refuse_argument, show_value
-from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.selection import find_rows
 from throwcollect.derive.derivation import Derived, derive
-from throwcollect.derive.source import source
 from throwcollect.files import StrPath
 
 
 def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
-    """Put the trials of several datasets, at least one, one after the other into a new one.
+    """Put the trials of several datasets, at least one, into a new one.
+
+    Datasets of one plan, such as the parts of a split, keep the numbers of their trials. Those of other plans follow.
 
     Raises:
-        ConfigError: If there is no dataset, they differ in keys that cannot be swept, or the directory cannot be used.
+        ConfigError: If there is no dataset, they differ in keys that cannot be swept or have a trial in common, or the
+            directory cannot be used.
         DatasetError: If a dataset is damaged, or the new one cannot be written.
     """
     listed = read_list("directories", directories, "directories", (str, os.PathLike))
     if not listed:
         raise refuse_argument("directories", "got none", expected="at least one dataset")
-    return derive([source(Dataset.open(directory)) for directory in listed], read_path("output", output))
+    sources = [Dataset.open(directory) for directory in listed]
+    return derive(sources, read_path("output", output), offered=sum(map(len, sources)))
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
-    """Take the trials that fulfil a condition on columns of the table of throws; see `dataset.expression`.
+    """Take the trials that fulfil a condition on columns of the table of throws; see `dataset.selection`.
 
     Raises:
         ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    condition = Expression(where, place="where")
     dataset = Dataset.open(directory)
-    chosen = source(dataset, condition.rows(dataset.throws))
-    if not chosen.trials:
+    chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where").fill_null(False)))
+    if not len(chosen.recorded):
         raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
-    return derive([chosen], read_path("output", output))
+    return derive([chosen], read_path("output", output), offered=len(dataset))
 
 
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
@@ -57,10 +60,11 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
     """
     check_whole_number("seed", seed, least=0)
     dataset = Dataset.open(directory)
-    candidates = source(dataset).trials
+    candidates = dataset.recorded
     if not (is_whole(count) and 1 <= count <= len(candidates)):
         bounds = f"from 1 to {len(candidates)}, the number of episodes of {directory}"
         problem = f"should be {bounds}, got {show_value(count)}"
         raise refuse_argument("count", problem)
-    order = np.random.default_rng(seed).permutation(len(candidates))
-    return derive([source(dataset, [candidates[place] for place in order[:count]])], read_path("output", output))
+    places = np.sort(np.random.default_rng(seed).permutation(len(candidates))[:count])
+    chosen = replace(candidates, throws=candidates.throws.take(places))
+    return derive([chosen], read_path("output", output), offered=len(dataset))

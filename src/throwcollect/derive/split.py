@@ -1,8 +1,8 @@
 """Splits a dataset into parts so that throws to the same place go to the same part.
 
 Space is cut into cells, such as squares of the ground. The hash of a cell and a seed decides to which part the cell
-goes, so it does not depend on other trials. For a trial that is in no cell, because it did not land, a hash over
-everything that determines the trial, except its number, decides on the part.
+goes, so it does not depend on other trials. For a trial that is in no cell, because it did not land, its digest decides
+on the part.
 """
 
 from __future__ import annotations
@@ -11,23 +11,21 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import accumulate
 from typing import Any, cast
 
 import pyarrow as pa
+import pyarrow.compute as pc
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.arguments import as_float, check_mapping, check_whole_number, read_list, read_path, refuse_argument
-from throwcollect.config.kinds import LONGEST_NAME, NAME_WORDS, Name
-from throwcollect.dataset.expression import Expression
+from throwcollect.config.kinds import NAME_WORDS, Name
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import Derived, derive
-from throwcollect.derive.source import Source, source
-from throwcollect.derive.trial_list import list_of_trials
+from throwcollect.dataset.selection import compute
+from throwcollect.derive.derivation import Derived, count_without_episode, derive
 from throwcollect.files import StrPath, new_directory
-from throwcollect.sweep.digest import trial_digests
 
 SQUARES = ("landing_x_m=0.05", "landing_y_m=0.05")
 """Squares of 5 cm on the ground."""
@@ -89,7 +87,7 @@ def split(
         fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping from names to
             shares.
         cells: Axes of the space that is cut into cells. Each is an expression on columns of the table of throws (see
-            `dataset.expression`) and the width of the cells along this axis, such as ``landing_x_m=0.05``.
+            `dataset.selection`) and the width of the cells along this axis, such as ``landing_x_m=0.05``.
         seed: Seed of the choice, 0 or more.
 
     Raises:
@@ -98,19 +96,20 @@ def split(
     """
     check_whole_number("seed", seed, least=0)
     dataset = Dataset.open(directory)
-    everything = source(dataset)
-    members = assign(everything, fractions=fractions, cells=cells, seed=seed)
+    members = assign(dataset, fractions=fractions, cells=cells, seed=seed)
     parts = {}
     with new_directory(read_path("output", output)) as beside:
-        for name, places in members.items():
-            derived = derive([source(dataset, places)], beside / name, name=_name_part(dataset.config.name, name))
-            held = list(places.values())
+        for name, cell_of in members.items():
+            chosen = replace(
+                dataset, throws=dataset.throws.filter(pc.is_in(dataset.throws["trial"], pa.array(cell_of)))
+            )
+            derived, held = derive([chosen], beside / name, offered=len(dataset)), list(cell_of.values())
             parts[name] = SplitPart(derived, len({cell for cell in held if cell is not None}), held.count(None))
-    return Split(parts, everything.without_episode)
+    return Split(parts, count_without_episode(dataset))
 
 
 def assign(
-    everything: Source, *, fractions: str | Mapping[str, float], cells: Sequence[str] = SQUARES, seed: int = 0
+    dataset: Dataset, *, fractions: str | Mapping[str, float], cells: Sequence[str] = SQUARES, seed: int = 0
 ) -> dict[str, dict[int, Cell | None]]:
     """Decide which trials each part gets by the arguments of `split`.
 
@@ -121,13 +120,12 @@ def assign(
         ConfigError: If fractions or cells are wrong, or a part gets no trial.
     """
     shares = _read_shares(fractions)
-    places = _find_cells(cells, everything.dataset.throws.take(everything.trials))
-    config, points = list_of_trials([everything])
-    # All seeds are taken as 0: they follow from the numbers of trials, on which the part of a trial must not depend.
-    contents = trial_digests(config, points, [0] * len(points.values))
+    throws = dataset.recorded.throws
+    places = _find_cells(cells, throws)
     members: dict[str, dict[int, Cell | None]] = {name: {} for name in shares}
-    for trial, cell, digest in zip(everything.trials, places, contents, strict=True):
-        part = _choose_part(f"trial {digest.tobytes().hex()}" if cell is None else f"cell {list(cell)}", shares, seed)
+    for trial, cell in zip(throws["trial"].to_pylist(), places, strict=True):
+        hashed = f"trial {dataset.plan.trial(trial).digest}" if cell is None else f"cell {list(cell)}"
+        part = _choose_part(hashed, shares, seed)
         members[part][trial] = cell
     if empty := [name for name, trials in members.items() if not trials]:
         raise refuse_argument(
@@ -155,8 +153,10 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
         name, width = _read_pair(text, "cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:
             raise refuse_argument("cells", f"the width of cells should be above 0, got {text!r}")
-        values = Expression(name, place="cells").numbers(throws)
-        columns.append([_number_along(value, float(width)) for value in values])
+        values = compute(name, throws, "cells")
+        if not pa.types.is_floating(values.type):
+            raise refuse_argument("cells", f"{name!r} is no number, but {values.type}")
+        columns.append([_number_along(value, float(width)) for value in values.to_pylist()])
     return [None if None in cell else cell for cell in zip(*columns, strict=True)]
 
 
@@ -218,9 +218,3 @@ def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
     if value is None or not name.strip():
         raise refuse_argument(argument, f"should be {what}, got {text!r}")
     return name.strip(), value
-
-
-def _name_part(name: str, part: str) -> str:
-    """Put the names of a dataset and of a part together; the first is cut, or left out, where there is no room."""
-    room = LONGEST_NAME - len(part) - 1
-    return f"{name[:room]}-{part}" if room > 0 else part

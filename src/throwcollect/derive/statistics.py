@@ -99,8 +99,9 @@ def statistics(directory: StrPath) -> Statistics:
     """
     dataset = Dataset.open(directory)
     moments, left_out = None, 0
-    for episode in log_progress(dataset.episodes(), len(dataset.recorded), "episode", "read"):
-        with locating_damage(dataset, episode.header.trial):
+    trials = dataset.recorded.throws["trial"].to_pylist()
+    for trial, episode in zip(trials, log_progress(dataset.episodes(), len(trials), "episode", "read"), strict=True):
+        with locating_damage(dataset, trial):
             rows = _stack_signals(episode.samples(dataset.joints))
         finite = rows[np.isfinite(rows).all(axis=1)]
         left_out += len(rows) - len(finite)

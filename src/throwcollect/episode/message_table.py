@@ -24,7 +24,6 @@ from throwcollect.episode.topics import (
     Topic,
     ball_odometry,
     joint_states,
-    put_stamps,
     read_joint_names,
     read_samples,
     read_stamps,
@@ -225,22 +224,7 @@ class MessageList:
         """The Message Index records of all channels, by channel."""
         return {channel: self.message_index(channel) for channel in self.channels}
 
-    def move(self, by_ns: int) -> None:
-        """Move all times and stamps by `by_ns` [ns], in the contents themselves, which must be a bytearray."""
-        stamps = np.empty(len(self), STAMP)
-        put_stamps(stamps, "stamp", self.stamps_ns + by_ns)
-        for time in ("log_time", "publish_time"):
-            # Times are unsigned, but `by_ns` may be negative.
-            self.headers[time] = self.headers[time].astype(np.int64) + by_ns
-        self._scatter(MESSAGE_HEADER.size + _STAMP_OFFSET, stamps)
-        self._scatter(0, self.headers)
-
     def _gather(self, start: int, kind: np.dtype[np.void]) -> Rows:
         """Copy a value of each record from byte `start` on."""
         places = self.offsets[:, np.newaxis] + start + np.arange(kind.itemsize)
         return self._bytes[places].view(kind)[:, 0]
-
-    def _scatter(self, start: int, values: Rows) -> None:
-        """Write values to the places from which `_gather` copies them."""
-        places = self.offsets[:, np.newaxis] + start + np.arange(values.itemsize)
-        self._bytes[places] = values[:, np.newaxis].view(np.uint8)

@@ -19,10 +19,10 @@ from throwcollect.episode.topics import STAMP, ball_odometry, joint_states, read
 
 STAMPS = "stamps_ns"
 """A pair of 32-bit numbers until `to_nanoseconds` turns it into one number."""
-JOINT_COLUMNS = ("joints.position", "joints.velocity", "joints.effort")
-BALL_VELOCITIES = ("ball.velocity", "ball.angular_velocity")
+JOINT_COLUMNS = ("joints_position", "joints_velocity", "joints_effort")
+BALL_VELOCITIES = ("ball_velocity", "ball_angular_velocity")
 """These are recorded in the frame of the ball."""
-BALL_ORIENTATION = "ball.orientation_xyzw"
+BALL_ORIENTATION = "ball_orientation_xyzw"
 
 _FIELDS = {
     JOINT_STATES_ID: {
@@ -30,7 +30,7 @@ _FIELDS = {
         **dict(zip(JOINT_COLUMNS, ("position", "velocity", "effort"), strict=True)),
     },
     BALL_ODOMETRY_ID: {
-        "ball.position": "pose.pose.position",
+        "ball_position": "pose.pose.position",
         BALL_ORIENTATION: "pose.pose.orientation",
         BALL_VELOCITIES[0]: "twist.twist.linear",
         BALL_VELOCITIES[1]: "twist.twist.angular",

@@ -99,8 +99,8 @@ def write(source: ExportSource, directory: Path) -> None:
             expected=f"at most {_LONGEST_NAME} characters, or another format",
         )
     # An array of objects, as texts are, becomes a cell array; one of texts would become a matrix of characters.
-    columns = {_name_field(name): to_array(source.table[name])[:, np.newaxis] for name in source.table.column_names}
-    units = {_name_field(field.name): read_metadata(field).get("unit", "") for field in source.table.schema}
+    columns = {name: to_array(source.table[name])[:, np.newaxis] for name in source.table.column_names}
+    units = {field.name: read_metadata(field).get("unit", "") for field in source.table.schema}
     _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.dataset.digest})
     (directory / "trajectories").mkdir()
     landings = {
@@ -131,10 +131,6 @@ def _count_bytes(value: Any) -> int:
     if isinstance(value, np.ndarray):
         return sum(map(_count_bytes, value.flat)) if value.dtype == object else value.nbytes
     return 0
-
-
-def _name_field(column: str) -> str:
-    return column.replace(".", "_")
 
 
 def _make_cell(values: Sequence[Any]) -> NDArray[np.object_]:

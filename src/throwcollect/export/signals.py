@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from throwcollect.config.shape import unit_of_key
 from throwcollect.config.target_columns import TargetColumn
 from throwcollect.dataset.trajectory_columns import name_components
-
-_ASCII = str.maketrans({"²": "^2", "³": "^3"})
+from throwcollect.units import ascii_unit, unit_of_name
 
 
 def unit_of(column: str) -> str:
-    """Find the unit of a column of numbers or a dotted key in ASCII, such as ``m/s^2``; ``1`` for counts and shares."""
-    return unit_of_key(column).translate(_ASCII) or "1"
+    """Find the unit of a column of numbers in ASCII, such as ``m/s^2``; ``1`` for counts and shares."""
+    return ascii_unit(unit_of_name(column))
 
 
 @dataclass(frozen=True)
@@ -64,11 +62,11 @@ def list_signals(joints: Sequence[str], moving: Sequence[str], targets: Sequence
         ),
         _describe_joints("command_velocity_radps", "Commanded velocities.", moving),
         _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving),
-        _describe_ball("ball_position_m", "Ball centre in world.", "ball.position", "xyz"),
-        _describe_ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "ball.orientation_xyzw", "xyzw"),
-        _describe_ball("ball_velocity_mps", "Velocity of the ball in world.", "ball.velocity", "xyz"),
+        _describe_ball("ball_position_m", "Ball centre in world.", "ball_position", "xyz"),
+        _describe_ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "ball_orientation_xyzw", "xyzw"),
+        _describe_ball("ball_velocity_mps", "Velocity of the ball in world.", "ball_velocity", "xyz"),
         _describe_ball(
-            "ball_angular_velocity_radps", "Angular velocity of the ball in world.", "ball.angular_velocity", "xyz"
+            "ball_angular_velocity_radps", "Angular velocity of the ball in world.", "ball_angular_velocity", "xyz"
         ),
         *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
     )

@@ -12,15 +12,14 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.config.values import leaves
+from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap, no_correction, scale_values
 from throwcollect.learning.polynomial import Validation, cross_validate, fit_polynomial
-from throwcollect.wording import format_count, join_names, suggest
+from throwcollect.wording import format_count, suggest
 
-MOST_PARAMETERS = 20
 EFFORT = "effort_peak_share"
 """Column of the largest share of a joint's torque limit."""
 _THROWS_PER_PARAMETER = 3
@@ -93,7 +92,7 @@ def fit_map(
     axes = _find_axes(dataset, throws, parameters, context)
     _check_amount(dataset, throws, axes)
     outputs = np.column_stack([_read_numbers(throws, column, dataset) for column in columns])
-    values = np.column_stack([_read_numbers(throws, axis.key, dataset) for axis in axes])
+    values = np.column_stack([_read_numbers(throws, column_of(axis.key), dataset) for axis in axes])
     trials: NDArray[np.int64] = throws["trial"].to_numpy()
     fit = fit_throws(kind, axes, columns, values, outputs, _read_numbers(throws, EFFORT, dataset))
     return replace(fit, trials=trials, ignored=len(dataset) - len(throws))
@@ -147,7 +146,7 @@ def _find_axes(
     nominal = {leaf.name: leaf.value for leaf in leaves(dataset.config)}
     axes = []
     for key in swept:
-        ends = pc.min_max(throws[key]).as_py()
+        ends = pc.min_max(throws[column_of(key)]).as_py()
         low, high = ends["min"], ends["max"]
         role = _choose_role(dataset.config, key, parameters, context)
         # Nothing can be learned about a key with one value, and scaling would divide by zero. With a single throw, no
@@ -175,12 +174,6 @@ def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) ->
         raise ConfigError(
             f"{dataset.directory}: no parameter of the task varies",
             expected="a sweep of task.… keys, or other parameters",
-        )
-    if len(chosen) > MOST_PARAMETERS:
-        raise ConfigError(
-            f"{len(chosen)} parameters: {join_names(chosen)}",
-            expected=f"at most {MOST_PARAMETERS}",
-            hint="choose some of them as parameters; the others count as unknown",
         )
     if len(throws) < (needed := count_needed_throws(len(chosen))):
         raise ConfigError(

@@ -148,16 +148,13 @@ class Model:
             processes: How many processes simulate.
 
         Raises:
-            ConfigError: If a number is out of its range, or what should simulate is no simulator.
+            ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
         for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
             check_whole_number(name, number, least=1)
         check_whole_number("seed", seed, least=0)
         _check_scatter(scatter)
-        for name, given in (("simulator", simulator), ("world", world)):
-            if not isinstance(given, Simulates) and (given is not None or name == "simulator"):
-                raise refuse_argument(name, f"got {show_value(given)}", expected="a throwcollect.Simulator")
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
             score_model(
@@ -306,8 +303,8 @@ def fit(
             or too few throws succeeded.
         DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
-    from throwcollect.dataset.expression import Expression
     from throwcollect.dataset.reader import Dataset
+    from throwcollect.dataset.selection import find_rows
 
     chosen = read_word("kind", kind, Kind)
     columns = read_list("targets", targets, "names")
@@ -316,10 +313,9 @@ def fit(
         dataset = Dataset.open(dataset)
     throws = dataset
     if where is not None:
-        rows = Expression(where, place="where").rows(dataset.throws)
-        if not rows:
+        throws = dataset.select(find_rows(where, dataset.throws, "where"))
+        if not len(throws):
             raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
-        throws = dataset.select(dataset["trial"][rows])
     found = fit_map(throws, kind=chosen, targets=columns, parameters=keys, context=known)
     return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -58,8 +59,10 @@ def _begin(directory: Path) -> Callable[[int], Comparison]:
 
     def replay(number: int) -> Comparison:
         """Simulate a trial, and compare it with the stored one."""
-        again = replayer.run(dataset.plan.trial(number))
+        # A merged dataset has numbers of its own, and episodes those of their own plans.
+        trial = replace(dataset.plan.trial(number), number=number - dataset.plan.first_of_part(number))
+        again = replayer.run(trial)
         with locating_damage(dataset, number):
-            return compare(dataset.episode(number), again)
+            return replace(compare(dataset.episode(number), again), trial=number)
 
     return replay

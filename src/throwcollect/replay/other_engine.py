@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from throwcollect.config.values import with_values
+from throwcollect.config.values import column_of, with_values
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import ThrowsTable
@@ -91,12 +91,12 @@ def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
         """Simulate a trial, and compare its row with the stored one."""
         trial = plan.trial(number)
         result = judge_episode(with_values(config, trial.values), replayer.run(trial))
-        stored, again = dataset[number].row, table.row(trial, result, None)
+        stored, again = dataset.select([number])[0].row, table.row(trial, result, None)
         # Columns of text, and numbers that only one of the two rows has, cannot be compared.
         compared = [
             column
             for column in again
-            if column not in ("trial", *trial.values, *trial.target)
+            if column not in ("trial", *map(column_of, trial.values), *trial.target)
             and all(isinstance(row.get(column), int | float) for row in (stored, again))
         ]
         values = {column: float(again[column]) - float(stored[column]) for column in compared}

@@ -60,7 +60,7 @@ def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
     """Find throws that do not come out of the simulation as they are stored."""
     try:
         dataset = Dataset.open(directory)
-        shards = dataset.throws["shard"].to_pylist()
+        shards = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["shard"].to_pylist(), strict=True))
         for comparison in replay_throws(directory, select_trials(dataset, sample=count)):
             if comparison.differences:
                 problem = f"comes out differently: {'; '.join(comparison.differences)}"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.shape import unit_of_key
+from throwcollect.config.values import keys_by_column
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.plotted_points import read_numbers
 
@@ -54,10 +55,8 @@ class SweptKey:
 
 def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[SweptKey, ...]:
     """Read all swept keys of a table of throws, in its order."""
-    # Only columns of swept keys have dots in their names.
-    return tuple(
-        _read_parameter(config, key, read_numbers(throws, key), outcomes) for key in throws.column_names if "." in key
-    )
+    columns = keys_by_column(config, throws.column_names)
+    return tuple(_read_parameter(config, key, read_numbers(throws, name), outcomes) for name, key in columns.items())
 
 
 def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> SweptKey:

@@ -6,6 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from throwcollect.config.values import column_of
 from throwcollect.dataset.misses import read_targets, summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import MissSummary
@@ -50,7 +51,7 @@ def _show_map(dataset: Dataset, targets: Targets) -> Panel:
     declared = {column.name: column for column in dataset.config.task.target_columns}
     throws, shown = dataset.throws, targets.names[:2]
     nowhere = np.full(len(throws), np.nan)
-    sources = [declared[name].of for name in shown]
+    sources = [column_of(declared[name].of) for name in shown]
     ends = [read_numbers(throws, name) if name in throws.column_names else nowhere for name in sources]
     chosen = choose_points(len(throws))
     goals, places = targets.values[chosen, : len(shown)], np.column_stack(ends)[chosen]

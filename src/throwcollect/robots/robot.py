@@ -25,8 +25,8 @@ class Robot:
         title: Name of the robot in sentences, such as ``Talos``.
         kind: Words before the title where a text first mentions the robot, such as ``the humanoid robot``; empty if
             the title says enough.
-        controllers: Joint trajectory controller of each limb and its joints, in order; each joint has one. Controllers have
-            names that ROS allows for nodes.
+        controllers: Joint trajectory controller of each limb and its joints, in order; each joint has one. Their
+            names are such as ROS allows for nodes.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings this directory is not installed.
         urdf: Path of the URDF in that directory, or an absolute path.

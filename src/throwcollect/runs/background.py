@@ -150,7 +150,7 @@ def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[
         # The process waits for the order before it changes the record, so the record has to be written first.
         with cast(IO[bytes], process.stdin) as pipe:
             pipe.write(order)
-    except (ThrowcollectError, OSError) as error:
+    except BaseException as error:
         if process is not None:
             process.kill()
             process.wait()

@@ -9,14 +9,12 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from throwcollect.arguments import check_whole_number
 from throwcollect.errors import ConfigError, ConflictError, ThrowcollectError, WorkerError
 from throwcollect.files import StrPath
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.run_selection import (
-    check_run,
     find_held_runs,
     id_of,
     require_living,
@@ -43,7 +41,6 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
 
     This function waits until the run ends or `keep_on` returns false, and returns the run as it is then.
     """
-    check_run(run)
     _signal(run.records, require_living(run), signal.SIGTERM)
     deadline = time.monotonic() + _STOP_S
     while run.records.lives(run.id) and keep_on():
@@ -97,8 +94,6 @@ def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]
 
 def scale(run: Run, simulations: int) -> None:
     """Ask the launcher of a run for another number of simulations."""
-    check_run(run)
-    check_whole_number("simulations", simulations, least=0)
     # The run may have ended since it was found.
     run = run.now()
     record = require_living(run)

@@ -25,12 +25,11 @@ from throwcollect.extras import (
     install_command,
     is_installed,
 )
-from throwcollect.members import explain_failure, find_broken, load_member, names_of
+from throwcollect.members import explain_failure, load_member, names_of
 from throwcollect.robots.description import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, uses_rclpy
-from throwcollect.runtimes.ports import check_loopback
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
 from throwcollect.state_directory import state_directory
@@ -42,9 +41,6 @@ _SIMULATION_MEMORY_GIB = 0.3
 
 _ROS_ROUTER_PORT = 7447
 """Port at which ROS 2 nodes on rmw_zenoh_cpp look for a router."""
-
-_LOADED = ("tools", "engines", "tasks", "exporters")
-"""The families whose members need no more than to be loaded; robots and runtimes are also tried."""
 
 _LEAST_DISK_GIB = 1.0
 _DIGITS = 10
@@ -102,15 +98,6 @@ def _check_robot(name: str) -> Check:
         return Check(check, "problem" if is_own else "note", error.one_line)
 
 
-def _check_members() -> list[Check]:
-    """Note members of other packages that cannot be loaded: only configurations that name them need them."""
-    return [
-        Check(f"{family.removesuffix('s')} {name}", "note", error.one_line)
-        for family in _LOADED
-        for name, error in find_broken(family).items()
-    ]
-
-
 def _check_extras() -> Check:
     """List the extras that are installed, and those of which at least one package is missing."""
     missing = sorted({extra for package, extra in EXTRA_OF.items() if has_wheel(package) and not is_installed(package)})
@@ -139,10 +126,6 @@ def _check_state() -> Check:
 
 
 def _check_port() -> Check:
-    try:
-        check_loopback()
-    except ConfigError as error:
-        return Check("ports", "problem", error.one_line)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -200,7 +183,6 @@ def examine(directory: Path) -> list[Check]:
     of_runtimes = [found for name in names_of("runtimes") if (found := _check_runtime(name)) is not None]
     return [
         *(check() for check in machine),
-        *_check_members(),
         *of_runtimes,
         _check_state(),
         _check_port(),

@@ -12,7 +12,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.runs.events import EVENTS, Event, parse
 from throwcollect.runs.records import Run
 from throwcollect.runs.run_record import Summary
-from throwcollect.runs.run_selection import check_run, describe_death
+from throwcollect.runs.run_selection import describe_death
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
 from throwcollect.wording import suggest
 
@@ -42,7 +42,6 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
     Yields:
         A look; the last one shows a run that has ended or died, unless `keep_on` returned false.
     """
-    check_run(run)
     run.record.middleware.joining.settle()
     from throwcollect.runtimes.run_listener import RunListener
 
@@ -66,7 +65,6 @@ def wait(run: Run) -> Summary:
     Returns:
         The summary of the dataset; its outcomes tell whether trials are lost.
     """
-    check_run(run)
     while run.status == "running":
         time.sleep(_READ_S)
         run = run.now()

@@ -14,12 +14,9 @@ from throwcollect.arguments import check_whole_number, read_path
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
-from throwcollect.dataset.configuration import read_config, refuse_damaged_config, refuse_lost_config
-from throwcollect.dataset.directory import config_path, describe_other
+from throwcollect.dataset.configuration import read_config, reading_config
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.files import refuse_pointers
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.records import OpenRun, Records
@@ -111,7 +108,7 @@ def resume(
     config: str | os.PathLike[str] | None = None,
     overrides: Sequence[str] = (),
     processes: int = 1,
-    check: bool = False,
+    simulate: bool = True,
     ahead: bool = False,
     onlooker: Onlooker = SILENT,
     run: OpenRun | None = None,
@@ -123,56 +120,43 @@ def resume(
         config: The configuration's file; None takes the configuration that lies in the directory.
         overrides: Keys to change, as for `prepare`.
         processes: Number of processes that may check the trials of a larger plan, as for `prepare`.
-        check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
+        simulate: Whether missing trials are run; if not, the dataset is finished at once with the episodes that are
+            whole, and all other trials are lost.
         ahead: As for `prepare`.
         onlooker: Is told what goes on.
         run: The run, if it has a record already; None makes a new one.
 
     Returns:
-        The run; None if every trial has ended, so that nothing is left to do.
+        The run; None if every trial has ended, so that nothing is left to do, or if nothing should be simulated.
     """
     started = datetime.now(timezone.utc)
     directory = read_path("directory", directory)
     file = None if config is None else read_path("config", config)
-    if not is_begun(directory):
-        refuse_lost_config(directory)
-        raise ConfigError(
-            f"{directory}: {describe_other(directory)}", expected="a directory that throwcollect up has made"
-        )
-    refuse_pointers(directory)
-    with ExitStack() as places:
-        read = _read_stored(places, file, directory, overrides)
+    with reading_config(directory, file, overrides) as read:
+        sweep_directory = directory if file is None else file.parent
+        if not simulate:
+            from throwcollect.coordinator.salvage import finish_without_simulating
+
+            finish_without_simulating(read, directory, sweep_directory=sweep_directory, onlooker=onlooker)
+            return None
         records = Records()
         own = None if run is None else run.run
         if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
             return left
         request = RunRequest(
             read,
-            directory if file is None else file.parent,
+            sweep_directory,
             directory,
             started,
             processes=processes,
             ahead=ahead,
             origin=None if run is None else run.record.origin,
         )
-        planned = _plan_again(request, onlooker, check=check)
+        planned = _plan_again(request, onlooker)
         return None if planned is None else prepare_run(records, planned, onlooker, run=run)
 
 
-def _read_stored(places: ExitStack, config: Path | None, directory: Path, overrides: Sequence[str]) -> Config:
-    """Read the configuration of a dataset to continue; until `places` is closed, errors name places of its file."""
-    try:
-        return places.enter_context(load_locating_errors(config or config_path(directory), overrides))
-    except ConfigError as error:
-        # A problem without a place in a file is a problem of the overrides, which another file would not solve.
-        if config or all(problem.path is None for problem in error.problems):
-            raise
-        refuse_damaged_config(directory, error)
-        hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
-        raise ConfigError(error.problems, hint=hint) from error
-
-
-def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunRequest | None:
+def _plan_again(request: RunRequest, onlooker: Onlooker) -> RunRequest | None:
     """Make the plan of a dataset to continue, and choose the runtime; None if every trial has ended."""
     from throwcollect.coordinator.resume import has_all_trials, resume
 
@@ -188,7 +172,6 @@ def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunR
             request.directory,
             sweep_directory=request.sweep_directory,
             processes=request.processes,
-            check=check,
             before_writing=choose_runtime,
             onlooker=onlooker,
         )
@@ -298,7 +281,7 @@ def _make_plan(request: RunRequest, directory: Path, onlooker: Onlooker) -> Plan
     from throwcollect.coordinator.prepare import prepare as prepare_plan
 
     config = request.config
-    if (config.trials or 0) >= MANY_TRIALS and not config.grows:
+    if (config.trials or 0) >= MANY_TRIALS and config.until is None:
         onlooker.say(
             f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms for each on one core"
         )

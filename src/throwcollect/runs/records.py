@@ -13,7 +13,6 @@ Only the owner can read these files.
 from __future__ import annotations
 
 import fcntl
-import json
 import os
 import secrets
 import shutil
@@ -34,7 +33,7 @@ from throwcollect.files import beside, open_log, write_all
 from throwcollect.own_process import make_command
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
-from throwcollect.runs.run_record import VERSION, RunRecord
+from throwcollect.runs.run_record import RunRecord
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import find_runtime
@@ -263,17 +262,11 @@ class Records:
 
     def into(self, directory: Path) -> list[Run]:
         """Runs that collect, or have collected, into a directory, and not into a volume; the latest last."""
-        # A record holds the real path; a record of an earlier version holds the path as the user gave it.
-        names = {os.path.realpath(directory), str(directory.absolute())}
+        name = os.path.realpath(directory)
         # There may be thousands of records, so only those that contain the directory's name are parsed.
-        written = [to_json(name) for name in names]
-
-        def names_it(run: str) -> bool:
-            text = _read_bytes(self._runs / f"{run}.json")
-            return any(name in text for name in written)
-
-        runs = self.read(filter(names_it, self.ids()))
-        return [run for run in runs if run.record.volume is None and run.record.directory in names]
+        written = to_json(name)
+        runs = self.read(run for run in self.ids() if written in _read_bytes(self._runs / f"{run}.json"))
+        return [run for run in runs if run.record.volume is None and run.record.directory == name]
 
     def read(self, ids: Iterable[str]) -> list[Run]:
         """Those of the runs whose records can be read, the latest last."""
@@ -337,19 +330,12 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _read(path: Path) -> RunRecord:
-    hint = f"{command('down', '--run', path.stem)} ends what is left of it, and forgets it"
     try:
-        content = json.loads(path.read_bytes())
-        version = content.get("version") if isinstance(content, dict) else None
-        if version not in (None, VERSION):
-            raise ConfigError(f"{path}: the record of the run is of another version of throwcollect", hint=hint)
-        if isinstance(content, dict) and (message := content.get("message")):
-            # Older versions wrote the error as one text.
-            content["failure"] = {"message": message}
-        return _ADAPTER.validate_python(content)
+        return _ADAPTER.validate_json(path.read_bytes())
     except FileNotFoundError as error:
         raise NotFoundError(f"no run {path.stem}", hint="throwcollect ps -a lists all") from error
     except OSError as error:
         raise unusable(path, error) from error
-    except (ValueError, ValidationError) as error:
-        raise ConfigError(f"{path}: the record of the run is damaged", hint=hint) from error
+    except ValidationError as error:
+        hint = f"{command('down', '--run', path.stem)} ends what is left of it, and forgets it"
+        raise ConfigError(f"{path}: the record is damaged, or of another version of throwcollect", hint=hint) from error

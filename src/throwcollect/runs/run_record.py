@@ -98,7 +98,7 @@ class RunRecord:
         left: Whether containers of the run may still exist, because its launcher did not remove them.
         failure: The error with which the run ended; None if there was none.
         summary: Summary of the dataset; None if the dataset is not finished.
-        begun_in: Absolute path of the directory in which the run was begun; empty if an older version did not note it.
+        begun_in: Absolute path of the directory in which the run was begun.
         middleware: The middleware that carries the messages of the nodes.
         origin: The request of a client; None if a command or a program began the run.
         stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from throwcollect.arguments import read_path, refuse_argument, show_value
+from throwcollect.arguments import read_path
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import StrPath
@@ -15,9 +15,7 @@ from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.runtimes.registry import find_runtime, get_runtime
 from throwcollect.runtimes.runtime import HeldRun
-from throwcollect.wording import command
-
-_MOST_LISTED = 5
+from throwcollect.wording import command, suggest
 
 
 def find_run_to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
@@ -34,22 +32,16 @@ def find_run_to_change(records: Records, named: str | None, *, command: str, die
     if not here and len(candidates) == 1:
         (other,) = candidates
         raise ConfigError(
-            f"no run of this directory lives; {other.id} {_describe_origin(other)}",
+            f"no run of this directory lives; {other.id} was begun in {other.record.begun_in}",
             hint=f"throwcollect {command} --run {other.id}, if that one is meant",
         )
-    return _require_only_run(here or candidates, runs)
+    return _require_only_run(here or candidates)
 
 
 def find(named: StrPath) -> Run:
     """Find a run of this machine by its id, the beginning of its id, or the directory of its dataset; see `id_of`."""
     records = Records()
     return records.get(id_of(records, named))
-
-
-def check_run(run: object) -> None:
-    """Refuse a value that is no `Run`, such as the name of one."""
-    if not isinstance(run, Run):
-        raise refuse_argument("run", f"got {show_value(run)}", expected="a Run, as runs.find(NAME) gives it")
 
 
 def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
@@ -64,19 +56,19 @@ def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str
     here = [run for run in runs if _belongs_here(run.record)]
     known = here or runs
     living = [run for run in known if run.status == "running"]
-    run = known[-1] if known and not living else _require_only_run(living, runs)
+    run = known[-1] if known and not living else _require_only_run(living)
     if not here:
-        say(f"run {run.record.run}, which {_describe_origin(run)}")
+        say(f"run {run.id}, which was begun in {run.record.begun_in}")
     return run
 
 
-def _require_only_run(living: Sequence[Run], runs: Sequence[Run]) -> Run:
+def _require_only_run(living: Sequence[Run]) -> Run:
     if len(living) == 1:
         return living[0]
     if living:
-        raise ConfigError(f"{len(living)} runs live", expected=_list_latest(living), hint="name one of them with --run")
-    over = f"; runs that are over: {_list_latest(runs)}" if runs else ""
-    raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
+        names = ", ".join(run.id for run in living)
+        raise ConfigError(f"{len(living)} runs live", expected=names, hint="name one of them with --run")
+    raise ConfigError("no run lives", hint="throwcollect up -d starts one; throwcollect ps -a lists earlier ones")
 
 
 def _belongs_here(record: RunRecord) -> bool:
@@ -84,11 +76,6 @@ def _belongs_here(record: RunRecord) -> bool:
     here = os.getcwd()
     dataset = None if record.volume else Path(os.path.realpath(record.directory))
     return record.begun_in == here or (dataset is not None and dataset.is_relative_to(here))
-
-
-def _describe_origin(run: Run) -> str:
-    begun_in = run.record.begun_in
-    return f"was begun in {begun_in}" if begun_in else f"collects into {run.place.dataset}"
 
 
 def id_of(records: Records, named: StrPath) -> str:
@@ -100,11 +87,7 @@ def id_of(records: Records, named: StrPath) -> str:
     directory, named = read_path("named", named), os.fspath(named)
     # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
     if not named:
-        raise ConfigError(
-            "the name of the run is empty",
-            expected="the id of a run, the beginning of its id, or the directory of its dataset",
-            hint="throwcollect ps -a lists all",
-        )
+        raise ConfigError("the name of the run is empty", hint="throwcollect ps -a lists all")
     ids = records.ids()
     # A whole id comes first, because it may also be the beginning of another one.
     if named in ids:
@@ -114,30 +97,12 @@ def id_of(records: Records, named: StrPath) -> str:
     matches = [run for run in ids if run.startswith(named)]
     if len(matches) == 1:
         return matches[0]
-    if matches:
-        return _find_only_living(records, matches, named)
-    known = _list_latest(records.all())
-    hint = "throwcollect ps -a lists all" if known else None
-    raise NotFoundError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
-
-
-def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
-    """Find the only one of several runs that lives; all of their ids begin with `named`."""
-    runs = records.read(ids)
-    living = [run for run in runs if run.status == "running"]
-    if len(living) == 1:
-        return living[0].id
-    runs.sort(key=lambda run: (run.status == "running", run.record.started), reverse=True)
-    lines = [f"{run.id} ({run.status}): {run.place.dataset}" for run in runs[:_MOST_LISTED]]
-    if more := len(ids) - len(lines):
-        lines.append(f"{more} more, which throwcollect ps -a lists")
-    raise ConfigError(f"{len(ids)} runs begin with {named!r}", expected="\n".join(["one of", *lines]))
-
-
-def _list_latest(runs: Sequence[Run]) -> str:
-    """The ids of the latest of these runs, the latest first, and the number of all others."""
-    more = len(runs) - _MOST_LISTED
-    return ", ".join(run.id for run in runs[: -_MOST_LISTED - 1 : -1]) + (f" and {more} more" if more > 0 else "")
+    if not matches:
+        raise NotFoundError(f"no run {named!r}{suggest(named, ids, 'throwcollect ps -a')}")
+    living = [run for run in records.read(matches) if run.status == "running"]
+    if len(living) != 1:
+        raise ConfigError(f"{len(matches)} runs begin with {named!r}", expected=f"one of {', '.join(matches)}")
+    return living[0].id
 
 
 def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:

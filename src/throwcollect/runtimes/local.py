@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import socket
 import time
@@ -78,7 +77,6 @@ class LocalNodes(NodeHost):
 
     Raises:
         ConfigError: If the router's port is taken.
-        WorkerError: If this process, and so its nodes, may open too few files or have too little memory.
     """
 
     cleared = True
@@ -86,7 +84,6 @@ class LocalNodes(NodeHost):
     def __init__(
         self, place: Place, config: Config, *, elsewhere: str | None = None, server: NodeServer | None = None
     ) -> None:
-        _check_limits(config.run.simulations)
         self.place = place
         self.config = config
         self.data = str(place.directory)
@@ -183,18 +180,6 @@ class LocalNodes(NodeHost):
 
 def _make_server(middleware: Middleware) -> NodeServer:
     return NodeServer({**os.environ, **library_environment(middleware)})
-
-
-def _check_limits(simulations: int) -> None:
-    """Check limits within which libraries of nodes neither work nor end with a reason."""
-    # The router was measured to open 20 files and one for each simulation, and all nodes to start within 0.9 GB.
-    for limit, least, what in (
-        (resource.RLIMIT_NOFILE, 32 + simulations, "files may be open (ulimit -n)"),
-        (resource.RLIMIT_AS, 1_000_000_000, "bytes of memory may be taken (ulimit -v)"),
-    ):
-        most, _ = resource.getrlimit(limit)
-        if most != resource.RLIM_INFINITY and most < least:
-            raise WorkerError(f"only {most} {what}", expected=f"at least {least}")
 
 
 def _is_stopped(pid: int) -> bool:

@@ -33,7 +33,6 @@ _LANDING = ("landing_x_m", "landing_y_m", "outcome", "trial")
 _MOST_LANDINGS = 20_000
 _JOURNAL_BYTES = 4_000_000
 """Most landings, and most bytes of a journal (about 15,000 throws), for one answer."""
-_MOST_FIRST = 2**53
 
 
 class DatasetFile(BaseModel):
@@ -105,7 +104,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
             return await asyncio.to_thread(lambda: _report(_find_finished(instances, instance), instance))
 
     @router.get("/landings")
-    def landings(instance: str, first: Annotated[int, Query(ge=0, le=_MOST_FIRST)] = 0) -> LandingPoints:
+    def landings(instance: str, first: Annotated[int, Query(ge=0)] = 0) -> LandingPoints:
         """Where throws came down, of a finished dataset or of one that grows; none for other tasks."""
         directory = _get_collection(instances, instance).place.directory
         if _is_finished(directory):

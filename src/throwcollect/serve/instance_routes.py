@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections import deque
@@ -12,7 +11,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, StrictInt, field_validator
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, StrictInt
 
 from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS, parse
@@ -35,17 +34,6 @@ class InstanceRequest(BaseModel):
     simulations: StrictInt | None = Field(default=None, ge=1, le=256)
     set: dict[str, JsonValue] = Field(default_factory=dict)
     joins: str | None = None
-
-    @field_validator("component", "set", "joins")
-    @classmethod
-    def _is_text(cls, value: JsonValue) -> JsonValue:
-        # JSON can contain half a character (a lone surrogate, escaped), which cannot be written to a file.
-        try:
-            json.dumps(value, ensure_ascii=False).encode()
-        except UnicodeEncodeError as error:
-            half = error.object[error.start]
-            raise ValueError(f"should be text that UTF-8 can hold, got half a character ({half!a})") from error
-        return value
 
     @property
     def origin(self) -> Origin:

@@ -1,4 +1,4 @@
-"""Models of a directory, as the page shows them: where their throws came down, how they miss, where to aim."""
+"""Models of a directory, as the page shows them: where their throws came down, how they miss, where to aim; by REST."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import islice
 from pathlib import Path
+from typing import Annotated
 
+from fastapi import APIRouter, Query
 from pydantic import BaseModel
 
 from throwcollect.errors import NotFoundError
@@ -19,7 +20,6 @@ from throwcollect.learning.model_file import MODEL, AdaptationEntry
 from throwcollect.learning.score import Score
 from throwcollect.serve.catalogue import ENTRY
 
-_MOST_MODELS = 200
 _MOST_POINTS = 2000
 
 
@@ -72,13 +72,12 @@ class Models:
     directory: Path
 
     def names(self) -> list[str]:
-        """Names of the models, at most 200."""
+        """Names of the models."""
         try:
             names = sorted(os.listdir(self.directory))
         except OSError:
             return []
-        found = (each for each in names if re.fullmatch(ENTRY, each) and (self.directory / each / MODEL).is_file())
-        return list(islice(found, _MOST_MODELS))
+        return [each for each in names if re.fullmatch(ENTRY, each) and (self.directory / each / MODEL).is_file()]
 
     def view(self, name: str) -> ModelView:
         """Describe a model."""
@@ -117,3 +116,25 @@ class Models:
 @lru_cache(maxsize=8)
 def _load(directory: Path, *_changed_ns: int) -> Model:
     return load_model(directory)
+
+
+def make_model_routes(models: Models) -> APIRouter:
+    """Make the routes on models, none of which changes a model."""
+    router = APIRouter(prefix="/models")
+
+    @router.get("")
+    def names() -> list[str]:
+        """Names of all models."""
+        return models.names()
+
+    @router.get("/{model}")
+    def view(model: str) -> ModelView:
+        """The throws that a model was learned from, its misses, and the effect of adapting it."""
+        return models.view(model)
+
+    @router.get("/{model}/aim")
+    def aim(model: str, at: Annotated[list[float], Query()]) -> AimView:
+        """The parameters of a throw at a target: values of the model's targets, then of the keys given with them."""
+        return models.aim(model, at)
+
+    return router

@@ -2,40 +2,32 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 import logging.handlers
 import os
 import socket
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
 from typing import Literal
 
 import uvicorn
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from throwcollect.errors import ConfigError
-from throwcollect.files import open_log
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
-from throwcollect.serve.finding import Address, log_path, publish
+from throwcollect.serve.finding import Address, publish
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.models import Models
-from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
+from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 
 _PORT = 8080
 """Port to serve at if the user names none and it is free."""
 WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
 """This implementation of WebSockets waits for a client that reads slowly, and does not collect frames in memory."""
-_MOST_WAITING = 256
-"""Connections whose next headers are awaited; `access` counts requests and sockets."""
-_LOG_BYTES = 1_000_000
 _PEM = "a certificate and its key without a password, both in PEM"
 _END_S = 2.5
 """Time within which the process ends after a signal."""
@@ -93,7 +85,6 @@ def serve(
             ws_max_size=LONGEST_FRAME,
             # Most clients are on this machine, where compression only costs time.
             ws_per_message_deflate=False,
-            http=_Connection,
             timeout_graceful_shutdown=1,
             # These headers are ignored, because any client could send them.
             proxy_headers=False,
@@ -108,29 +99,6 @@ def serve(
             # uvicorn raises the signal that ended it a second time. For a server, that is the usual end and no error.
             with contextlib.suppress(KeyboardInterrupt):
                 _Server(config).run(sockets=[listener])
-
-
-class _Connection(H11Protocol):
-    """A connection that ends if its next headers are not whole when the time to keep alive is over.
-
-    Until they are whole, it may be anybody's: with too many such connections, the one that has waited longest ends.
-    """
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(transport)  # type: ignore[arg-type]
-        self.timeout_keep_alive_task = self.loop.call_later(self.timeout_keep_alive, self.timeout_keep_alive_handler)
-        waiting = {
-            each.timeout_keep_alive_task.when(): each
-            for each in self.connections
-            if isinstance(each, _Connection) and each.timeout_keep_alive_task and not each.transport.is_closing()
-        }
-        if len(waiting) > _MOST_WAITING:
-            waiting[min(waiting)].timeout_keep_alive_handler()
-
-    def data_received(self, data: bytes) -> None:
-        # uvicorn would end the wait at the first byte; when the headers are whole, `handle_events` does.
-        self.conn.receive_data(data)
-        self.handle_events()
 
 
 class _Server(uvicorn.Server):
@@ -161,28 +129,9 @@ def _load(config: uvicorn.Config) -> None:
         ) from error
 
 
-class _CutLog(logging.handlers.RotatingFileHandler):
-    """The log of a server that was started in the background: at most two files of 1 MB.
-
-    Standard error is redirected to each new file, so that everything else that is printed is in the log, too.
-    """
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, maxBytes=_LOG_BYTES, backupCount=1)
-
-    def _open(self) -> TextIOWrapper:
-        log = os.fdopen(open_log(Path(self.baseFilename)), "a")
-        os.dup2(log.fileno(), sys.stderr.fileno())
-        return log
-
-
 def _write_lines() -> None:
-    """Write a line for each request: to the log of a server in the background, else to standard error."""
-    lines: logging.Handler = logging.StreamHandler()
-    # An error means that there is no such log, or no standard error, so this server is not in the background.
-    with contextlib.suppress(OSError, ValueError):
-        if os.path.samestat(os.fstat(sys.stderr.fileno()), log_path().stat()):
-            lines = _CutLog(log_path())
+    """Write a line for each request to standard error, which is the log of a server in the background."""
+    lines = logging.StreamHandler()
     lines.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
     logger = logging.getLogger("throwcollect.serve")
     logger.setLevel(logging.INFO)
@@ -203,11 +152,9 @@ def _listen(host: str, port: int | None) -> Iterator[socket.socket]:
                     raise
                 listener.bind((host, 0))
             listener.listen()
-        # A text that cannot be a host name leads to a TypeError.
-        except (OSError, TypeError) as error:
-            why = error.strerror if isinstance(error, OSError) else error
+        except OSError as error:
             raise ConfigError(
-                f"--host {host} --port {_PORT if port is None else port}: cannot listen there: {why}",
+                f"--host {host} --port {_PORT if port is None else port}: cannot listen there: {error.strerror}",
                 hint="--port 0 takes one that is free; throwcollect view finds who serves already",
             ) from error
         yield listener

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,10 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
-from throwcollect.files import is_there, remove, write_file
+from throwcollect.files import write_file
 from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, open_parquet
 from throwcollect.sweep.points import Points, Targets
-from throwcollect.sweep.round_file import read_rounds, rounds_path
-from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.slice import Slice
 from throwcollect.sweep.trials import DIGEST_BYTES, Trial, Trials
 from throwcollect.wording import blank_numbers, format_count
@@ -28,14 +27,9 @@ _FORMAT = "1"
 _FORMAT_KEY = b"throwcollect.plan_format"
 _CONFIG_KEY = b"throwcollect.config_digest"
 _SLICE_KEY = b"throwcollect.slice"
+_JOINED_KEY = b"throwcollect.joined"
 _MOST_REASONS = 5
-_ROWS_AT_ONCE = 1 << 16
 _MISNUMBERED = "the trials are not numbered from 0 without gaps"
-
-ROUND_TRIALS = 64
-"""Number of trials in a round, by which a plan grows."""
-FIRST_TRIALS = 2 * ROUND_TRIALS
-"""Number of trials in the first rounds, which depend on no result."""
 
 Check = Callable[[Config], str | None]
 """Explains why a trial with this configuration cannot be run; None if it can."""
@@ -49,11 +43,14 @@ class Plan:
         config: Configuration that the trials vary.
         trials: At least one trial; the first trial has number 0 unless this is a slice.
         slice: Which slice this is; None for the whole plan.
+        joined: If this plan joins those of merged datasets, the numbers of trials of these; else empty. An episode has
+            the number that its trial has in its own plan.
     """
 
     config: Config
     trials: Trials
     slice: Slice | None = None
+    joined: tuple[int, ...] = ()
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -67,6 +64,22 @@ class Plan:
             raise IndexError(number)
         return self.trials[index]
 
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """Numbers of trials of the plans that this one joins; its own number if it joins none."""
+        return self.joined or (len(self.trials),)
+
+    def first_of_part(self, number: int) -> int:
+        """Return the number of the first trial of the joined plan that a trial belongs to."""
+        return max((first for first in accumulate(self.joined, initial=0) if first <= number), default=0)
+
+    def part_from(self, first: int) -> Plan:
+        """Return the joined plan whose first trial has this number, with trials from 0 on, as it was collected."""
+        count = dict(zip(accumulate(self.parts, initial=0), self.parts, strict=False))[first]
+        trials = self.trials[first : first + count]
+        refused = {number - first: reason for number, reason in trials.refused.items()}
+        return Plan(self.config, Trials(trials.points, trials.seeds, trials.digests, refused=refused))
+
     def slice_of(self, wanted: Slice) -> Plan:
         """Cut a slice out of the plan."""
         numbers = wanted.trials_of(len(self.trials), trials_per_shard=self.config.record.trials_per_shard)
@@ -77,14 +90,8 @@ class Plan:
         return with_values(self.config, trial.values)
 
     def write(self, path: Path) -> None:
-        """Write the plan as a Parquet file, whole or not at all, and remove the rounds beside it, which it contains."""
+        """Write the plan as a Parquet file, whole or not at all."""
         write_file(path, self.encode())
-        remove(rounds_path(path))
-
-    def take_in_rounds(self, path: Path) -> None:
-        """Write the plan as a whole if rounds lie beside its file; this plan contains them."""
-        if is_there(rounds_path(path)):
-            self.write(path)
 
     def encode(self) -> bytes:
         """Encode the plan as Parquet; equal plans give equal bytes.
@@ -107,6 +114,8 @@ class Plan:
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
             metadata[_SLICE_KEY] = str(self.slice)
+        if self.joined:
+            metadata[_JOINED_KEY] = " ".join(map(str, self.joined))
         schema = _make_schema(self.keys, trials.target_names).with_metadata(metadata)
         return encode_table(make_table(columns, schema))
 
@@ -115,7 +124,7 @@ class Plan:
         """Read a plan that was written for a configuration.
 
         Args:
-            path: File that `write` wrote; rounds that were added later lie beside it.
+            path: File that `write` wrote.
             config: The configuration; its section `run` may differ.
         """
         with open_parquet(path) as file:
@@ -144,7 +153,10 @@ class Plan:
                     raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
             for name, reason in config.task.find_wrong_targets(targets).items():
                 raise DatasetError(f"is damaged: column {name!r}: {reason}", path=path)
-            trials = _read_trials(file, keys, targets, path)
+            table = file.read().combine_chunks()
+            table.validate(full=True)
+            (rows,) = table.to_batches()
+            trials = _read_trials(rows, keys, targets, path)
         stored = metadata.get(_SLICE_KEY)
         if stored is not None:
             try:
@@ -154,29 +166,21 @@ class Plan:
         # Only a slice may begin with a trial other than 0.
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
-        read_rounds(path, trials)
-        return cls(config, trials)
-
-
-def draw_first_points(config: Config, *, directory: Path) -> Points:
-    """Draw the points of all trials that are known before anything runs; for a plan that grows, its first two rounds.
-
-    A relative `sweep.file` starts at `directory`.
-    """
-    points = draw_points(config, directory=directory)
-    return points[:FIRST_TRIALS] if config.grows else points
+        joined = metadata.get(_JOINED_KEY, b"").split()
+        if not all(map(bytes.isdigit, joined)) or (joined and sum(map(int, joined)) != len(trials)):
+            raise DatasetError("is damaged: it does not have the trials of the plans that it joins", path=path)
+        return cls(config, trials, joined=tuple(map(int, joined)))
 
 
 def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
     """Make trials of points, with numbers from `first` on; none of them is refused."""
     count = len(points.values)
     seeds = np.fromiter((_make_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
-    digests = trial_digests(config, points, seeds)
-    return Trials(points, seeds, digests, first=first)
+    return Trials(points, seeds, trial_digests(config, points, seeds), first=first)
 
 
 def _make_seed(root: int, number: int) -> int:
-    # The seed of a trial does not depend on other trials, so a plan can grow, or be made in parts.
+    # The seed of a trial does not depend on other trials, so a plan can be continued.
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
@@ -188,10 +192,10 @@ def refusal(config: Config, check: Check) -> str | None:
         return str(error)
 
 
-def check_some_left(trials: Trials) -> None:
-    """Make sure that a plan has something to run."""
-    reasons = list(trials.refused.values())
-    if len(reasons) < len(trials):
+def check_some_left(found: Sequence[str | None]) -> None:
+    """Make sure that a plan has something to run, given for each trial why it is refused; None if it is not."""
+    reasons = [reason for reason in found if reason is not None]
+    if len(reasons) < len(found):
         return
     # Reasons that differ only in their numbers are of one kind, of which the first reason is shown.
     kinds = [blank_numbers(reason) for reason in reasons]
@@ -201,34 +205,17 @@ def check_some_left(trials: Trials) -> None:
     # Other reasons begin with the key that is wrong, and say what is right.
     of_motions = any("." not in reason.split(" ", 1)[0] for reason in examples.values())
     raise PlanError(
-        [Problem(f"{format_count(len(trials), 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
+        [Problem(f"{format_count(len(reasons), 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
         hint="sweep over smaller ranges or slower motions, or change task.start and task.end" if of_motions else None,
     )
 
 
-def _read_trials(file: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
-    """Read the trials of an open plan in batches, because all rows at once take Arrow several times as much memory."""
-    trials: Trials | None = None
-    for rows in file.iter_batches(_ROWS_AT_ONCE):
-        rows.validate(full=True)
-        first = rows["trial"][0].as_py()
-        more = _make_trials_of(rows, keys, targets, first, path)
-        if trials is None:
-            trials = more
-        elif first != trials.numbers.stop:
-            raise DatasetError(_MISNUMBERED, path=path)
-        else:
-            trials.extend(more)
-    if trials is None:
-        raise DatasetError("is damaged: has no rows", path=path)
-    return trials
-
-
-def _make_trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first: int, path: Path) -> Trials:
+def _read_trials(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
+    """Read the trials of the table of a plan."""
     from throwcollect.sweep.arrow_column import nan_where_null, read_numbers
 
-    numbers = np.arange(first, first + len(rows))
-    if not np.array_equal(read_numbers(rows["trial"]), numbers):
+    first = rows["trial"][0].as_py()
+    if not np.array_equal(read_numbers(rows["trial"]), np.arange(first, first + len(rows))):
         raise DatasetError(_MISNUMBERED, path=path)
     digests = rows["digest"].to_pylist()
     if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:

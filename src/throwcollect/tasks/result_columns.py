@@ -28,13 +28,11 @@ class Column:
         name: Name of the column.
         kind: Kind of its values: numbers, whole numbers, or text; null where nothing was measured.
         description: One sentence, with units.
-        later: Whether datasets of earlier versions lack this column.
     """
 
     name: str
     kind: Literal["number", "count", "text"]
     description: str
-    later: bool = False
 
 
 class Columns(ABC):
@@ -59,16 +57,14 @@ class Number(Columns):
 
     Attributes:
         description: One sentence, with the unit.
-        later: Whether datasets of earlier versions lack this column.
     """
 
     kind: ClassVar[Literal["number", "count"]] = "number"
     description: str
-    later: bool = False
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the column; see `Columns`."""
-        return [Column(name, self.kind, self.description, self.later)]
+        return [Column(name, self.kind, self.description)]
 
 
 class Count(Number):
@@ -130,10 +126,7 @@ class SpinColumns(Columns):
         """List the columns; see `Columns`."""
         return [
             Column(
-                f"{name}_{axis}_radps",
-                "number",
-                f"Angular velocity of the ball in world {self.when}, {axis} [rad/s].",
-                later=True,
+                f"{name}_{axis}_radps", "number", f"Angular velocity of the ball in world {self.when}, {axis} [rad/s]."
             )
             for axis in "xyz"
         ]

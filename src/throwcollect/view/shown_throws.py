@@ -35,11 +35,14 @@ def choose_throws(dataset: Dataset, trials: Iterable[int] | None) -> Dataset:
         if not len(recorded := dataset.recorded):
             raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
         return recorded
-    numbers = list(trials)
+    numbers, known = list(trials), dataset["trial"]
     for number in numbers:
-        if not 0 <= number < len(dataset):
-            raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(dataset) - 1}")
-        if not (throw := dataset[number]).recorded:
+        if number not in known:
+            expected = f"trials from {known[0]} to {known[-1]}"
+            raise ConfigError(f"{dataset.directory}: no trial {number}", expected=expected)
+    chosen = dataset.select(numbers)
+    for throw in chosen:
+        if not throw.recorded:
             reason = f"{throw.outcome}: {throw.reason}"
-            raise DatasetError(f"trial {number} has no episode: {reason}", path=dataset.directory)
-    return dataset.select(numbers)
+            raise DatasetError(f"trial {throw.trial} has no episode: {reason}", path=dataset.directory)
+    return chosen

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from throwcollect.cli import cluster_runs
-from throwcollect.cluster import slurm
 from throwcollect.cluster.cluster_run import SlicesLook
 from throwcollect.cluster.slurm import ArrayTask
 from throwcollect.errors import ConfigError
@@ -30,12 +29,6 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("looks")
-def test_events_of_a_cluster_run_are_printed_as_lines(capsys: pytest.CaptureFixture[str]) -> None:
-    cluster_runs.print_events(RUN, as_json=False)
-    assert capsys.readouterr().out.splitlines() == ["task 0: running on n1", "task 0: completed on n1", "finished"]
-
-
-@pytest.mark.usefixtures("looks")
 def test_events_of_a_cluster_run_with_json_are_one_document_a_line(capsys: pytest.CaptureFixture[str]) -> None:
     cluster_runs.print_events(RUN, as_json=True)
     assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [
@@ -49,19 +42,6 @@ def test_a_run_is_named_by_its_joining_job_if_nothing_else_was_submitted(monkeyp
     jobs = [SimpleNamespace(array="7", join="8"), SimpleNamespace(array="", join="9")]
     run: Any = SimpleNamespace(submission=SimpleNamespace(jobs=jobs, tasks=3), directory="data")
     assert cluster_runs.make_document(run, look())["run"] == "9"
-
-
-def test_a_damaged_submission_gives_a_warning_and_the_other_runs_are_listed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name, text in (("damaged", "{"), ("whole", '{"name": "a", "tasks": 2, "program": [], "image": null}')):
-        (tmp_path / name / "cluster").mkdir(parents=True)
-        (tmp_path / name / "cluster" / "submission.json").write_text(text)
-    directories = [str(tmp_path / name) for name in ("damaged", "whole")]
-    monkeypatch.setattr(slurm, "find_directories", lambda: directories)
-    monkeypatch.setattr(slurm, "find_tasks", dict)
-    assert list(cluster_runs.list_queued(lambda run, _: str(run.directory))) == directories[1:]
-    assert "damaged/cluster/submission.json: does not say what was submitted" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("named", ["2", "-1", "²", "sim_0"])
@@ -98,12 +78,3 @@ def test_logs_of_a_cluster_run_are_followed_until_it_ends(
     logs.clear()
     with pytest.raises(ConfigError, match="task 1 has printed nothing yet"):
         cluster_runs.print_logs(run, ["1"])
-
-
-def test_events_of_a_run_on_several_nodes_name_no_task_number(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    seen = [look(ArrayTask(None, "COMPLETED", "n[1-2]", "0:0"), complete=True)]
-    monkeypatch.setattr(cluster_runs, "follow", lambda _run, **_: iter(seen))
-    cluster_runs.print_events(RUN, as_json=False)
-    assert capsys.readouterr().out.splitlines() == ["all tasks: completed on n[1-2]", "finished"]

@@ -11,8 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from throwcollect.cluster import cluster_run
-from throwcollect.cluster.cluster_run import ProgressOfSlices, SlicesLook, find_cluster_run
-from throwcollect.cluster.submission import Submission, write_submission
+from throwcollect.cluster.cluster_run import ProgressOfSlices, SlicesLook
 
 
 @pytest.fixture
@@ -48,13 +47,3 @@ def test_refused_trials_are_not_counted(run: Any) -> None:
     pq.write_table(pa.table({"outcome": outcomes}), run.directory / "throws.parquet")
     progress = ProgressOfSlices(run).at(SlicesLook(frozenset(), (), None, complete=True))
     assert (progress.ended, progress.failed) == (28, 1)
-
-
-def test_an_empty_name_is_not_that_of_a_submitted_dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "cluster").mkdir()
-    write_submission(tmp_path, Submission("small", 2, ("throwcollect",), None))
-    monkeypatch.chdir(tmp_path)
-    found = find_cluster_run(".")
-    assert found is not None
-    assert found.directory == tmp_path
-    assert find_cluster_run("") is None

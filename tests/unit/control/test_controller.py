@@ -191,28 +191,6 @@ def test_a_trajectory_from_the_topic_needs_a_decision_once_it_is_late() -> None:
     assert bench.controller.command[0] == 2.1
 
 
-def test_an_idle_controller_gives_any_number_of_commands_in_one_row_of_memory() -> None:
-    commands = Bench().controller.take(1_000_000)
-    assert commands.shape == (1_000_000, 3)
-    assert commands.strides[0] == 0
-
-
-def test_a_trajectory_that_lasts_years_can_be_taken_in_parts() -> None:
-    bench = Bench()
-    bench.send(goal(to(1.5e9, 2.1)))
-    bench.step()
-    commands = np.vstack([bench.controller.take(n) for n in (4000, 4000, 1)])
-    assert commands[-1][0] == pytest.approx(1.1 + 8002 * 0.01 / 1.5e9, abs=1e-15)
-
-
-def test_commands_cannot_be_changed_from_outside() -> None:
-    bench = Bench()
-    command = bench.controller.update(bench.now_ns, bench.plant.measure())
-    for positions in (bench.controller.command, command):
-        with pytest.raises(ValueError, match="read-only"):
-            positions[0] = 9.0
-
-
 def test_cancel_returns_whether_the_goal_was_being_executed() -> None:
     bench = Bench()
     bench.send(goal(to(0.0, 2.1)), "A")

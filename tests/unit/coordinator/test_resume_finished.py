@@ -1,25 +1,29 @@
-"""Resuming a finished dataset with missing or damaged files makes it what it was."""
+"""Resuming a dataset with missing or damaged files makes it what it was; without simulating, it keeps what is whole."""
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from tests.unit.coordinator.listener import Listener
 from tests.unit.dataset.conftest import Collection
-from tests.unit.dataset.damage import flip
+from tests.unit.dataset.damage import find_stored, flip
 
 from throwcollect.coordinator.resume import has_all_trials, resume
+from throwcollect.coordinator.salvage import finish_without_simulating
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text
+from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
 TRIALS = 4
 SHARD = "quick_00001.mcap"
+ALL = {*range(TRIALS)}
 
 
 class Trials:
@@ -35,18 +39,24 @@ class Trials:
         """Collect the missing trials; returns the trials that were kept."""
         kept: set[int] = set()
         writer = DatasetWriter.open(directory)
-        writer.recover(lambda trial, _: kept.add(trial))
-        for trial in sorted({*range(TRIALS)} - kept):
+        writer.recover(lambda trial, _: kept.add(trial) is None)
+        for trial in sorted(ALL - kept):
             writer.append(self.episodes[trial], self.results[trial])
         writer.finish(wall_s=1.0)
         writer.close()
         return kept
 
-    def go_on(self, directory: Path, *, check: bool = False) -> tuple[set[int] | None, list[str]]:
+    def go_on(self, directory: Path) -> tuple[set[int] | None, list[str]]:
         """Resume; returns the trials that were kept, or None if there was nothing to do, and the warnings."""
         told = Listener()
-        plan = resume(self.plan.config, directory, sweep_directory=directory, check=check, onlooker=told)
+        plan = resume(self.plan.config, directory, sweep_directory=directory, onlooker=told)
         return None if has_all_trials(directory, plan) else self.run(directory), told.warnings
+
+    def finish(self, directory: Path) -> dict[int, str | None]:
+        """Finish without simulating; returns the reasons of the trials that are lost."""
+        finish_without_simulating(self.plan.config, directory, sweep_directory=directory)
+        rows = pq.read_table(directory / "throws.parquet").to_pylist()
+        return {row["trial"]: row["reason"] for row in rows if row["outcome"] == "lost"}
 
 
 @pytest.fixture(scope="module")
@@ -63,24 +73,12 @@ def sound(trials: Trials, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def promised(sound: Path, tmp_path: Path) -> Path:
-    """A dataset with a manifest."""
-    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
-    entries = [entry_of_file(directory / name) for name in list_promised_names(directory)]
-    (directory / "datapackage.json").write_text(manifest_text("quick", entries))
-    return directory
-
-
-@pytest.fixture(params=["manifest", "no manifest"])
-def dataset(request: pytest.FixtureRequest, promised: Path) -> Path:
-    """A dataset with or, as earlier versions wrote it, without a manifest."""
-    if request.param == "no manifest":
-        (promised / "datapackage.json").unlink()
-    return promised
+def dataset(sound: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(sound, tmp_path / "dataset"))
 
 
 def contents(directory: Path) -> dict[str, bytes]:
-    others = ("README.md", "provenance.json", "datapackage.json")
+    others = ("README.md", "provenance.json")
     return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file() and path.name not in others}
 
 
@@ -88,71 +86,144 @@ def delete(path: Path) -> None:
     path.unlink()
 
 
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
 def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
+
+
+def extend(path: Path) -> None:
+    path.write_bytes(path.read_bytes() + b"\0")
 
 
 def flip_bit(path: Path) -> None:
     flip(path, path.stat().st_size * 2 // 3)
 
 
-def test_resuming_a_finished_dataset_changes_no_file(trials: Trials, dataset: Path) -> None:
-    before = {path: path.stat().st_mtime_ns for path in dataset.rglob("*")}
-    assert trials.go_on(dataset) == (None, [])
-    assert trials.go_on(dataset, check=True) == (None, [])
-    assert {path: path.stat().st_mtime_ns for path in dataset.rglob("*")} == before
+def flip_early(path: Path) -> None:
+    flip(path, path.stat().st_size // 10)
 
 
-def test_resume_keeps_a_configuration_of_an_earlier_version(trials: Trials, promised: Path) -> None:
-    """The configuration lacks keys that were added later, and the manifest has its size and hash."""
-    path = promised / "config.yaml"
-    earlier = path.read_text()[: path.read_text().index("cluster:")]
-    path.write_text(earlier)
-    entries = [entry_of_file(promised / name) for name in list_promised_names(promised)]
-    (promised / "datapackage.json").write_text(manifest_text("quick", entries))
-    assert trials.go_on(promised) == (None, [])
-    assert path.read_text() == earlier
+def flip_end(path: Path) -> None:
+    flip(path, path.stat().st_size - 10)
 
 
-@pytest.mark.parametrize(
-    ("damage", "check", "kept"),
-    [(delete, False, {0, 1}), (cut, False, {0, 1, 2, 3}), (flip_bit, True, {0, 1, 2})],
-)
-def test_resume_restores_the_bytes_of_a_damaged_recording(
-    trials: Trials, sound: Path, dataset: Path, damage: Callable[[Path], None], check: bool, kept: set[int]
+def flip_latched(path: Path) -> None:
+    flip(path, 6000)
+
+
+def flip_index(path: Path) -> None:
+    """Flip a bit in the message index of an episode, whose samples stay whole."""
+    flip(path, find_stored(path, 3).chunks[0].indexes[4].offset + 100)
+
+
+def swap(path: Path) -> None:
+    other = path.with_name("quick_00000.mcap")
+    one, two = path.read_bytes(), other.read_bytes()
+    path.write_bytes(two)
+    other.write_bytes(one)
+
+
+def rename_to_part(path: Path) -> None:
+    path.rename(path.with_name(f"{path.name}.part"))
+
+
+WAYS = (delete, empty, cut, extend, flip_bit, flip_early, flip_end)
+TABLES = ("throws.parquet", "plan.parquet", "datapackage.json", "metadata.yaml")
+DAMAGE = [
+    *((name, way, ALL) for name in TABLES for way in WAYS),
+    (SHARD, delete, {0, 1}),
+    (SHARD, empty, {0, 1}),
+    (SHARD, cut, ALL),
+    (SHARD, extend, ALL),
+    (SHARD, flip_bit, {0, 1, 2}),
+    (SHARD, flip_latched, ALL),
+    (SHARD, flip_end, ALL),
+    (SHARD, flip_index, ALL),
+    (SHARD, swap, set()),
+    (SHARD, rename_to_part, ALL),
+    ("README.md", delete, ALL),
+    ("provenance.json", delete, ALL),
+]
+NAMES = [f"{name}: {way.__name__}" for name, way, _ in DAMAGE]
+
+
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize(("name", "damage", "whole"), DAMAGE, ids=NAMES)
+def test_resume_restores_the_bytes_of_a_damaged_dataset_and_keeps_whole_episodes(
+    trials: Trials,
+    sound: Path,
+    dataset: Path,
+    name: str,
+    damage: Callable[[Path], None],
+    whole: set[int],
+    finished: bool,
 ) -> None:
-    damage(dataset / SHARD)
-    found, said = trials.go_on(dataset, check=check)
-    assert found == kept
-    assert said
-    assert all(line.startswith(f"{dataset}: {SHARD}: ") for line in said)
+    damage(dataset / name)
+    if not finished:
+        for each in ("metadata.yaml", "datapackage.json"):
+            (dataset / each).unlink(missing_ok=True)
+    kept, said = trials.go_on(dataset)
+    assert kept == whole
+    # A dataset without metadata.yaml is not finished, and a changed manifest names the files that it is wrong about.
+    if finished and name not in ("metadata.yaml", "datapackage.json"):
+        assert f"{dataset}: {name}: " in "".join(said)
+    assert contents(dataset) == contents(sound)
+    assert verify(dataset) == []
+
+
+@pytest.mark.parametrize(("name", "damage", "whole"), DAMAGE, ids=NAMES)
+def test_finishing_without_simulating_keeps_whole_episodes_and_gives_up_the_others(
+    trials: Trials, sound: Path, dataset: Path, name: str, damage: Callable[[Path], None], whole: set[int]
+) -> None:
+    provenance = (dataset / "provenance.json").read_bytes()
+    damage(dataset / name)
+    assert trials.finish(dataset) == dict.fromkeys(ALL - whole, "no whole episode of it was left")
+    assert verify(dataset) == []
+    assert name == "provenance.json" or (dataset / "provenance.json").read_bytes() == provenance
+    if whole == ALL:
+        assert contents(dataset) == contents(sound)
+    assert trials.go_on(dataset)[0] == (None if whole == ALL else whole)
     assert contents(dataset) == contents(sound)
 
 
-@pytest.mark.parametrize("name", ["throws.parquet", "plan.parquet"])
-def test_resume_with_check_writes_damaged_tables_again(trials: Trials, sound: Path, promised: Path, name: str) -> None:
-    flip_bit(promised / name)
-    assert trials.go_on(promised, check=True)[0] == {*range(TRIALS)}
-    assert contents(promised) == contents(sound)
+def test_finishing_without_simulating_takes_results_from_the_table(
+    trials: Trials, dataset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (dataset / SHARD).unlink()
+    monkeypatch.setattr("throwcollect.coordinator.salvage.judge_episode", lambda *_: pytest.fail("is judged again"))
+    assert trials.finish(dataset).keys() == {2, 3}
 
 
-def test_resume_restores_a_dataset_whose_manifest_is_damaged(trials: Trials, sound: Path, promised: Path) -> None:
-    (promised / "datapackage.json").write_text("{}")
-    assert trials.go_on(promised)[0] == {*range(TRIALS)}
-    assert contents(promised) == contents(sound)
+def test_finishing_without_simulating_keeps_the_reasons_of_trials_that_were_lost(
+    trials: Trials, tmp_path: Path
+) -> None:
+    directory = trials.collection.collect(tmp_path / "dataset", lost=[2])
+    (directory / "quick_00000.mcap").unlink()
+    none = "no whole episode of it was left"
+    assert trials.finish(directory) == {0: none, 1: none, 2: "two simulations were lost"}
 
 
-def test_resume_without_a_file_that_cannot_be_made_again_is_an_error(trials: Trials, promised: Path) -> None:
-    dataset = promised
-    entries = [entry_of_file(dataset / name) for name in list_promised_names(dataset)]
-    (dataset / "sources.parquet").write_bytes(b"from there")
-    entries.append(entry_of_file(dataset / "sources.parquet"))
-    (dataset / "datapackage.json").write_text(manifest_text("quick", entries))
-    (dataset / "sources.parquet").unlink()
-    before = contents(dataset)
-    with pytest.raises(DatasetError, match=r"sources\.parquet: is missing or damaged, and nothing else says"):
-        trials.go_on(dataset)
-    assert contents(dataset) == before
+@pytest.mark.parametrize("finish", [False, True])
+def test_resuming_a_finished_dataset_changes_no_file(trials: Trials, dataset: Path, finish: bool) -> None:
+    before = {path: path.stat().st_mtime_ns for path in dataset.rglob("*")}
+    if finish:
+        assert trials.finish(dataset) == {}
+    else:
+        assert trials.go_on(dataset) == (None, [])
+    assert {path: path.stat().st_mtime_ns for path in dataset.rglob("*")} == before
+
+
+@pytest.mark.parametrize("damage", WAYS)
+def test_a_damaged_configuration_is_an_error_or_is_restored(
+    trials: Trials, sound: Path, dataset: Path, damage: Callable[[Path], None]
+) -> None:
+    """`trials.go_on` gives the configuration of the dataset, as `up CONFIG --resume` does."""
+    damage(dataset / "config.yaml")
+    assert trials.go_on(dataset)[0] == ALL
+    assert contents(dataset) == contents(sound)
 
 
 def test_resume_refuses_a_dataset_whose_configuration_was_changed(trials: Trials, dataset: Path) -> None:
@@ -160,6 +231,24 @@ def test_resume_refuses_a_dataset_whose_configuration_was_changed(trials: Trials
     (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
     before = contents(dataset)
     other = trials.plan.config.model_copy(update={"seed": 1})
-    with pytest.raises(DatasetError, match=r"one of the two was changed, and nothing says which"):
+    with pytest.raises(DatasetError, match="the plan belongs to another configuration"):
         resume(other, dataset, sweep_directory=dataset)
     assert contents(dataset) == before
+
+
+@pytest.mark.parametrize(("name", "lost"), [("plan.parquet", []), ("throws.parquet", []), ("quick_00001.mcap", [3])])
+def test_finishing_without_simulating_ends_a_dataset_with_until_where_it_ended(
+    tmp_path: Path, name: str, lost: list[int]
+) -> None:
+    collection, directory = Collection({"until": {"landed": 4}}), tmp_path / "dataset"
+    create(directory, collection.plan)
+    with closing(DatasetWriter.open(directory)) as writer:
+        collection.fill(writer, range(4))
+        writer.end_with(3)
+        writer.finish()
+    before = contents(directory)
+    (directory / name).unlink()
+    finish_without_simulating(collection.config, directory, sweep_directory=directory)
+    rows = pq.read_table(directory / "throws.parquet").to_pylist()
+    assert [row["outcome"] for row in rows] == ["lost" if number in lost else "landed" for number in range(4)]
+    assert lost or contents(directory) == before

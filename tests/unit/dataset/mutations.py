@@ -21,15 +21,15 @@ from typing import Any, NamedTuple
 
 from hypothesis import strategies as st
 
+from throwcollect.config.loader import load
+from throwcollect.coordinator.salvage import finish_without_simulating
+from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text, read_named_manifest
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.rebuild import rebuild
-from throwcollect.dataset.repair import repair
 from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.verify import verify
-from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.sweep.plan import Plan
+from throwcollect.errors import ThrowcollectError
 
 KINDS = ("flip", "delete", "repeat", "insert", "cut", "length 32", "length 64", "copy", "zero")
 LENGTHS = (0, 1, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1)
@@ -89,8 +89,9 @@ def fit_manifest(directory: Path) -> None:
     (directory / "datapackage.json").write_text(manifest_text(name, map(entry_of_file, files)))
 
 
-def no_plan(config: object) -> Plan:
-    raise ConfigError("a plan is not drawn here")
+def finish(directory: Path) -> None:
+    """Finish a dataset with what is whole."""
+    finish_without_simulating(load(config_path(directory)), directory, sweep_directory=directory)
 
 
 def use(directory: Path) -> None:
@@ -100,14 +101,13 @@ def use(directory: Path) -> None:
         episode.check_records()
 
 
-def outcomes(directory: Path, scratch: Path, name: str) -> list[Callable[[], Any]]:
+def outcomes(directory: Path, name: str) -> list[Callable[[], Any]]:
     """All functions that read a dataset, to be called when this file of it is damaged."""
     calls: list[Callable[[], Any]] = [
         lambda: verify(directory),
         lambda: use(directory),
         lambda: (info(directory), digest(directory)),
-        lambda: repair(directory, scratch / "repaired", remake=no_plan),
-        lambda: rebuild(directory),
+        lambda: finish(directory),
     ]
     return [lambda: list(scan_whole(directory / name)), *calls] if name.endswith(".mcap") else calls
 
@@ -140,7 +140,7 @@ def main(count: int, seed: int) -> int:
             name, mutations = source.choice(names), draw_mutations(source)
             directory = Path(shutil.copytree(original, Path(scratch) / "damaged"))
             (directory / name).write_bytes(mutate((original / name).read_bytes(), mutations))
-            for call in outcomes(directory, Path(scratch), name):
+            for call in outcomes(directory, name):
                 signal.alarm(60)
                 try:
                     call()
@@ -151,7 +151,6 @@ def main(count: int, seed: int) -> int:
                     print(f"{number}: {name}: {mutations}", traceback.format_exc(), sep="\n", flush=True)
                 signal.alarm(0)
             shutil.rmtree(directory)
-            shutil.rmtree(Path(scratch) / "repaired", ignore_errors=True)
     print(f"{count} damages, {bad} bad ends, {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024} MB")
     return bad
 

@@ -36,7 +36,7 @@ def invent_loss(directory: Path) -> None:
 
 
 def change_swept_value(directory: Path) -> None:
-    change_table(directory / "throws.parquet", "task.duration_s", 6, 0.9)
+    change_table(directory / "throws.parquet", "task_duration_s", 6, 0.9)
 
 
 def refuse_row(directory: Path) -> None:
@@ -168,7 +168,7 @@ def change_bag_file_count(directory: Path) -> None:
 
 
 def change_bag_format(directory: Path) -> None:
-    replace_text(directory / "metadata.yaml", "throwcollect.format: '1'", "throwcollect.format: '7'")
+    replace_text(directory / "metadata.yaml", "throwcollect.format: '2'", "throwcollect.format: '7'")
 
 
 def add_bag_key(directory: Path) -> None:
@@ -187,7 +187,7 @@ def change_bag_file_number_type(directory: Path) -> None:
 
 def change_unit(directory: Path) -> None:
     table = pq.read_table(directory / "throws.parquet")
-    index = table.schema.get_field_index("task.duration_s")
+    index = table.schema.get_field_index("task_duration_s")
     field = table.schema.field(index)
     other = field.with_metadata({**field.metadata, b"unit": b"ms"})
     pq.write_table(table.set_column(index, other, table.column(index)), directory / "throws.parquet")
@@ -210,7 +210,7 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_row_offset: (SHARD, "trial 4", "chunk_offset = 17"),
     lose_row: (SHARD, "trial 4", "does not place here"),
     invent_loss: ("throws.parquet", "trial 4", "is lost with shard"),
-    change_swept_value: ("throws.parquet", "trial 6", r"task\.duration_s = 0\.9, the plan"),
+    change_swept_value: ("throws.parquet", "trial 6", r"task_duration_s = 0\.9, the plan"),
     refuse_row: ("throws.parquet", "trial 6", "nothing against it"),
     remove_row: ("throws.parquet", "trial 6", "has no row"),
     change_seed: ("config.yaml", "", "not the configuration that plan.parquet was made for"),
@@ -242,7 +242,7 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_bag_file_count: ("metadata.yaml", "files", "the files give"),
     change_bag_format: ("metadata.yaml", "throwcollect.format", "is '7'"),
     add_bag_key: ("metadata.yaml", "", "unknown keys: .*colour"),
-    change_unit: ("throws.parquet", "task.duration_s", "has the unit b'ms', should be 's'"),
+    change_unit: ("throws.parquet", "task_duration_s", "has the unit b'ms', should be b's'"),
     nudge_landing: ("quick_00000.mcap", "trial 2", "throws.parquet has landing_x_m"),
     add_bag_section: ("metadata.yaml", "", "unknown sections: .*colours"),
     change_bag_number_type: ("metadata.yaml", "version", "is 9.0, the files give 9"),

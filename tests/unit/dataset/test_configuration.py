@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,6 @@ from throwcollect.config.loader import load
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import info
-from throwcollect.dataset.rebuild import rebuild
-from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError, Problem
@@ -43,7 +40,7 @@ def spoil(path: Path) -> None:
     path.write_text(path.read_text().replace("trials: ", "trails: "))
 
 
-@pytest.mark.parametrize("look", [throwcollect.load, info, rebuild, prepare_to_resume])
+@pytest.mark.parametrize("look", [throwcollect.load, info, prepare_to_resume])
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
@@ -84,7 +81,7 @@ def test_an_unfinished_dataset_without_its_configuration_is_an_error(collection:
 def test_resuming_a_directory_of_recordings_alone_asks_for_the_configuration(dataset: Path, tmp_path: Path) -> None:
     for name in ("config.yaml", "plan.parquet", "metadata.yaml"):
         (dataset / name).unlink()
-    with pytest.raises(DatasetError, match=r"config\.yaml: no such file\n  try: copy the configuration .* to "):
+    with pytest.raises(DatasetError, match=r"config\.yaml: no such file\n  try: throwcollect up CONFIG --resume"):
         prepare_to_resume(dataset)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").touch()
@@ -99,13 +96,7 @@ def test_a_bag_of_another_program_is_no_dataset(storage: StoragePlugin, tmp_path
     with Writer(path, version=9, storage_plugin=storage) as writer:
         connection = writer.add_connection("/chatter", text.__msgtype__, typestore=store)
         writer.write(connection, 0, store.serialize_cdr(text(data="hello"), text.__msgtype__))
-    for look in (
-        info,
-        verify,
-        throwcollect.load,
-        rebuild,
-        partial(repair, output=tmp_path / "new", remake=lambda _: []),
-    ):
+    for look in (info, verify, throwcollect.load):
         with pytest.raises(DatasetError, match=f"^{path}: is a rosbag2 bag, but not of throwcollect$"):
             look(path)
     with pytest.raises(ConfigError, match=f"^{path}: is a rosbag2 bag, but not of throwcollect\n"):
@@ -119,7 +110,7 @@ def test_a_dataset_with_pointers_of_git_lfs_is_refused_as_it_is(dataset: Path) -
     for path in (dataset / "plan.parquet", *dataset.glob("*.mcap")):
         path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0123\nsize 12345\n")
     before = {path: path.read_bytes() for path in dataset.iterdir() if path.is_file()}
-    for look in (info, verify, throwcollect.load, rebuild, prepare_to_resume):
+    for look in (info, verify, throwcollect.load, prepare_to_resume):
         with pytest.raises(
             DatasetError, match=r"/dataset/\S+: a Git LFS pointer is in its place\n  try: git lfs pull$"
         ):
@@ -139,11 +130,4 @@ def test_a_configuration_that_needs_a_missing_package_is_not_damaged(
 
     monkeypatch.setattr(configuration, "load", refuse)
     with pytest.raises(ConfigError, match="no package brings it"):
-        info(dataset)
-
-
-def test_a_derived_dataset_without_its_configuration_must_be_derived_again(dataset: Path) -> None:
-    (dataset / "config.yaml").unlink()
-    (dataset / "sources.parquet").touch()
-    with pytest.raises(DatasetError, match=r"no such file\n  try: derive the dataset again"):
         info(dataset)

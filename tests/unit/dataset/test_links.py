@@ -11,11 +11,9 @@ from pathlib import Path
 
 import pytest
 from tests.unit.dataset.conftest import Collection
-from tests.unit.dataset.mutations import SETTINGS, no_plan
+from tests.unit.dataset.mutations import SETTINGS, finish
 
 from throwcollect.coordinator.resume import resume
-from throwcollect.dataset.rebuild import rebuild
-from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import filter_trials
@@ -24,7 +22,6 @@ from throwcollect.errors import DatasetError, ThrowcollectError
 BEGUN = "quick_00001.mcap.part"
 UNFINISHED = (
     "config.yaml.new",
-    "plan.parquet.part",
     "plan.parquet.new",
     "throws.parquet.new",
     "metadata.yaml.new",
@@ -50,9 +47,7 @@ def go_on(directory: Path, source: Collection) -> None:
     writer = DatasetWriter.open(directory)
     try:
         there: list[int] = []
-        writer.recover(lambda trial, _: there.append(trial))
-        writer.extend(writer.plan.trials[len(source.plan.trials) :])
-        writer.close_plan()
+        writer.recover(lambda trial, _: there.append(trial) is None)
         source.fill(writer, [trial for trial in range(len(source.plan.trials)) if trial not in there])
         writer.finish(wall_s=1.0)
     finally:
@@ -61,8 +56,7 @@ def go_on(directory: Path, source: Collection) -> None:
 
 USES: dict[str, Callable[[Path, Collection, Path], object]] = {
     "resume": lambda directory, source, _: go_on(directory, source),
-    "rebuild": lambda directory, _source, _: rebuild(directory),
-    "repair": lambda directory, _source, output: repair(directory, output, remake=no_plan),
+    "finish": lambda directory, _source, _: finish(directory),
     "filter": lambda directory, _source, output: filter_trials(directory, output, where="outcome == 'landed'"),
     "verify": lambda directory, _source, _: verify(directory),
 }
@@ -105,18 +99,16 @@ def test_links_in_the_place_of_temporary_files_are_not_followed(
         assert verify(directory) == []
 
 
-@pytest.mark.parametrize(
-    ("use", "name"), [*(("resume", name) for name in REPLACED), *(("rebuild", name) for name in REPLACED[1:4])]
-)
+@pytest.mark.parametrize("name", REPLACED)
 def test_a_link_in_the_place_of_a_file_that_can_be_made_again_is_replaced(
-    source: Collection, sound: Path, tmp_path: Path, use: str, name: str
+    source: Collection, sound: Path, tmp_path: Path, name: str
 ) -> None:
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
     lead_out(directory, name, tmp_path / "outside")
     before = contents(tmp_path / "outside")
-    USES[use](directory, source, tmp_path / "output")
+    go_on(directory, source)
     assert contents(tmp_path / "outside") == before
-    assert use == "rebuild" or not (directory / name).is_symlink()
+    assert not (directory / name).is_symlink()
     assert name in ("README.md", "provenance.json") or (directory / name).read_bytes() == (sound / name).read_bytes()
 
 
@@ -124,7 +116,7 @@ def test_a_link_in_the_place_of_a_file_that_can_be_made_again_is_replaced(
     ("use", "name"),
     [
         *(("resume", name) for name in REFUSED),
-        *((use, name) for use in ("rebuild", "filter") for name in ("config.yaml", "plan.parquet", "quick_00000.mcap")),
+        *(("filter", name) for name in ("config.yaml", "plan.parquet", "quick_00000.mcap")),
     ],
 )
 def test_a_link_in_the_place_of_a_file_that_must_be_read_is_refused(

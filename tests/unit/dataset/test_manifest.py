@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
-from tests.unit.dataset.mutations import SETTINGS, no_plan
+from tests.unit.dataset.mutations import SETTINGS, finish
 
 from throwcollect.dataset.manifest import (
     RunningHash,
@@ -25,8 +25,6 @@ from throwcollect.dataset.manifest import (
     read_manifest,
 )
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.rebuild import rebuild
-from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.derive.selection import filter_trials
 from throwcollect.errors import DatasetError
@@ -103,31 +101,20 @@ def test_the_manifest_lists_the_promised_files_and_no_others(dataset: Path) -> N
     assert document["resources"][0]["hash"].startswith("sha256:")
 
 
-def test_filter_and_repair_write_the_manifest_of_their_output(dataset: Path, derived: Path, tmp_path: Path) -> None:
+def test_filter_writes_the_manifest_of_its_output(derived: Path) -> None:
     assert [entry.path for entry in read_manifest(derived)] == list_promised_names(derived)
     assert {"sources.parquet", "trials.parquet"} < set(list_promised_names(derived))
-    repair(dataset, tmp_path / "repaired", remake=no_plan)
-    assert (tmp_path / "repaired" / MANIFEST).read_bytes() == (dataset / MANIFEST).read_bytes()
 
 
-def test_a_missing_manifest_is_reported_and_rebuild_writes_it(dataset: Path) -> None:
+def test_a_missing_manifest_is_reported_and_resume_writes_it(dataset: Path) -> None:
     written = (dataset / MANIFEST).read_bytes()
     (dataset / MANIFEST).unlink()
     (finding,) = verify(dataset)
     assert finding.file == MANIFEST
-    assert f"throwcollect dataset rebuild {dataset}" in finding.problem
     with pytest.raises(DatasetError, match=f"{MANIFEST}: is missing"):
         read_manifest(dataset)
-    assert MANIFEST in rebuild(dataset).written
+    finish(dataset)
     assert (dataset / MANIFEST).read_bytes() == written
-
-
-def test_rebuild_leaves_foreign_files_out_of_the_manifest(dataset: Path) -> None:
-    written = (dataset / MANIFEST).read_bytes()
-    (dataset / "other.mcap").write_bytes(b"")
-    rebuild(dataset)
-    assert (dataset / MANIFEST).read_bytes() == written
-    assert {finding.file for finding in verify(dataset)} == {"other.mcap"}
 
 
 def find_resized(directory: Path) -> list[str]:

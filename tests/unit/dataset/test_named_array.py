@@ -32,7 +32,7 @@ def test_parameters_are_bounded_by_the_sweep(loaded: Dataset) -> None:
     assert parameters.names == ("task.duration_s",)
     assert parameters.bounds.tolist() == [[0.8, 1.2]]
     assert np.asarray(parameters).shape == parameters.values.shape == (7, 1)
-    assert parameters["task.duration_s"].tolist() == loaded.throws["task.duration_s"].to_pylist()
+    assert parameters["task.duration_s"].tolist() == loaded.throws["task_duration_s"].to_pylist()
     assert np.array_equal(loaded[2:4].parameters.values, parameters.values[2:4])
     assert np.array_equal(loaded[2:4].parameters.bounds, parameters.bounds)
 
@@ -92,30 +92,17 @@ def test_a_joint_is_found_by_its_name(loaded: Dataset) -> None:
     assert [joint.name for joint in joints] == list(joints.names)
     assert "torso_1_joint" in joints
     assert "arm_right_4" not in joints
-    with pytest.raises(KeyError, match=r"^no joint 'arm_right_4'; did you mean 'arm_right_4_joint'\?$"):
+    with pytest.raises(KeyError, match=r"no joint 'arm_right_4'; there are .*arm_right_4_joint"):
         joints["arm_right_4"]
 
 
-@pytest.mark.parametrize(
-    ("wrong", "near"), [("landing_x", "landing_x_m"), ("duration_s", "task.duration_s"), ("outcom", "outcome")]
-)
-def test_an_unknown_column_is_an_error_that_names_similar_ones(loaded: Dataset, wrong: str, near: str) -> None:
-    for look in (lambda: loaded[wrong], lambda: loaded[0][wrong]):
-        with pytest.raises(ConfigError, match=rf"^no column '{wrong}'; did you mean '{near}'\?$"):
-            look()
+def test_an_unknown_column_is_an_error_that_names_all(loaded: Dataset) -> None:
+    for look in (loaded.__getitem__, loaded[0].__getitem__, loaded.landings.__getitem__):
+        with pytest.raises(KeyError, match=r"no column 'landing_x'; there are .*landing_x_m"):
+            look("landing_x")
 
 
-def test_a_wrong_attribute_is_an_error_that_names_the_right_one(loaded: Dataset) -> None:
-    for wrong, meant in {"landing": "landings", "recorde": "recorded", "pandas": "to_pandas"}.items():
-        with pytest.raises(AttributeError, match=rf"^a Dataset has no '{wrong}'; did you mean '{meant}'\?$"):
-            getattr(loaded, wrong)
-    for wrong, meant in {"landing": "events.landing", "position": "ball.position", "outcom": "outcome"}.items():
-        with pytest.raises(AttributeError, match=f"^a Throw has no '{wrong}'; did you mean '{meant}'"):
-            getattr(loaded[0], wrong)
-    with pytest.raises(AttributeError, match=r"^a Dataset has no 'df'; docs/reading\.md lists all$"):
-        _ = loaded.df
-    with pytest.raises(AttributeError, match=r"^a Dataset has no '__nothing'$"):
-        getattr(loaded, "__nothing")
+def test_what_is_no_position_is_an_error_and_a_pickled_dataset_still_has_its_throws(loaded: Dataset) -> None:
     with pytest.raises(TypeError, match=r"the name of a column, not ndarray; see select\(\.\.\.\)"):
         loaded[np.arange(3)]
     with pytest.raises(TypeError):

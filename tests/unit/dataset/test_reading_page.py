@@ -33,7 +33,7 @@ def block_with(text: str) -> str:
 
 def test_the_first_example_of_the_page_on_reading_runs(collected: Path, tmp_path: Path) -> None:
     printed = run(block_with("throw.trial"), collected, tmp_path)
-    assert "task.duration_s: double" in printed
+    assert "task_duration_s: double" in printed
     assert re.search(r"^6 \(\d+, 32\) \[", printed, flags=re.MULTILINE)
 
 

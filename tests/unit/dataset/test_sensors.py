@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Callable
 from contextlib import closing
@@ -10,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 import zstandard
 from mcap import records
 from mcap.reader import make_reader
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.damage import find_stored, flip
-from tests.unit.dataset.mutations import fit_manifest, no_plan
+from tests.unit.dataset.mutations import finish, fit_manifest
 
 from rclzenoh.interfaces import deserialize, get_message, serialize
 from throwcollect.dataset.creation import create
@@ -25,9 +23,7 @@ from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.mcap_file import EPISODE
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import sample
@@ -121,33 +117,30 @@ def test_the_mcap_package_reads_the_images_of_a_sensor(dataset: Path) -> None:
     assert counts[topics[0]] > counts[topics[1]] > 0
 
 
-def test_a_dataset_with_sensors_has_no_findings_and_rebuild_keeps_it(dataset: Path) -> None:
+def test_a_dataset_with_sensors_has_no_findings(dataset: Path) -> None:
     assert verify(dataset) == []
-    before = {path.name: path.read_bytes() for path in dataset.iterdir()}
-    rebuild(dataset)
-    assert {path.name: path.read_bytes() for path in dataset.iterdir()} == before
 
 
 @pytest.mark.parametrize(("begin", "problem"), [(60, "chunk: "), (9 + 24, "CRC differs")])
-def test_a_damaged_sensor_chunk_is_found_and_loses_its_episode(
-    dataset: Path, tmp_path: Path, begin: int, problem: str
-) -> None:
+def test_a_damaged_sensor_chunk_is_found_and_loses_its_episode(dataset: Path, begin: int, problem: str) -> None:
     flip(dataset / SHARD, find_stored(dataset / SHARD, 4).chunks[1].record.offset + begin)
     fit_manifest(dataset)
     assert any((finding.place, problem in finding.problem) == ("trial 4", True) for finding in verify(dataset))
-    assert [lost.trial for lost in repair(dataset, tmp_path / "repaired", remake=no_plan).lost] == [4]
-    assert verify(tmp_path / "repaired") == []
+    (dataset / "metadata.yaml").unlink()
+    finish(dataset)
+    assert [row["trial"] for row in Dataset.open(dataset).throws.to_pylist() if row["outcome"] == "lost"] == [4]
+    assert verify(dataset) == []
 
 
-def test_repair_restores_damaged_indexes_of_a_sensor_chunk(dataset: Path, tmp_path: Path) -> None:
+def test_resume_restores_damaged_indexes_of_a_sensor_chunk(dataset: Path) -> None:
     whole = (dataset / SHARD).read_bytes()
     flip(dataset / SHARD, find_stored(dataset / SHARD, 4).chunks[1].indexes[CAMERA].offset + 30)
     fit_manifest(dataset)
     (finding,) = (finding for finding in verify(dataset) if finding.file == SHARD and finding.place == "trial 4")
     assert "message indexes" in finding.problem
     flip(dataset / SHARD, find_stored(dataset / SHARD, 4).chunks[1].indexes[CAMERA].offset + 1)
-    repaired = repair(dataset, tmp_path / "repaired", remake=no_plan)
-    assert (repaired.lost, (tmp_path / "repaired" / SHARD).read_bytes()) == ((), whole)
+    finish(dataset)
+    assert (dataset / SHARD).read_bytes() == whole
 
 
 def without_one(messages: list[records.Message]) -> None:
@@ -203,7 +196,7 @@ def test_a_killed_collection_with_sensors_resumes_to_the_same_files(dataset: Pat
     remove_unfinished(begun)
     with closing(DatasetWriter.open(begun)) as writer:
         kept: list[int] = []
-        writer.recover(lambda trial, _: kept.append(trial))
+        writer.recover(lambda trial, _: kept.append(trial) is None)
         assert kept == [0, 1, 4]
         collection.fill(writer, [6, 5, 3, 2])
         writer.finish()
@@ -211,17 +204,13 @@ def test_a_killed_collection_with_sensors_resumes_to_the_same_files(dataset: Pat
         assert (begun / path.name).read_bytes() == path.read_bytes()
 
 
-def test_a_derived_dataset_moves_sensor_messages_to_new_slots_of_time(dataset: Path, tmp_path: Path) -> None:
+def test_a_derived_dataset_has_the_sensor_messages_of_its_sources(dataset: Path, tmp_path: Path) -> None:
     sample(dataset, tmp_path / "some", count=3)
     assert verify(tmp_path / "some") == []
     some = Dataset.open(tmp_path / "some")
-    sources = pq.read_table(tmp_path / "some" / "sources.parquet")["source_trial"].to_pylist()
-    assert sources != [0, 1, 2]
-    for trial, source in enumerate(sources):
-        (moved,), (original,) = some.episode(trial).sensors, Dataset.open(dataset).episode(source).sensors
-        assert moved.messages.stamps_ns[0] == some.config.trial_start_ns(trial)
-        assert len(moved.messages) == len(original.messages)
-        assert hashlib.sha256(moved.contents).hexdigest() == moved.records_sha256 != original.records_sha256
+    for throw in some:
+        (copied,), (original,) = some.episode(throw.trial).sensors, Dataset.open(dataset).episode(throw.trial).sensors
+        assert copied.chunk == original.chunk
 
 
 def test_a_recording_without_sensors_has_no_metadata_of_sensors(

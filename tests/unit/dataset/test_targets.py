@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection, create_and_open
-from tests.unit.dataset.mutations import fit_manifest
+from tests.unit.dataset.mutations import finish, fit_manifest
 from tests.unit.dataset.targeted import LIST, WITHOUT_TARGETS, collect_targeted, plan_targeted
 
 from throwcollect.cli.dataset.info import describe
@@ -22,8 +22,6 @@ from throwcollect.config.target_columns import TargetColumn
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.misses import Misses
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.rebuild import rebuild
-from throwcollect.dataset.repair import repair
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
@@ -32,7 +30,6 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError
 from throwcollect.export.throw_source import ExportSource
 from throwcollect.sweep.parquet_file import encode_table
-from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.throw.throw_config import ThrowConfig
 
 
@@ -45,15 +42,11 @@ def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episode
     return samples, replace(header, end_reason="timeout", contacts=(replace(header.contacts[0], end_ns=None),))
 
 
-def no_plan(config: object) -> Plan:
-    raise AssertionError(config)
-
-
 def test_a_throw_has_its_target_and_its_miss_is_the_distance(targeted: Path) -> None:
     dataset = Dataset.open(targeted)
     assert dataset.plan.keys == ("task.duration_s",)
     names = dataset.throws.column_names
-    assert names[:5] == ["trial", "task.duration_s", "target_x_m", "target_y_m", "outcome"]
+    assert names[:5] == ["trial", "task_duration_s", "target_x_m", "target_y_m", "outcome"]
     assert [throw.target for throw in dataset] == [
         {"target_x_m": 1.4, "target_y_m": -0.1},
         {},
@@ -178,25 +171,17 @@ def test_a_damaged_plan_is_not_reported_as_a_wrong_digest(targeted: Path, tmp_pa
     assert not [each for each in verify(directory) if "digest" in each.place]
 
 
-def test_rebuilt_files_have_the_targets(targeted: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("damaged", ["plan.parquet", "trials.parquet", "throws.parquet", "metadata.yaml"])
+def test_a_mended_dataset_has_the_targets_and_the_list(targeted: Path, tmp_path: Path, damaged: str) -> None:
     directory = Path(shutil.copytree(targeted, tmp_path / "data"))
-    for name in ("throws.parquet", "metadata.yaml", "datapackage.json"):
-        (directory / name).unlink()
-    rebuild(directory)
-    for name in ("throws.parquet", "metadata.yaml", "datapackage.json"):
+    (directory / damaged).write_bytes(b"PAR1")
+    if damaged == "trials.parquet":
+        # Of a dataset that is not finished, too.
+        (directory / "metadata.yaml").unlink()
+    finish(directory)
+    assert verify(directory) == []
+    for name in ("throws.parquet", "plan.parquet", "trials.parquet", "metadata.yaml", "datapackage.json"):
         assert (directory / name).read_bytes() == (targeted / name).read_bytes(), name
-
-
-@pytest.mark.parametrize("damaged", ["", "plan.parquet", "trials.parquet"])
-def test_a_repaired_dataset_has_the_targets_and_the_list(targeted: Path, tmp_path: Path, damaged: str) -> None:
-    directory = Path(shutil.copytree(targeted, tmp_path / "data"))
-    if damaged:
-        (directory / damaged).write_bytes(b"PAR1")
-    repaired = repair(directory, tmp_path / "repaired", remake=no_plan)
-    assert [damaged in remark for remark in repaired.remarks] == ([True] if damaged else [])
-    assert verify(tmp_path / "repaired") == []
-    for name in ("throws.parquet", "plan.parquet", "trials.parquet", "metadata.yaml"):
-        assert (tmp_path / "repaired" / name).read_bytes() == (targeted / name).read_bytes(), name
 
 
 def test_a_resumed_collection_keeps_its_targets(targeted: Path, tmp_path: Path) -> None:

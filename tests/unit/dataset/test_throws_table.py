@@ -1,3 +1,4 @@
+import re
 from dataclasses import make_dataclass, replace
 from pathlib import Path
 
@@ -9,8 +10,6 @@ from tests.unit.dataset.conftest import Collection
 from throwcollect.config.schema import Config
 from throwcollect.dataset import throws_table
 from throwcollect.dataset.throws_table import EpisodePlace, RowsByTrial, ThrowsTable, read_throws
-from throwcollect.dataset.verify import verify
-from throwcollect.derive.selection import merge
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.tasks.result import Outcome
@@ -39,22 +38,30 @@ def test_results_read_back_equal_from_the_table_of_throws(collection: Collection
     assert outcomes == {ThrowOutcome.LANDED, ThrowOutcome.NOT_RELEASED, ThrowOutcome.TRACKING_FAILED}
 
 
-def test_the_column_of_a_swept_key_has_a_unit_and_an_alias_without_dots() -> None:
+def test_the_column_of_a_swept_key_needs_no_quotes_and_has_the_unit_of_the_key() -> None:
     swept = {
         "task.end.arm_right_4_joint": {"min": -0.7, "max": -0.4},
         "task.duration_s": {"min": 0.9, "max": 1.1},
         "ball.friction": {"min": 0.1, "max": 0.5},
+        "scene.gravity_mps2": {"min": 9.7, "max": 9.9},
     }
     collection = Collection({"sweep": {"sampler": "uniform", "parameters": swept}})
     schema = ThrowsTable.of(collection.plan).schema
-    told = {key: schema.field(key).metadata for key in swept}
-    assert [each[b"alias"].decode() for each in told.values()] == [
-        "task_end_arm_right_4_joint_rad",
-        "task_duration_s",
-        "ball_friction",
-    ]
-    assert [each[b"unit"].decode() for each in told.values()] == ["rad", "s", ""]
-    assert told["ball.friction"][b"description"] == b"Swept value of ball.friction [-]."
+    units = {name: schema.field(name).metadata[b"unit"].decode() for name in schema.names[1 : 1 + len(swept)]}
+    assert units == {
+        "task_end_arm_right_4_joint": "rad",
+        "task_duration_s": "s",
+        "ball_friction": "1",
+        "scene_gravity_mps2": "m/s^2",
+    }
+    assert schema.field("ball_friction").metadata[b"description"] == b"Swept value of ball.friction [-]."
+    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) for name in schema.names)
+
+
+def test_two_swept_keys_that_share_a_column_are_refused() -> None:
+    keys = ("task.end.upper_arm", "task.end.upper-arm")
+    with pytest.raises(ConfigError, match="have the same name: task_end_upper_arm"):
+        ThrowsTable(keys, Config())
 
 
 @pytest.mark.parametrize("column", ["digest", "trial", "landing_x_m"])
@@ -65,7 +72,7 @@ def test_a_task_with_a_result_named_like_another_column_is_refused(
         "Results", [(column, float, measured(Number("A number.")))], bases=(ThrowResult,), frozen=True
     )
     monkeypatch.setattr(ThrowTask, "results", results)
-    with pytest.raises(ConfigError, match=f"the task throw have columns of the same name as others .*: {column}"):
+    with pytest.raises(ConfigError, match=f"table of throws of the task throw have the same name: {column}"):
         ThrowsTable((), Config())
 
 
@@ -82,20 +89,11 @@ def test_a_task_that_lacks_a_required_outcome_is_refused(monkeypatch: pytest.Mon
         ThrowsTable((), Config())
 
 
-def test_a_table_of_throws_of_an_earlier_version_can_be_read_and_merged(collection: Collection, tmp_path: Path) -> None:
+def test_a_table_of_throws_without_one_of_its_columns_is_refused(collection: Collection, tmp_path: Path) -> None:
     directory = collection.collect(tmp_path / "dataset")
-    earlier = pq.read_table(directory / "throws.parquet").drop_columns(sorted(ThrowsTable.of(collection.plan).later))
+    table = pq.read_table(directory / "throws.parquet")
     (directory / "throws.parquet").unlink()
-    pq.write_table(earlier, directory / "throws.parquet")
-    (directory / "datapackage.json").unlink()
-    assert read_throws(directory, collection.plan).equals(earlier)
-    assert not [finding for finding in verify(directory) if finding.file not in ("datapackage.json",)]
-    merge([directory, collection.collect(tmp_path / "new")], tmp_path / "merged")
-    merged = pq.read_table(tmp_path / "merged" / "throws.parquet")
-    assert merged["release_spin_y_radps"].null_count == 0
-    assert not verify(tmp_path / "merged")
-
-    pq.write_table(earlier.drop_columns(["recontacts"]), directory / "throws.parquet")
+    pq.write_table(table.drop_columns(["recontacts"]), directory / "throws.parquet")
     with pytest.raises(DatasetError, match=r"not the table of this plan: differs in \['recontacts'\]"):
         read_throws(directory, collection.plan)
 

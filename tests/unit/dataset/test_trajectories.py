@@ -21,8 +21,10 @@ def loaded(collected: Path) -> Dataset:
 
 
 def column_of(throw: Any, name: str) -> np.ndarray:
-    owner, _, attribute = name.rpartition(".")
-    return getattr(getattr(throw, owner or "ball"), attribute)
+    if name in ("time_s", "stamps_ns"):
+        return getattr(throw.ball, name)
+    owner, _, attribute = name.partition("_")
+    return getattr(getattr(throw, owner), attribute)
 
 
 @pytest.mark.parametrize("threads", [None, 1, 3])
@@ -64,32 +66,32 @@ def test_large_arrays_of_trajectories_equal_small_ones(loaded: Dataset, monkeypa
 def test_trajectories_of_chosen_joints_hold_only_their_columns(loaded: Dataset) -> None:
     every = loaded.trajectories()
     for joints in (loaded.moving_joints, ("leg_left_1_joint",), ()):
-        some = loaded.trajectories(["joints.position", "joints.effort", "ball.position"], joints=joints)
+        some = loaded.trajectories(["joints_position", "joints_effort", "ball_position"], joints=joints)
         assert some.joints == joints
         indexes = [TALOS.joints.index(joint) for joint in joints]
-        for name in ("joints.position", "joints.effort"):
+        for name in ("joints_position", "joints_effort"):
             assert np.array_equal(some[name], every[name][:, indexes])
-        assert np.array_equal(some["ball.position"], every["ball.position"])
+        assert np.array_equal(some["ball_position"], every["ball_position"])
     assert set(loaded.moving_joints) == {"torso_1_joint", *(f"arm_right_{n}_joint" for n in (1, 2, 4, 7))}
 
 
 def test_trajectories_of_trials_without_an_episode_have_no_samples(collection: Any, tmp_path: Path) -> None:
     collection.refuse(0, "too fast")
     dataset = throwcollect.load(collection.collect(tmp_path / "dataset", range(1, 7), lost=[6]))
-    found = dataset.trajectories(["ball.position", "stamps_ns"])
+    found = dataset.trajectories(["ball_position", "stamps_ns"])
     assert (found.lengths > 0).tolist() == [False, *[True] * 5, False]
-    assert np.array_equal(found[3]["ball.position"], dataset[3].ball.position)
-    assert found[0]["ball.position"].shape == (0, 3)
+    assert np.array_equal(found[3]["ball_position"], dataset[3].ball.position)
+    assert found[0]["ball_position"].shape == (0, 3)
     nothing = dataset.select([6, 0]).trajectories()
-    assert nothing["joints.position"].shape == (0, 32)
-    assert nothing.padded("ball.position").shape == (2, 0, 3)
+    assert nothing["joints_position"].shape == (0, 32)
+    assert nothing.padded("ball_position").shape == (2, 0, 3)
     assert len(dataset.select([]).trajectories()) == 0
 
 
 def test_padded_trajectories_have_one_shape(loaded: Dataset) -> None:
-    found = loaded.trajectories(["time_s", "ball.position"])
+    found = loaded.trajectories(["time_s", "ball_position"])
     assert len(set(found.lengths)) > 1
-    for name, rest in (("time_s", ()), ("ball.position", (3,))):
+    for name, rest in (("time_s", ()), ("ball_position", (3,))):
         padded = found.padded(name)
         assert padded.shape == (7, found.lengths.max(), *rest)
         for one, row, length in zip(found, padded, found.lengths, strict=True):
@@ -99,25 +101,21 @@ def test_padded_trajectories_have_one_shape(loaded: Dataset) -> None:
 
 
 def test_the_repr_of_trajectories_names_their_size_and_columns(loaded: Dataset) -> None:
-    found = loaded.trajectories(["time_s", "ball.position"])
+    found = loaded.trajectories(["time_s", "ball_position"])
     samples = sum(loaded.throws["samples"].to_pylist())
     size = samples * (8 + 3 * 8) / 1e6
-    assert repr(found) == f"Trajectories(7 throws, {samples} samples, {size:.1f} MB: time_s, ball.position)"
+    assert repr(found) == f"Trajectories(7 throws, {samples} samples, {size:.1f} MB: time_s, ball_position)"
 
 
 def test_unknown_columns_joints_and_positions_of_trajectories_are_errors(loaded: Dataset) -> None:
-    with pytest.raises(ConfigError, match=r"no column 'ball\.colour'"):
-        loaded.trajectories(["ball.colour"])
+    with pytest.raises(ConfigError, match=r"no column 'ball_colour'"):
+        loaded.trajectories(["ball_colour"])
     with pytest.raises(ConfigError, match="Talos has no joint 'elbow'"):
         loaded.trajectories(joints=["elbow"])
     found = loaded.trajectories(["time_s"])
     for look in (found.__getitem__, found.padded):
-        with pytest.raises(KeyError) as raised:
+        with pytest.raises(KeyError, match="no column 'stamps_ns'; there are time_s"):
             look("stamps_ns")
-        assert isinstance(raised.value, ConfigError)
-        assert str(raised.value) == "no column 'stamps_ns'; known: time_s"
-    with pytest.raises(ConfigError, match=r"^no column \['time_s'\]; known: time_s"):
-        found.padded(["time_s"])
     assert "time_s" in found
     assert "stamps_ns" not in found
     for outside in (7, -8):

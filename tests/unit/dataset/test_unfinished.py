@@ -10,7 +10,7 @@ import pytest
 
 import throwcollect
 from throwcollect import progress_log
-from throwcollect.dataset import recovery, unfinished
+from throwcollect.dataset import reader, recovery
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.verify import verify
@@ -111,7 +111,7 @@ def test_a_shard_that_finishes_while_the_dataset_is_loaded_is_included(
                 collection.fill(writer, [waiting.pop()])
             return recovery.find_episodes(path, *arguments)
 
-        monkeypatch.setattr(unfinished, "find_episodes", find_episodes)
+        monkeypatch.setattr(reader, "find_episodes", find_episodes)
         with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 3 of 7 trials"):
             dataset = throwcollect.load(tmp_path / "dataset")
         assert all(len(throw.ball) for throw in dataset)

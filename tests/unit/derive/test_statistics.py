@@ -57,7 +57,7 @@ def test_statistics_of_columns_leave_out_empty_cells(collection: Collection, tmp
     assert column.mean == pytest.approx(np.mean(landings))
     assert column.std == pytest.approx(np.std(landings))
     assert column.quantiles["q50"] == np.median(landings)
-    assert found.columns["task.duration_s"].count == 7
+    assert found.columns["task_duration_s"].count == 7
     assert not {"trial", "chunk_offset", "outcome", "digest"} & set(found.columns)
 
 

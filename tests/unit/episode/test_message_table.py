@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from mcap.records import Message
 
@@ -36,16 +35,6 @@ def test_messages_of_different_sizes_are_listed_one_after_the_other(contents: by
     assert messages.stamps_ns.tolist() == messages.headers["log_time"].tolist() == [5, 1_000_000_000, 1_999_999_999]
     assert messages.headers["sequence"].tolist() == [0, 0, 1]
     assert [count_indexed(messages.message_index(channel)) for channel in messages.channels] == [2, 1]
-
-
-def test_moving_messages_changes_only_their_times_and_stamps(contents: bytes) -> None:
-    moved = bytearray(contents)
-    MessageList(moved).move(LATE_NS)
-    after, before = MessageList(moved), MessageList(contents)
-    assert np.array_equal(after.stamps_ns, before.stamps_ns + LATE_NS)
-    assert np.array_equal(after.headers["publish_time"], before.headers["log_time"] + LATE_NS)
-    MessageList(moved).move(-LATE_NS)
-    assert moved == contents
 
 
 def test_bytes_that_are_no_messages_with_a_header_are_refused(contents: bytes) -> None:

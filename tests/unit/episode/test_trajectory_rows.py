@@ -24,11 +24,11 @@ def test_the_columns_of_a_trajectory_hold_the_recorded_samples(contents: bytes, 
     samples = make_samples(20)
     rows = trajectory_rows(contents, 20, TALOS.joints)
     for name, expected in {
-        "joints.position": samples.position,
-        "joints.velocity": samples.velocity,
-        "joints.effort": samples.effort,
-        "ball.position": samples.ball_position,
-        "ball.orientation_xyzw": samples.ball_orientation_xyzw,
+        "joints_position": samples.position,
+        "joints_velocity": samples.velocity,
+        "joints_effort": samples.effort,
+        "ball_position": samples.ball_position,
+        "ball_orientation_xyzw": samples.ball_orientation_xyzw,
     }.items():
         assert rows[name].tobytes() == expected.tobytes()
         assert column_shapes(20, 32)[name] == expected.shape

@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from tests.unit.dataset.conftest import Collection
 
+from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.fitting import fit_throws
 from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap
@@ -72,8 +73,10 @@ def make_dataset(directory: Path, count: int) -> Dataset:
     found = Dataset.open(Collection({"sweep": {"sampler": "uniform", "parameters": sweep}}).collect(directory))
     values = draw(count)
     drag = np.random.default_rng(1).random(count)
-    columns = dict(zip(KEYS, values.T, strict=True)) | dict(zip(TARGETS, land(values, drag).T, strict=True))
-    columns |= {DRAG.key: drag, "trial": np.arange(count), "outcome": ["landed"] * count}
+    columns = dict(zip(map(column_of, KEYS), values.T, strict=True)) | dict(
+        zip(TARGETS, land(values, drag).T, strict=True)
+    )
+    columns |= {column_of(DRAG.key): drag, "trial": np.arange(count), "outcome": ["landed"] * count}
     throws = pa.concat_tables([found.throws.slice(0, 1)] * count)
     for name, column in (columns | {"effort_peak_share": effort(values)}).items():
         field = throws.schema.field(name)

@@ -56,7 +56,7 @@ def test_deviations_are_those_of_the_rows_of_both_engines(dataset: Path) -> None
     with Simulator(dataset / "config.yaml", overrides=["sim.engine=ballistic"]) as simulator:
         for each in found:
             row = stored[each.trial]
-            again = simulator.throw({"task.duration_s": row["task.duration_s"]})
+            again = simulator.throw({"task.duration_s": row["task_duration_s"]})
             assert (each.stored, each.again) == (row["outcome"], again.outcome)
             for column in ("release_speed_mps", "flight_time_s", "landing_x_m"):
                 assert each.values[column] == pytest.approx(again.row[column] - row[column], abs=1e-12)

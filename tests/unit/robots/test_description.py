@@ -1,5 +1,4 @@
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.errors import ConfigError
-from throwcollect.robots import description
 from throwcollect.robots.description import (
     full_description,
     joint_model,
@@ -73,15 +71,6 @@ def test_descriptions_with_different_tools_differ():
     assert [full_description(config) for config in configs] == described
 
 
-def test_making_a_description_does_not_change_the_cached_source():
-    source, model = TALOS.xml, joint_model(TALOS)
-    before = ElementTree.tostring(source), model.copy()
-    config = Config.model_validate({"robot": {"locked": ["arm_left_1_joint"]}, "tool": {"handle_length_m": 0.23}})
-    physics_description(config)
-    full_description(config)
-    assert (ElementTree.tostring(source), model) == before
-
-
 def test_by_default_joints_that_the_task_does_not_move_are_locked():
     made = physics_description(CONFIG)
     assert made.moving == tuple(joint for joint in JOINTS if joint in MOVED)
@@ -108,16 +97,6 @@ def test_the_start_of_a_joint_comes_from_the_task_else_posture_else_rest():
     assert posture["head_1_joint"] == 0.3
     assert posture["leg_left_4_joint"] == TALOS.rest_posture["leg_left_4_joint"] != 0
     assert tuple(posture) == JOINTS
-
-
-@pytest.mark.parametrize("text", ["<robot", "<robot name='talos'><link name='base_link'/></robot>"])
-def test_a_robot_description_that_cannot_be_used_is_named(text, tmp_path, monkeypatch):
-    path = tmp_path / "broken.urdf"
-    path.write_text(text, encoding="utf-8")
-    broken = replace(TALOS, share=lambda: tmp_path, urdf=path.name, srdf=str(TALOS.srdf_path))
-    monkeypatch.setattr(description, "load_member", lambda *_: broken)
-    with pytest.raises(ConfigError, match=r"broken\.urdf: "):
-        physics_description(CONFIG)
 
 
 def test_the_full_description_holds_talos_and_the_spoon():

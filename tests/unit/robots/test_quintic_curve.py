@@ -41,12 +41,6 @@ def test_the_ends_of_a_trajectory_are_held_before_and_after_it():
     assert velocities[:, 0] == pytest.approx(0, abs=1e-13)
 
 
-def test_sampling_a_trajectory_of_a_single_point_is_refused():
-    point = JointTrajectory(("j",), np.zeros(1), *(np.zeros((1, 1)),) * 3)
-    with pytest.raises(ValueError, match="at least two points, got 1"):
-        sample_quintic(point, np.zeros(1))
-
-
 def test_sampling_only_positions_gives_the_same_positions():
     trajectory = rest_to_rest(duration=0.7)
     times = np.linspace(-0.1, 0.9, 33)

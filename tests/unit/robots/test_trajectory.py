@@ -23,9 +23,3 @@ RIGHT = JointTrajectory(("hip", "knee"), np.arange(3.0), ZEROS, ZEROS, ZEROS)
 def test_numbers_that_are_no_motion_are_refused(change: dict[str, object], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         replace(RIGHT, **change)
-
-
-def test_a_trajectory_has_at_least_one_point() -> None:
-    none = np.zeros((0, 2))
-    with pytest.raises(ValueError, match="should increase"):
-        JointTrajectory(("hip", "knee"), np.zeros(0), none, none, none)

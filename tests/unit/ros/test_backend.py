@@ -1,14 +1,9 @@
 """Which backend nodes run on; both backends offer the same names."""
 
 import ast
-import os
 import re
-import subprocess
-import sys
 from importlib.machinery import PathFinder
 from pathlib import Path
-from shlex import quote
-from types import SimpleNamespace
 
 import pytest
 
@@ -18,7 +13,7 @@ from rclzenoh.interfaces.typed_names import ACTIONS, MESSAGES, SERVICES
 from throwcollect.errors import ConfigError
 from throwcollect.ros import embedded
 from throwcollect.ros.middleware import RMW_VARIABLE, VARIABLE, _choose_installed, uses_rclpy
-from throwcollect.ros_installation import PACKAGES, how_to_install, missing, module_name
+from throwcollect.ros_installation import PACKAGES, missing, module_name
 
 ROOT = Path(__file__).parents[3]
 
@@ -87,26 +82,6 @@ def test_a_missing_package_or_interface_is_an_error_only_if_rclpy_is_asked_for(
         uses_rclpy()
 
 
-@pytest.mark.parametrize(
-    ("platform", "hint"),
-    [
-        (
-            ("cpython", (3, 11, 2), "x86_64"),
-            f"pip install {quote(f'{ROOT}/packaging/ros_interfaces')} -e '{ROOT}[collect,ros]', or",
-        ),
-        (("cpython", (3, 12, 1), "x86_64"), "source the setup script of a ROS 2 Jazzy"),
-        (("cpython", (3, 11, 2), "aarch64"), "by pip it is for CPython 3.11 on Linux, x86-64, with glibc alone"),
-    ],
-)
-def test_the_hint_how_to_install_rclpy_fits_python_and_machine(platform, hint, ros, monkeypatch):
-    name, number, machine = platform
-    monkeypatch.setattr("sys.implementation", SimpleNamespace(name=name, cache_tag="cpython-311"))
-    monkeypatch.setattr("sys.version_info", number)
-    monkeypatch.setattr("platform.machine", lambda: machine)
-    assert hint in how_to_install()
-    assert ("pip install" in how_to_install()) == hint.startswith("pip")
-
-
 def test_an_rmw_that_is_not_installed_is_refused_with_a_list_of_others(ros, monkeypatch):
     monkeypatch.setenv(RMW_VARIABLE, "rmw_cyclonedds_cpp")
     with pytest.raises(ConfigError, match="RMW_IMPLEMENTATION is rmw_cyclonedds_cpp, which is not installed") as told:
@@ -139,18 +114,6 @@ def test_the_check_for_rclpy_covers_all_packages_of_used_interfaces():
 
 OF_DATASETS = {"diagnostic_msgs", "visualization_msgs"}
 """Packages of messages that are written into recordings, and that no node sends."""
-
-
-def test_up_reports_an_unknown_backend_with_exit_code_2(tmp_path):
-    sweep = "sweep: {sampler: uniform, parameters: {task.duration_s: {min: 0.9, max: 1.3}}}"
-    (tmp_path / "throws.yaml").write_text(f"trials: 1\n{sweep}\n")
-    options = ["--runtime", "local", "--output", str(tmp_path / "data")]
-    command = [sys.executable, "-m", "throwcollect", "up", str(tmp_path / "throws.yaml"), *options]
-    found = subprocess.run(command, env={**os.environ, VARIABLE: "ros2"}, capture_output=True, text=True, check=False)
-    assert found.returncode == 2
-    assert "THROWCOLLECT_ROS: got 'ros2'" in found.stderr
-    assert "Traceback" not in found.stderr
-    assert not (tmp_path / "data").exists()
 
 
 def test_the_genuine_backend_offers_all_names_of_the_embedded_one():

@@ -59,13 +59,3 @@ def test_joining_a_run_on_other_middleware_is_refused(key):
     way = Connection("udp/127.0.0.1:7447", key, 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
     with pytest.raises(ConfigError, match="7447 is on rmw_fastrtps_cpp, and this process on rmw_zenoh_cpp"):
         ros.init(connection=way)
-
-
-def test_joining_with_a_key_that_cannot_be_read_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match=r"the key of the run cannot be read: .*gone"):
-        ros.init(connection=Connection("tls/127.0.0.1:7447", RunKey(tmp_path / "gone")))
-
-
-def test_joining_at_a_malformed_endpoint_is_refused(key):
-    with pytest.raises(ConfigError, match="endpoint: connect/endpoints cannot be"):
-        ros.init(connection=Connection("nowhere", key))

@@ -8,11 +8,10 @@ import time
 from contextlib import suppress
 
 import pytest
-import zenoh
 
 import throwcollect.ros.health_check as health
 from rclzenoh.session_config import OVERRIDE_VARIABLE
-from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.errors import ThrowcollectError
 from throwcollect.ros.health_check import check
 
 
@@ -37,7 +36,7 @@ def test_a_health_check_of_a_working_node_passes(rig, spinning, name, namespace)
     rig.node(name, namespace=namespace)
     spinning()
     # The router may hear the question before it knows of the node: nothing orders two sessions.
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
         with suppress(ThrowcollectError):
             check(name)
@@ -67,34 +66,6 @@ def test_a_health_check_of_a_stuck_node_fails(rig, impatient):
     assert "\n" not in str(caught.value)
 
 
-def test_a_health_check_of_a_missing_node_fails(environment):
-    with pytest.raises(ThrowcollectError, match="sim_4: does not answer"):
-        check("sim_4")
-
-
-def test_a_health_check_does_not_reach_a_node_of_another_domain(rig, spinning, monkeypatch):
-    rig.node("sim_3", namespace="/sim_3")
-    spinning()
-    monkeypatch.setenv("ROS_DOMAIN_ID", "231")
-    with pytest.raises(ThrowcollectError, match="sim_3: does not answer"):
-        check("sim_3")
-
-
-def test_a_health_check_without_a_name_asks_the_node_of_the_environment(environment, monkeypatch):
-    monkeypatch.setenv("THROWCOLLECT_NODE", "router")
-    check()
-    monkeypatch.setenv("THROWCOLLECT_NODE", "sim_4")
-    with pytest.raises(ThrowcollectError, match="sim_4: does not answer"):
-        check()
-
-
-@pytest.mark.parametrize("name", ["", "a*", "**", "a/b", "$x"])
-def test_a_health_check_of_a_malformed_name_is_refused(environment, monkeypatch, name):
-    monkeypatch.delenv("THROWCOLLECT_NODE", raising=False)
-    with pytest.raises(ConfigError, match="health: "):
-        check(name)
-
-
 def test_every_health_check_without_a_router_fails(environment, monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:1"]')
     for node in ("router", "sim_3"):
@@ -116,16 +87,3 @@ def test_a_health_check_of_a_stuck_router_fails(environment, monkeypatch, impati
                 check("router")
         finally:
             router.kill()
-
-
-def test_a_health_check_waits_for_a_session_as_long_as_for_an_answer(environment, monkeypatch):
-    opened = []
-
-    def refuse(config):
-        opened.append(json.loads(config.get_json("transport/unicast/open_timeout")))
-        raise zenoh.ZError("no")
-
-    monkeypatch.setattr(zenoh, "open", refuse)
-    with pytest.raises(ThrowcollectError, match="router: no session"):
-        check("router")
-    assert opened == [health.TIMEOUT_S * 1000]

@@ -44,10 +44,6 @@ def test_only_fast_dds_uses_a_server_and_only_zenoh_keeps_others_out(middleware,
     assert (middleware.is_fast_dds, middleware.keeps_others_out) == (by_server, private)
 
 
-def test_commands_join_a_zenoh_run_with_the_embedded_backend():
-    assert [each.joining for each in (EMBEDDED, ZENOH, FAST_DDS, OTHER)] == [EMBEDDED, EMBEDDED, FAST_DDS, OTHER]
-
-
 def test_the_environment_of_a_process_names_the_backend_and_its_rmw():
     assert EMBEDDED.environment() == {VARIABLE: "embedded"}
     assert OTHER.environment() == {VARIABLE: "rclpy", RMW_VARIABLE: "rmw_cyclonedds_cpp"}

@@ -16,7 +16,7 @@ from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerE
 from throwcollect.runs import background
 from throwcollect.runs.background import begin_run, carry_out
 from throwcollect.runs.records import OpenRun, Records
-from throwcollect.runs.run_record import Origin, Planning
+from throwcollect.runs.run_record import Origin
 from throwcollect.state_directory import STATE_VARIABLE
 
 ORIGIN = Origin("throws", 1, {"trials": 2})
@@ -203,45 +203,3 @@ def test_a_run_that_fails_between_preparation_and_launch_leaves_no_dataset(
     assert not (tmp_path / "data").exists()
     assert str(Records().get("a").record.error) == "no space left"
     assert Records().get("a").status == "ended"
-
-
-def test_making_a_large_plan_shows_its_progress_and_can_be_interrupted(
-    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(background, "MANY_TRIALS", 1)
-    order = take_over(config, tmp_path, processes)
-    run = Records().take("a")
-    assert run is not None
-    told: list[Planning | None] = []
-
-    def asks_after_a_look() -> int:
-        told.append(Records().get("a").record.planning)
-        return len(told) - 1
-
-    with pytest.raises(Interrupted):
-        carry_out("a", run.lock, order, onlooker=SILENT, interruptions=asks_after_a_look)
-    run.close()
-    assert told == [None, Planning(0, 1)]
-    record = Records().get("a").record
-    assert (record.exit_code, record.planning) == (130, None)
-    assert not (tmp_path / "data").exists()
-
-
-PREPARATION = """
-import sys
-from pathlib import Path
-from throwcollect.runs import background
-print("prepares", flush=True)
-background._move_log(Path(sys.argv[1]), Path(sys.argv[2]))
-print("collects", flush=True)
-print("a warning", file=sys.stderr)
-"""
-
-
-def test_the_log_of_the_launcher_continues_after_it_was_moved(tmp_path: Path) -> None:
-    before, after = tmp_path / "launcher.log", tmp_path / "logs" / "launcher.log"
-    with before.open("ab") as log:
-        words = [sys.executable, "-c", PREPARATION, str(before), str(after)]
-        subprocess.run(words, stdout=log, stderr=subprocess.STDOUT, check=True, timeout=60)
-    assert after.read_text() == "prepares\ncollects\na warning\n"
-    assert not before.exists()

@@ -14,11 +14,11 @@ from tests.unit.runtimes.docker.engine import Engine, engine_at
 
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.coordinator.onlooker import SILENT
-from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
+from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runs.component_container import ContainerOrder, check_order, launch_container
+from throwcollect.runs.component_container import ContainerOrder, launch_container
 from throwcollect.runs.control import down
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Kind, Origin, RunRecord
@@ -109,44 +109,12 @@ def test_a_container_ends_with_the_run_that_it_has_joined(engine: Engine, sessio
     assert engine.names() == []
 
 
-def test_a_container_that_ends_before_the_run_it_has_joined_fails(engine: Engine, session: OpenRun) -> None:
-    def end() -> bool:
-        engine.end("throwcollect-ear-1-container", 7)
-        return False
-
-    assert launch(engine, end, replace(ORDER, joins="talos")).exit_code == WorkerError.exit_code
-
-
 def test_down_removes_the_container_of_a_launcher_that_died(engine: Engine) -> None:
     run = remember("ear-1", "container", "docker")
     engine.create("throwcollect-ear-1-container", {RUN_LABEL: "ear-1", NODE_LABEL: "container"})
     run.close()
     assert down(Records().get("ear-1")) == ("ear-1", ["throwcollect-ear-1-container"])
     assert engine.names() == []
-
-
-def test_an_order_for_a_container_that_cannot_work_is_refused(
-    session: OpenRun, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    check_order(replace(ORDER, joins="talos"))
-    with pytest.raises(NotFoundError, match="no run nobody"):
-        check_order(replace(ORDER, joins="nobody"))
-    other = remember("ear-0", "container", "docker")
-    with pytest.raises(ConflictError, match="no router that a container could join"):
-        check_order(replace(ORDER, joins="ear-0"))
-    other.close()
-    ports = ContainerSpec("nodes", None, NodeContainerConfig(ports={"80": 8081}))
-    with pytest.raises(ConfigError, match="has this machine's network"):
-        check_order(ContainerOrder("ear", ports, joins="talos"))
-    session.update(ended=datetime.now(timezone.utc), exit_code=0)
-    with pytest.raises(ConflictError, match="run talos has ended"):
-        check_order(replace(ORDER, joins="talos"))
-    missing = ContainerSpec("nodes", None, NodeContainerConfig(networks=["lab"]))
-    with pytest.raises(ConfigError, match="no network lab"):
-        check_order(ContainerOrder("ear", missing))
-    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    with pytest.raises(WorkerError, match="no Docker engine answers"):
-        check_order(ORDER)
 
 
 def test_a_container_joins_a_run_of_containers_over_the_network_of_the_run(tmp_path: Path) -> None:

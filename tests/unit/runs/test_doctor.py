@@ -16,10 +16,7 @@ from throwcollect.members import names_of
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, _choose_installed
 from throwcollect.runs.doctor import examine
-from throwcollect.runtimes import ports
-from throwcollect.runtimes.docker import docker_engine
 from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
-from throwcollect.state_directory import STATE_VARIABLE
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 
@@ -99,26 +96,6 @@ def test_doctor_examines_robots_of_other_packages_and_notes_failures(
     assert "the robot absent of an unknown package cannot be loaded: ModuleNotFoundError" in found["absent"][1]
     assert "the robot lost of an unknown package cannot find its files: OSError: the disk" in found["lost"][1]
     assert (checks["robot"].status, checks["robot"].finding.partition(" of ")[0]) == ("ok", "Talos")
-
-
-def test_doctor_notes_broken_members_of_other_packages(
-    tmp_path: Path, install: Callable[[str, Mapping[str, str]], None]
-) -> None:
-    families = ("tools", "engines", "tasks", "exporters", "runtimes")
-    for family in families:
-        install(family, {"absent": "not_there:X"})
-    noted = [check for check in examine(tmp_path) if check.name.endswith("absent")]
-    assert [check.name for check in noted] == [
-        "tool absent",
-        "engine absent",
-        "task absent",
-        "exporter absent",
-        "absent",
-    ]
-    for family, check in zip(families, noted, strict=True):
-        said = f"the {family[:-1]} absent of an unknown package cannot be loaded: ModuleNotFoundError: No module named"
-        assert check.status == "note"
-        assert check.finding.startswith(said)
 
 
 def backends(directory: Path) -> dict[str, tuple[str, str]]:
@@ -211,45 +188,3 @@ def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypa
             f"{outdated}; throwcollect image build makes it anew",
         )
         server.shutdown()
-
-
-def test_doctor_notes_a_docker_engine_on_another_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DOCKER_HOST", "ssh://lab")
-    monkeypatch.setattr(docker_engine, "connect", lambda **_: Mock(info=lambda: {"Name": "lab"}))
-    (check,) = [check for check in examine(tmp_path) if check.name == "docker"]
-    problem = "the Docker engine at ssh://lab is on another machine, lab, without directories of this one"
-    assert (check.status, check.finding) == ("note", f"{problem}; runs use processes")
-
-
-def test_doctor_notes_a_python_without_wheels_of_bullet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.version_info", (3, 12, 3))
-    (python,) = [check for check in examine(tmp_path) if check.name == "python"]
-    said = "3.12.3; pybullet has wheels for 3.10 and 3.11, MuJoCo (sim.engine) for this"
-    assert (python.status, python.finding) == ("note", said)
-
-
-def test_doctor_reports_a_state_directory_and_a_loopback_interface_that_runs_cannot_use(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "runs"))
-    checks = {check.name: check for check in examine(tmp_path)}
-    assert (checks["state"].status, checks["state"].finding) == ("ok", f"runs are remembered in {tmp_path / 'runs'}")
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "file"))
-    # The system refuses to connect to this address, too, unless a socket has asked to broadcast.
-    monkeypatch.setattr(ports, "LOOPBACK", "255.255.255.255")
-    checks = {check.name: check for check in examine(tmp_path)}
-    assert checks["state"].status == checks["ports"].status == "problem"
-    assert checks["state"].finding.startswith(f"{tmp_path / 'file'}: runs cannot be remembered there: ")
-    assert "; try: set the loopback interface up" in checks["ports"].finding
-
-
-@pytest.mark.parametrize(("missing", "status"), [({"pybullet"}, "note"), ({"pybullet", "mujoco"}, "problem")])
-def test_a_missing_physics_engine_is_a_problem_only_if_no_other_is_installed(
-    missing: set[str], status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda package: package not in missing)
-    checks = {check.name: check for check in examine(tmp_path)}
-    assert {name: checks[name].status for name in missing} == dict.fromkeys(missing, status)
-    finding = "not installed, for sim.engine: bullet; try: pip install 'throwcollect[collect]'"
-    assert checks["pybullet"].finding == finding

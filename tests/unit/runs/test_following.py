@@ -1,6 +1,4 @@
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from datetime import datetime, timezone
 from pathlib import Path
@@ -8,41 +6,10 @@ from pathlib import Path
 import pytest
 
 from throwcollect.runs.events import EventLog
-from throwcollect.runs.following import follow, read_events, read_logs
+from throwcollect.runs.following import follow, read_logs
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.state_directory import STATE_VARIABLE
-
-
-@pytest.mark.parametrize("words", [("events",), ("logs", "-f")], ids=" ".join)
-def test_the_commands_events_and_logs_end_when_their_output_is_closed(
-    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    logs = tmp_path / "logs"
-    run = Records().new("small")
-    started = datetime.now(timezone.utc)
-    run.write(RunRecord(run.run, "small", "local", str(tmp_path), None, str(logs), 0, started, os.getpid(), 1))
-    EventLog(logs, run.run).run_event("started", simulations=1)
-    (logs / "sim_0.log").write_text("ready\n")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "throwcollect", *words, "--run", run.run],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdout is not None
-    assert process.stderr is not None
-    try:
-        assert process.stdout.readline()
-        process.stdout.close()
-        assert process.wait(timeout=10) == 0
-        assert process.stderr.read() == ""
-    finally:
-        process.kill()
-        process.wait()
-        process.stderr.close()
-        run.close()
 
 
 @pytest.fixture
@@ -76,11 +43,6 @@ def test_logs_are_followed_when_they_move_to_the_dataset(planned: tuple[Run, Cal
     run, go_on = planned
     lines = [(name, line) for name, line, _ in read_logs(run, (), follow=True, keep_on=go_on)]
     assert lines == [("launcher", "plan: 3 trials"), ("sim_0", "ready")]
-
-
-def test_events_are_followed_when_logs_move_to_the_dataset(planned: tuple[Run, Callable[[], bool]]) -> None:
-    run, go_on = planned
-    assert [event.run for event, _ in read_events(run, keep_on=go_on)] == [run.id]
 
 
 def test_follow_gives_only_events_of_this_run_even_if_its_logs_move(

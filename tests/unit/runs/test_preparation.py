@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 from tests.e2e.collection import FAST, collect_here, write_config
 
-from throwcollect.errors import ConfigError, DatasetError, ThrowcollectError
+from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.runs.preparation import _name_directory, prepare, resume
-from throwcollect.runtimes.in_process import InProcessRuntime
 from throwcollect.state_directory import STATE_VARIABLE
 
 
@@ -68,19 +67,3 @@ def test_a_failed_resume_leaves_a_finished_dataset_unchanged(
         resume(finished, overrides=["trials=5", *overrides])
     assert read_files(finished) == before
     assert resume(finished) is None
-
-
-def test_a_resume_that_fails_ends_what_its_runtime_has_begun(
-    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(_directory: Path) -> None:
-        raise DatasetError("cannot be written: No space left on device")
-
-    done: list[str] = []
-    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    monkeypatch.setattr(InProcessRuntime, "begin", lambda *_: done.append("begun"))
-    monkeypatch.setattr(InProcessRuntime, "close", lambda _: done.append("closed"))
-    monkeypatch.setattr("throwcollect.coordinator.resume.remove_unfinished", fail)
-    with pytest.raises(DatasetError, match="No space left"):
-        resume(finished, overrides=["trials=5", "run.runtime=inprocess"], ahead=True)
-    assert done == ["begun", "closed"]

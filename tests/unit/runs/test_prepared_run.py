@@ -43,15 +43,6 @@ def test_launching_a_prepared_run_twice_is_refused(prepared: PreparedRun, launch
     assert runs.wait(runs.find(run.record.run)) == summary
 
 
-@launched_again
-def test_launching_a_prepared_run_after_its_block_is_refused(prepared: PreparedRun, launch, tmp_path: Path) -> None:
-    with prepared as run:
-        pass
-    with pytest.raises(ConflictError, match=f"run {run.record.run}: was given up when its block was left"):
-        launch(run)
-    assert not (tmp_path / "data").exists()
-
-
 def call_later(act: Callable[[], object]) -> Callable[[], int]:
     """Count no interruptions, but call `act` in another thread, once the run collects."""
     thread = threading.Thread(target=act)
@@ -86,15 +77,6 @@ def test_stopping_a_run_that_a_program_collects_drains_it_and_leaves_the_program
         time.sleep(0.01)
     assert stopped[0].record.exit_code == Interrupted.exit_code
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-
-
-def test_stopping_a_run_leaves_the_answer_to_the_programs_own_handler(many: PreparedRun) -> None:
-    def handle(*_: object) -> None:
-        raise SystemExit("the program decides")
-
-    signal.signal(signal.SIGTERM, handle)
-    with many as run, pytest.raises(SystemExit, match="the program decides"):
-        run.collect(interruptions=call_later(lambda: signal.raise_signal(signal.SIGTERM)))
 
 
 def test_a_run_that_ctrl_c_ends_in_a_program_was_interrupted(many: PreparedRun, tmp_path: Path) -> None:

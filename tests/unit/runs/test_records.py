@@ -1,6 +1,3 @@
-import errno
-import fcntl
-import json
 import os
 import stat
 import subprocess
@@ -14,7 +11,6 @@ import pytest
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import ConfigError
-from throwcollect.run_key import RunKey
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import RunFailure, RunRecord, Summary
 from throwcollect.runtimes.runtime import NodeState
@@ -73,17 +69,6 @@ def test_a_written_and_updated_record_can_be_read_again(state: Path) -> None:
     assert Records().ids() == [run.run]
 
 
-def test_a_state_directory_without_file_locks_is_refused(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_descriptor: int, _how: int) -> None:
-        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
-
-    records = Records()
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    with pytest.raises(ConfigError, match="runs cannot be remembered there: Function not implemented"):
-        records.new("small")
-    assert list((state / "runs").iterdir()) == []
-
-
 def test_the_id_of_a_run_begins_with_the_name_of_its_collection_and_is_unique(
     state: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,17 +86,6 @@ def test_a_run_without_a_record_is_not_found(state: Path) -> None:
         records.get(run.run)
 
 
-def test_a_record_is_written_only_when_something_has_changed(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = Records().new("small")
-    run.write(record(run))
-    written: list[RunRecord] = []
-    monkeypatch.setattr(run, "write", written.append)
-    run.update(simulations=2, nodes=())
-    assert written == []
-    run.update(simulations=3)
-    assert [each.simulations for each in written] == [3]
-
-
 def test_a_run_lives_as_long_as_its_lock_is_held(state: Path) -> None:
     records = Records()
     run = records.new("small")
@@ -119,11 +93,6 @@ def test_a_run_lives_as_long_as_its_lock_is_held(state: Path) -> None:
     assert (records.lives(run.run), records.get(run.run).status) == (True, "running")
     run.close()
     assert (records.lives(run.run), records.get(run.run).status) == (False, "died")
-
-
-def test_a_run_that_has_ended_does_not_count_as_died(state: Path) -> None:
-    records = Records()
-    assert records.get(remember(records, ended=NOW, exit_code=3)).status == "ended"
 
 
 def test_a_killed_launcher_releases_its_run_even_if_its_pid_is_in_use(state: Path) -> None:
@@ -169,27 +138,6 @@ def test_only_one_process_can_take_over_a_dead_run(state: Path) -> None:
     taken.update(simulations=5)
     taken.close()
     assert records.get(name).record.simulations == 5
-
-
-def test_a_run_that_is_forgotten_while_it_is_taken_over_gets_a_new_lock(
-    state: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = Records()
-    name = remember(found)
-    first = found.take(name)
-    assert first is not None
-    lock = fcntl.flock
-
-    def forget_before(descriptor: int, how: int) -> None:
-        if (state / "runs" / f"{name}.json").exists():
-            first.forget()
-        lock(descriptor, how)
-
-    monkeypatch.setattr(fcntl, "flock", forget_before)
-    second = found.take(name)
-    assert second is not None
-    assert os.path.samestat(os.fstat(second.lock), (state / "runs" / f"{name}.lock").stat())
-    second.close()
 
 
 def test_runs_are_found_by_any_spelling_of_their_directory(
@@ -240,75 +188,25 @@ def test_runs_are_remembered_for_a_week_after_their_end(
     assert (name in records.ids()) == remembered
 
 
-@pytest.mark.parametrize(("days", "remembered"), [(6, True), (8, False)])
-def test_the_key_of_a_run_without_a_record_is_removed_after_a_week(days: int, remembered: bool, state: Path) -> None:
-    records = Records()
-    run = records.new("small")
-    run.close()
-    then = (NOW - timedelta(days=days)).timestamp()
-    os.utime(state / "runs" / f"{run.run}.lock", times=(then, then))
-    records.new("small")
-    assert [run.key.exists, (state / "runs" / f"{run.run}.lock").exists()] == [remembered, remembered]
-
-
-def test_a_long_run_is_not_forgotten_while_it_lives(state: Path) -> None:
-    records = Records()
-    run = records.new("small")
-    run.write(record(run, started=NOW - timedelta(days=80)))
-    records.new("small")
-    assert records.ids() == [run.run]
-
-
-def truncate(text: str) -> str:
-    return text[: len(text) // 2]
-
-
-def without(key: str) -> Callable[[str], str]:
-    return lambda text: json.dumps({name: value for name, value in json.loads(text).items() if name != key})
-
-
 @pytest.mark.parametrize(
-    ("damage", "message"),
+    "damage",
     [
-        (truncate, "the record of the run is damaged"),
-        (lambda _: "[]", "the record of the run is damaged"),
-        (lambda _: "", "the record of the run is damaged"),
-        (without("launcher"), "the record of the run is damaged"),
-        (
-            lambda text: text.replace('"version":1', '"version":2').replace('"version": 1', '"version": 2'),
-            "another ver",
-        ),
+        lambda text: text[: len(text) // 2],
+        lambda _: "",
+        lambda text: text.replace('"launcher"', '"starter"'),
+        lambda text: text.replace('"version": 1', '"version": 2'),
     ],
 )
-def test_a_damaged_record_is_an_error_but_other_runs_can_be_listed(
-    damage: Callable[[str], str], message: str, state: Path
-) -> None:
+def test_a_damaged_record_is_an_error_but_other_runs_can_be_listed(damage: Callable[[str], str], state: Path) -> None:
     records = Records()
     name, whole = remember(records), remember(records)
     path = state / "runs" / f"{name}.json"
     path.write_text(damage(path.read_text()))
-    with pytest.raises(ConfigError, match=message) as caught:
+    with pytest.raises(ConfigError, match="the record is damaged, or of another version") as caught:
         records.get(name)
     assert caught.value.hint == f"throwcollect down --run {name} ends what is left of it, and forgets it"
     assert [each.record.run for each in records.all()] == [whole]
     records.new("small")
-
-
-def test_runs_are_found_by_a_directory_with_special_characters(state: Path, tmp_path: Path) -> None:
-    records = Records()
-    odd = tmp_path / 'a "quoted" \\ name\n\u00e9\x7f'
-    remember(records, directory=str(tmp_path))
-    of_volume = remember(records, directory=str(odd), volume="throws")
-    late, early = (remember(records, directory=str(odd), started=NOW - timedelta(hours=hours)) for hours in (0, 1))
-    (state / "runs" / "damaged-0000.json").write_bytes(b"{" + json.dumps(str(odd)).encode())
-    assert [run.id for run in records.into(odd)] == [early, late]
-    assert of_volume in records.ids()
-
-
-def test_runs_are_listed_in_the_order_of_their_start(state: Path) -> None:
-    records = Records()
-    late, early = remember(records, started=NOW), remember(records, started=NOW - timedelta(hours=1))
-    assert [each.record.run for each in records.all()] == [early, late]
 
 
 def test_the_files_and_directories_of_a_run_are_private(state: Path) -> None:
@@ -339,16 +237,6 @@ def test_every_run_has_its_own_key_until_the_run_is_forgotten(state: Path) -> No
     assert (keys[0].exists, keys[1].exists) == (False, True)
 
 
-def test_a_run_whose_key_cannot_be_written_leaves_no_files(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_: RunKey) -> None:
-        raise ConfigError("the key of the run cannot be written: No space left on device")
-
-    monkeypatch.setattr(RunKey, "create", fail)
-    with pytest.raises(ConfigError, match="cannot be written"):
-        Records().new("small")
-    assert list((state / "runs").iterdir()) == []
-
-
 def test_a_record_that_cannot_be_written_to_a_full_disk_is_an_error(
     state: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -361,12 +249,3 @@ def test_a_record_that_cannot_be_written_to_a_full_disk_is_an_error(
     with pytest.raises(ConfigError, match="runs cannot be remembered there: No space left on device") as caught:
         run.write(record(run))
     assert "free space there" in str(caught.value)
-
-
-def test_the_error_in_a_record_of_an_earlier_version_can_be_read(state: Path) -> None:
-    name = remember(Records(), exit_code=3)
-    path = state / "runs" / f"{name}.json"
-    written = json.loads(path.read_text())
-    del written["failure"]
-    path.write_text(json.dumps({**written, "message": "no luck\n  evidence: none"}))
-    assert str(Records().get(name).record.error) == "no luck\n  evidence: none"

@@ -78,7 +78,7 @@ os.kill(os.getpid(), 9)
 def test_a_forked_process_dies_with_its_parent() -> None:
     done = subprocess.run([sys.executable, "-c", ORPHAN], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == -9
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while psutil.pid_exists(int(done.stdout)):
         assert time.monotonic() < deadline
         time.sleep(0.05)

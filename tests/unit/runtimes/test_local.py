@@ -1,5 +1,4 @@
 import os
-import resource
 import signal
 import socket
 import sys
@@ -11,7 +10,7 @@ import psutil
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.local import LocalNodes, LocalRuntime
@@ -30,18 +29,6 @@ def nodes(directory: Path, **run: object) -> LocalNodes:
 
 def node(code: str, name: str = "node") -> NodeSpec:
     return NodeSpec(name, (code,), NodeRole.EXPENDABLE)
-
-
-@pytest.mark.parametrize(("kind", "name"), [("RLIMIT_NOFILE", "-n"), ("RLIMIT_AS", "-v")])
-def test_a_limit_with_which_nodes_cannot_start_is_named(
-    kind: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    limits = {getattr(resource, kind): 16}
-    monkeypatch.setattr(resource, "getrlimit", lambda limit: (limits.get(limit, resource.RLIM_INFINITY), 0))
-    with pytest.raises(WorkerError, match=rf"only 16 .*\(ulimit {name}\)"):
-        nodes(tmp_path)
-    limits.clear()
-    nodes(tmp_path).close()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -116,12 +103,6 @@ def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNo
     runtime.signal("node", signal.SIGKILL)
 
 
-def test_a_node_that_a_signal_without_a_name_ends_is_reported_with_its_number(runtime: LocalNodes) -> None:
-    runtime.start(node("import os; os.kill(os.getpid(), 35)"))
-    end = wait_for_end(runtime)
-    assert (end.code, end.reason) == (-35, "ended by signal 35")
-
-
 def test_the_readiness_and_the_log_of_a_node_outlive_it(runtime: LocalNodes) -> None:
     assert not runtime.ready("node")
     runtime.start(node("print('node is ready', flush=True); import time; time.sleep(60)"))
@@ -149,12 +130,6 @@ def test_a_node_that_ignores_requests_is_ended_by_force(runtime: LocalNodes) -> 
     runtime.stop(["node"], grace_s=0.1)
     assert not process.is_running()
     assert (runtime.running(), runtime.handle("node")) == ((), None)
-
-
-def test_a_node_whose_log_cannot_be_written_cannot_be_started(tmp_path: Path) -> None:
-    (tmp_path / "logs").write_text("a file")
-    with pytest.raises(WorkerError, match=r"node: cannot be started: .*File exists"):
-        nodes(tmp_path).start(node(""))
 
 
 def test_a_busy_port_of_the_router_is_refused_with_a_hint(tmp_path: Path) -> None:

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -7,11 +6,10 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
-from throwcollect.errors import DatasetError, WorkerError
+from throwcollect.errors import WorkerError
 from throwcollect.runtimes import node_collection
 from throwcollect.runtimes.node_collection import NodeCollection
-from throwcollect.runtimes.nodes import COORDINATOR, NodeExit
-from throwcollect.runtimes.runtime import NodeState, Place
+from throwcollect.runtimes.runtime import NodeState
 
 BLIND = Progress(total=4, ended=0, outcomes={}, simulations=0, throws_per_s=0.0, hung=[])
 
@@ -25,17 +23,6 @@ def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock, simulations: i
     place = SimpleNamespace(simulations=simulations, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
     host = SimpleNamespace(place=place, config=Config(), endpoint=None, connection=None)
     return NodeCollection(host, session)
-
-
-def test_the_launcher_waits_less_for_messages_once_all_trials_have_ended(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    collection = collection_of(monkeypatch, Mock())
-    spin = collection._listener.spin
-    for ended, longest_s in ((3, 0.1), (4, 0.01)):
-        collection._report(replace(BLIND, ended=ended))
-        collection._listen()
-        assert spin.call_args.args[1] <= longest_s
 
 
 @pytest.mark.parametrize(("simulations", "patience_s"), [(1, 12.5), (64, 44)])
@@ -66,16 +53,3 @@ def test_restarted_nodes_have_the_same_time_to_find_each_other_again(
         collection._report(BLIND)
     assert "it was started again 3 times, as it was ended by SIGABRT" in str(caught.value)
     assert "firewall" not in str(caught.value)
-
-
-def test_a_dataset_that_was_renamed_during_its_collection_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    session = Mock(interruptions=Mock(return_value=0))
-    collection = collection_of(monkeypatch, session)
-    collection._host.place = Mock(Place, directory=tmp_path / "data", volume=None)
-    with pytest.raises(DatasetError, match=f"^{tmp_path}/data: was removed or renamed during the run$"):
-        collection._check(NodeExit(COORDINATOR, DatasetError.exit_code, "exit code 4", ""))
-    collection._host.place.volume = "a volume"
-    with pytest.raises(DatasetError, match=r"^the coordinator stopped: exit code 4$"):
-        collection._check(NodeExit(COORDINATOR, DatasetError.exit_code, "exit code 4", ""))

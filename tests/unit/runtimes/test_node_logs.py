@@ -1,22 +1,7 @@
-import shutil
 from pathlib import Path
-from types import SimpleNamespace
-
-import pytest
 
 from throwcollect.heartbeat import ready_line
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
-
-
-@pytest.mark.parametrize(("printed", "before"), [("", ""), ("at work\n", "at work\n")])
-def test_the_tail_of_a_log_ends_with_a_note_if_the_disk_is_full(
-    printed: str, before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    logs = NodeLogs(tmp_path)
-    logs.path("sim_0").write_text(printed)
-    assert logs.tail("sim_0") == printed.strip()
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=512) if path == tmp_path else None)
-    assert logs.tail("sim_0") == (f"{before}the disk of {tmp_path} is full: 512 bytes are free; free space, and resume")
 
 
 def test_logs_leave_out_what_an_earlier_run_printed(tmp_path: Path) -> None:
@@ -39,10 +24,6 @@ def test_logs_forget_that_a_removed_node_was_ready(tmp_path: Path) -> None:
     assert [logs.said_ready(name) for name in ("sim_0", "sim_1", "sim_2")] == [True, False, False]
     append(logs.path("sim_1"), f"{ready_line('sim_1')}\n".encode())
     assert logs.said_ready("sim_1")
-
-
-def test_the_tail_of_a_missing_log_is_empty(tmp_path: Path) -> None:
-    assert NodeLogs(tmp_path / "none").tail("sim_0") == ""
 
 
 def append(path: Path, data: bytes) -> None:

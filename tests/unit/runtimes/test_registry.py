@@ -18,7 +18,6 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
 from throwcollect.members import names_of
 from throwcollect.ros.middleware import Middleware
-from throwcollect.run_key import RunKey
 from throwcollect.runs.runtime_choice import choose
 from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
 from throwcollect.runtimes.runtime import Host, Place, Runtime
@@ -66,15 +65,6 @@ def test_a_runtime_describes_itself_and_holds_nothing_of_an_unknown_run(
     assert member.find_held() == []
     assert member.is_left("never-0000") is False
     assert member.outlives_launcher == (name == "docker")
-
-
-@pytest.mark.parametrize("name", ["local", "inprocess"])
-def test_a_host_that_was_never_used_leaves_no_files(name: str, tmp_path: Path) -> None:
-    place = Place("run", tmp_path, None, tmp_path / "logs", 1, Middleware(), RunKey(tmp_path / "key"))
-    host = get_runtime(name).host(place, Config(), warn=print)
-    host.close()
-    assert host.cleared
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_runtime_can_be_added_by_another_package(added: None, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.runtimes import run_listener
 from throwcollect.runtimes.run_listener import RunListener
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def progress(total: int) -> Progress:

@@ -160,12 +160,6 @@ def test_the_router_is_started_first_and_the_coordinator_last(runtime: FakeRunti
     ]
 
 
-def test_nodes_that_already_run_are_not_started_again(runtime: FakeRuntime, clock: Clock) -> None:
-    runtime.alive = [ROUTER, "sim_1", COORDINATOR]
-    Supervisor(runtime, RunConfig(), roster(runtime, 2)).start(found=runtime.alive)
-    assert runtime.started == ["sim_0"]
-
-
 @pytest.mark.parametrize("hint", ["  try: something else", "note: run with `RUST_BACKTRACE=1` environment variable"])
 def test_a_lost_node_is_restarted_and_reported(hint: str, runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
@@ -214,17 +208,6 @@ def test_a_simulation_that_was_never_ready_is_restarted_only_once(runtime: FakeR
     assert "is started again" in supervisor.poll()[1][0]
     wait_for_start(supervisor, runtime, clock, "sim_0")
     runtime.die("sim_0")
-    assert "is given up" in supervisor.poll()[1][0]
-
-
-def test_a_simulation_that_found_no_router_is_restarted_as_often_as_others(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = Supervisor(runtime, RunConfig(restarts=3), roster(runtime, 2))
-    supervisor.start()
-    for _ in range(3):
-        runtime.die("sim_0", UnreachableError.exit_code)
-        assert "is started again" in supervisor.poll()[1][0]
-        wait_for_start(supervisor, runtime, clock, "sim_0")
-    runtime.die("sim_0", UnreachableError.exit_code)
     assert "is given up" in supervisor.poll()[1][0]
 
 
@@ -286,31 +269,6 @@ def test_a_run_fails_if_no_simulation_is_ready_in_time(runtime: FakeRuntime, clo
     assert caught.value.evidence == "log of sim_0"
 
 
-def test_time_in_which_an_engine_creates_containers_is_not_start_time(
-    runtime: FakeRuntime, clock: Clock, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), roster(runtime, 2))
-    supervisor.start()
-    with monkeypatch.context() as slow:
-        slow.setattr(runtime, "handle", lambda _: None)
-        clock.now += 100
-        supervisor.poll()
-    clock.now += 6.9
-    supervisor.poll()
-    clock.now += 0.2
-    with pytest.raises(WorkerError, match="no simulation was ready within 7 s"):
-        supervisor.poll()
-
-
-def test_a_run_with_one_ready_simulation_passes_the_start_timeout(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), roster(runtime, 2))
-    supervisor.start()
-    runtime.logs.ready_ones.add("sim_1")
-    clock.now += 100
-    supervisor.poll()
-    assert [state(supervisor, name).status for name in SIMULATIONS] == ["starting", "running"]
-
-
 @pytest.mark.parametrize("name", ["sim_0", ROUTER, COORDINATOR])
 def test_a_frozen_node_is_ended_after_three_seconds(name: str, runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
@@ -348,17 +306,6 @@ def test_a_coordinator_that_exits_by_itself_is_not_restarted(code: int, runtime:
     assert (end is not None, state(supervisor, COORDINATOR).restarts) == (True, 0)
 
 
-def test_a_frozen_simulation_that_continues_in_time_is_not_ended(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = supervise(runtime)
-    for _ in range(2):
-        runtime.paused.add("sim_0")
-        supervisor.poll()
-        clock.now += 2.0
-        runtime.paused.clear()
-        assert supervisor.poll() == (None, [])
-    assert runtime.signals == []
-
-
 def test_a_hanging_simulation_is_ended_only_once_until_it_recovers(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     for hung in (["sim_0"], ["sim_0", "sim_1"], ["sim_1"], [], ["sim_0"]):
@@ -377,29 +324,6 @@ def test_scaling_up_starts_simulations_and_scaling_down_ends_the_last(runtime: F
     assert runtime.started == []
 
 
-def test_a_simulation_that_is_scaled_away_and_back_begins_without_losses(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = supervise(runtime, restarts=0)
-    runtime.die("sim_1")
-    supervisor.poll()
-    assert state(supervisor, "sim_1").status == "lost"
-    supervisor.change(roster(runtime, 1))
-    supervisor.change(roster(runtime, 2))
-    assert state(supervisor, "sim_1") == NodeState("sim_1", "starting", 0, "id of sim_1", None)
-
-
-def test_a_run_scaled_to_zero_simulations_waits_without_a_timeout(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = supervise(runtime, start_timeout_s=7)
-    supervisor.change(roster(runtime, 0))
-    clock.now += 1000
-    assert supervisor.poll() == (None, [])
-    supervisor.change(roster(runtime, 1))
-    clock.now += 6.9
-    assert supervisor.poll() == (None, [])
-    clock.now += 0.2
-    with pytest.raises(WorkerError, match="no simulation was ready within 7 s"):
-        supervisor.poll()
-
-
 def test_draining_asks_the_coordinator_and_waits_for_its_end(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     left = iter([False, False, True])
@@ -414,23 +338,9 @@ def test_draining_asks_the_coordinator_and_waits_for_its_end(runtime: FakeRuntim
     assert runtime.stopped == []
 
 
-def test_draining_in_a_hurry_ends_the_coordinator_by_force(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = supervise(runtime)
-    begin = clock.now
-    assert supervisor.drain(hurry=lambda: clock.now > begin + 1) is None
-    assert clock.now < begin + 1.1
-    assert runtime.stopped == [(COORDINATOR, 0.0)]
-
-
 def test_a_coordinator_that_does_not_drain_is_ended_by_force(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     begin = clock.now
     assert supervisor.drain() is None
     assert math.isclose(clock.now - begin, 15.0, abs_tol=0.1)
     assert runtime.stopped == [(COORDINATOR, 0.0)]
-
-
-def test_leaving_the_block_of_a_supervisor_closes_its_host(runtime: FakeRuntime, clock: Clock) -> None:
-    with supervise(runtime):
-        assert not runtime.closed
-    assert runtime.closed

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
 import io
-import json
 import shutil
 import tarfile
-import time
 from pathlib import Path
-from typing import Any
 
-import httpx
 import pytest
 from starlette.testclient import TestClient
-from tests.unit.serve.conftest import HOST, Remember, Served, make_end_fields
+from tests.unit.serve.conftest import Remember, make_end_fields
 
 from throwcollect.runs.records import Records, Run
-from throwcollect.serve import dataset_routes
-from throwcollect.sweep.parquet_file import read_parquet
 
 URL = "/api/v1/collections"
 
@@ -97,30 +90,6 @@ def test_the_landings_of_a_finished_dataset_are_returned(client: TestClient, dir
     assert (found["total"], found["is_finished"], found["has_more"]) == (3, True, False)
 
 
-def test_landings_are_read_without_the_other_columns(
-    client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    read: list[str] = []
-
-    def note_columns(*given: Any) -> Any:
-        table = read_parquet(*given)
-        read.extend(table.column_names)
-        return table
-
-    monkeypatch.setattr(dataset_routes, "read_parquet", note_columns)
-    client.get(f"{URL}/a/landings")
-    assert sorted(read) == ["digest", "landing_x_m", "landing_y_m", "outcome", "trial"]
-
-
-def test_too_many_landings_are_thinned_out(
-    client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(dataset_routes, "_MOST_LANDINGS", 2)
-    found = client.get(f"{URL}/a/landings").json()
-    assert (found["total"], [trial for *_, trial in found["landings"]]) == (3, [0, 2])
-    assert found["outcomes"] == {"landed": 3}
-
-
 def test_landings_of_a_growing_dataset_come_in_parts(client: TestClient, directory: Path, remember: Remember) -> None:
     """A growing dataset gives the same landings as the finished one, but in parts and in order of arrival."""
     finished = client.get(f"{URL}/a/landings").json()["landings"]
@@ -139,32 +108,6 @@ def test_landings_of_a_growing_dataset_come_in_parts(client: TestClient, directo
     assert (last["landings"], last["following"]) == ([], then["following"])
 
 
-def test_landings_of_a_long_journal_come_in_parts(
-    client: TestClient, directory: Path, remember: Remember, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    remember("growing", directory=str(directory))
-    monkeypatch.setattr(dataset_routes, "_JOURNAL_BYTES", 500)
-    first, landings, asked = 0, [], 0
-    has_more = True
-    while has_more:
-        found = client.get(f"{URL}/growing/landings", params={"first": first}).json()
-        has_more = found["has_more"]
-        assert found["following"] > first
-        first, asked = found["following"], asked + 1
-        landings += found["landings"]
-    assert (len(landings), asked > 2) == (3, True)
-
-
-def test_without_a_journal_there_are_no_landings(client: TestClient, directory: Path, remember: Remember) -> None:
-    remember("growing", directory=str(directory))
-    (directory / "logs" / "journal.jsonl").unlink()
-    assert client.get(f"{URL}/growing/landings").json()["landings"] == []
-    refused = client.get(f"{URL}/growing/landings", params={"first": -1})
-    assert (refused.status_code, refused.json()["problems"][0]["key"]) == (422, "first")
-    assert refused.json()["title"].startswith("first: should be a whole number from 0 to ")
-    assert refused.json()["title"].endswith(", got '-1'")
-
-
 def test_the_report_of_a_finished_dataset_is_one_page_and_leaves_no_file(
     client: TestClient, directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -177,29 +120,6 @@ def test_the_report_of_a_finished_dataset_is_one_page_and_leaves_no_file(
     assert answer.text.rstrip().endswith("</html>")
     assert sorted(directory.rglob("*")) == before
     assert not list((tmp_path / "scratch").iterdir())
-
-
-def test_reports_that_are_asked_for_at_the_same_time_are_written_one_after_the_other(
-    served: Served, directory: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    events: list[str] = []
-
-    def write(directory: Path, page: Path) -> None:
-        events.append("begins")
-        time.sleep(0.05)
-        page.write_text("a report")
-        events.append("ends")
-
-    async def ask() -> list[str]:
-        headers = {"Authorization": f"Bearer {served.keys.full}"}
-        transport = httpx.ASGITransport(served.app)
-        async with httpx.AsyncClient(transport=transport, base_url=f"http://{HOST}", headers=headers) as client:
-            answers = await asyncio.gather(*(client.get(f"{URL}/a/report") for _ in range(3)))
-        return [answer.text for answer in answers]
-
-    monkeypatch.setattr("throwcollect.report.write.write_report", write)
-    assert asyncio.run(ask()) == ["a report"] * 3
-    assert events == ["begins", "ends"] * 3
 
 
 def test_files_of_an_unfinished_dataset_are_refused(client: TestClient, directory: Path, remember: Remember) -> None:
@@ -222,16 +142,6 @@ def test_files_of_a_dataset_that_another_run_continues_are_refused(
     assert client.get(f"{URL}/a/files").status_code == 200
     remember("again", directory=str(directory))
     assert client.get(f"{URL}/a/files").status_code == 409
-
-
-def test_a_damaged_manifest_is_an_error(client: TestClient, directory: Path) -> None:
-    manifest = json.loads((directory / "datapackage.json").read_text())
-    manifest["resources"][0]["path"] = "../secret"
-    (directory / "datapackage.json").write_text(json.dumps(manifest))
-    for what in ("files", "files/..%2fsecret", "dataset.tar"):
-        answer = client.get(f"{URL}/a/{what}")
-        assert answer.status_code == 409
-        assert "is not the manifest of a dataset" in answer.json()["title"]
 
 
 def test_a_request_for_a_dataset_reads_no_records_of_other_datasets(

@@ -76,14 +76,6 @@ def test_the_last_watcher_restores_the_speed(
     assert simulation.asked[3:] == [SLOW, FAST]
 
 
-def test_the_restored_speed_is_that_of_the_configuration(
-    remember: Remember, tmp_path: Path, simulation: Simulation
-) -> None:
-    run = make(remember, tmp_path, more="sim: {real_time_factor: 3.0}\nrun: {simulations: 1, root_namespace: true}\n")
-    slow_down(run, "sim_0").restore_speed()
-    assert simulation.asked == [("/sim_0", 1.0), ("/sim_0", 3.0)]
-
-
 def test_the_next_server_restores_speeds_after_a_killed_one(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
@@ -133,16 +125,3 @@ def test_only_running_simulations_can_be_slowed_down(
         with pytest.raises(NotFoundError, match="no simulation"):
             slow_down(each, name)
     assert simulation.asked == []
-
-
-def test_a_vanished_run_is_not_asked_to_restore_its_speed(
-    remember: Remember, tmp_path: Path, simulation: Simulation
-) -> None:
-    directory = tmp_path / "datasets" / "a"
-    directory.mkdir(parents=True)
-    (directory / "config.yaml").write_text(CONFIG)
-    opened = remember("a", nodes=(SIM,))
-    hold = slow_down(Records().get("a"), "sim_0")
-    opened.forget()
-    hold.restore_speed()
-    assert simulation.asked == [SLOW]

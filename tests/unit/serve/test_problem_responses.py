@@ -9,7 +9,6 @@ from throwcollect.errors import (
     ConflictError,
     DatasetError,
     NotFoundError,
-    Problem,
     ThrowcollectError,
     WorkerError,
 )
@@ -35,18 +34,3 @@ def test_each_kind_of_error_has_a_status(error: ThrowcollectError, status: int) 
     assert response.status_code == status
     assert response.media_type == "application/problem+json"
     assert json.loads(response.body)["status"] == status
-
-
-def test_a_problem_response_has_all_facts_of_an_error() -> None:
-    problems = [Problem("should be 1", key="trials", line=3), Problem("unknown key", key="trails")]
-    found = json.loads(answer(ConfigError(problems, expected="one", hint="mend it")).body)
-    assert (found["expected"], found["hint"]) == ("one", "mend it")
-    assert found["problems"] == [
-        {"message": "should be 1", "key": "trials", "line": 3},
-        {"message": "unknown key", "key": "trails", "line": None},
-    ]
-    assert json.loads(answer(WorkerError("lost", evidence="a log")).body) == {
-        "title": "lost",
-        "status": 503,
-        "evidence": "a log",
-    }

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from datetime import datetime, timezone
-from typing import NoReturn
 
 import pytest
 from starlette.websockets import WebSocketDisconnect
-from tests.unit.serve.conftest import Remember, Served, make_end_fields
+from tests.unit.serve.conftest import Remember, Served
 
-from throwcollect.errors import ConflictError
-from throwcollect.serve import bridges, rosbridge_routes, run_end
+from throwcollect.serve import sockets
 
 
 def end_of(served: Served, path: str) -> tuple[int, str]:
@@ -25,16 +23,11 @@ def test_a_client_without_a_living_run_is_turned_away_with_the_reason(served: Se
     assert end_of(served, "/") == (4404, "no run lives; the path /rosbridge/RUN names one")
 
 
-def test_a_client_of_an_ended_run_is_turned_away_for_good(served: Served, remember: Remember) -> None:
-    remember("over", **make_end_fields())
-    assert end_of(served, "/rosbridge/over") == (4404, "run over has ended")
-
-
 @pytest.mark.parametrize("path", ["/rosbridge/small", "/", "/api/v1/instances/small/shown"])
 def test_a_client_is_told_when_its_run_ends_or_is_forgotten(
     path: str, served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_end, "_LOOK_S", 0.05)
+    monkeypatch.setattr(sockets, "_LOOK_S", 0.05)
     run = remember("small")
     with served.socket(path, served.keys.full) as socket:
         run.update(ended=datetime.now(timezone.utc), exit_code=0)
@@ -47,23 +40,3 @@ def test_a_client_is_told_when_its_run_ends_or_is_forgotten(
         with pytest.raises(WebSocketDisconnect) as end:
             socket.receive_text()
     assert (end.value.code, end.value.reason) == (4404, "no run small")
-
-
-def test_a_client_beyond_the_limit_is_told_to_try_later(
-    served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    remember("busy")
-    monkeypatch.setattr(bridges, "_MOST_CLIENTS", 0)
-    assert end_of(served, "/rosbridge/busy") == (
-        1013,
-        "0 clients are connected by rosbridge, which is the limit",
-    )
-
-
-def test_a_long_reason_is_cut_to_fit_into_a_close_frame(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rosbridge_routes, "_find_only_run", lambda: _fail("ä" * 100))
-    assert end_of(served, "/") == (4404, "ä" * 61)
-
-
-def _fail(message: str) -> NoReturn:
-    raise ConflictError(message)

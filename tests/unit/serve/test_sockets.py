@@ -19,7 +19,6 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.sync.client import connect
 
-from throwcollect.errors import WorkerError
 from throwcollect.serve.server_process import WEBSOCKETS
 from throwcollect.serve.sockets import keep_telling
 
@@ -113,20 +112,3 @@ def test_an_unexpected_error_closes_the_socket_and_gets_into_the_log(caplog: pyt
 
     assert end_of(fail) == (1011, "internal error")
     assert find_logged(caplog) == [error]
-
-
-def test_an_error_of_our_own_closes_the_socket_with_its_message_alone(caplog: pytest.LogCaptureFixture) -> None:
-    async def fail(_: WebSocket) -> None:
-        raise WorkerError("the simulation does not answer")
-
-    assert end_of(fail) == (4503, "the simulation does not answer")
-    assert find_logged(caplog) == []
-
-
-def test_sending_to_a_socket_that_was_closed_before_is_no_error_for_the_log(caplog: pytest.LogCaptureFixture) -> None:
-    async def speak_on(socket: WebSocket) -> None:
-        await socket.close(4404, "gone")
-        await socket.send_text("more")
-
-    assert end_of(speak_on) == (4404, "gone")
-    assert find_logged(caplog) == []

@@ -110,30 +110,6 @@ def test_listeners_share_one_thread_until_the_last_leaves(remember: Remember, li
     watch(Records().get("a"), scenario)
 
 
-def test_a_vanished_run_is_looked_for_without_busy_waiting(
-    remember: Remember, listeners: list[Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    opened = remember("a")
-    run, now, looks = Records().get("a"), Run.now, []
-
-    def look(self: Run) -> Run:
-        looks.append(self.id)
-        return now(self)
-
-    monkeypatch.setattr(Run, "now", look)
-
-    async def scenario(heard: ThrowWatch) -> None:
-        async with heard.throws():
-            await asyncio.sleep(0.05)
-            opened.forget()
-            await asyncio.sleep(0.05)
-            before, began = len(looks), time.monotonic()
-            await asyncio.sleep(0.2)
-            assert 0 < len(looks) - before <= (time.monotonic() - began) / 0.02 + 1
-
-    watch(run, scenario)
-
-
 def test_a_slow_listener_gets_the_newest_throw_and_a_late_one_the_last(
     remember: Remember, listeners: list[Any]
 ) -> None:

@@ -6,9 +6,7 @@ import hashlib
 import re
 from pathlib import Path
 
-import pytest
 from starlette.testclient import TestClient
-from starlette.websockets import WebSocketDisconnect
 from tests.unit.serve.conftest import Remember, Served
 
 from throwcollect.robots.talos import TALOS
@@ -70,22 +68,3 @@ def test_meshes_come_only_from_packages_of_robots(served: Served) -> None:
         "%2fetc/passwd",
     ):
         assert client.get(f"{base}/{path}").status_code == 404, path
-
-
-def test_a_socket_to_throws_of_no_run_or_of_a_damaged_record_is_refused_with_the_reason(
-    served: Served, remember: Remember, state: Path
-) -> None:
-    def end_of(name: str) -> tuple[int, str]:
-        with (
-            served.socket(f"{URL}/{name}/shown", served.keys.full) as socket,
-            pytest.raises(WebSocketDisconnect) as end,
-        ):
-            socket.receive_bytes()
-        return end.value.code, end.value.reason
-
-    assert end_of("nobody") == (4404, "no run nobody")
-    remember("a")
-    path = state / "runs" / "a.json"
-    path.write_text("{")
-    # The frame that closes a socket holds 123 bytes of the reason.
-    assert end_of("a") == (4404, f"{path}: the record of the run is damaged"[:123])

@@ -57,21 +57,6 @@ def test_a_watcher_gets_the_state_and_then_each_change() -> None:
     run(scenario)
 
 
-def test_an_unchanged_state_is_not_sent_again() -> None:
-    async def scenario(world: World, watch: StateWatch) -> None:
-        async with aclosing(watch.states()) as states:
-            await anext(states)
-            waiting = asyncio.ensure_future(anext(states))
-            before = world.looks
-            while world.looks < before + 3:
-                await asyncio.sleep(0.005)
-            assert not waiting.done()
-            waiting.cancel()
-            await asyncio.wait([waiting])
-
-    run(scenario)
-
-
 def test_a_slow_watcher_gets_only_the_latest_state() -> None:
     async def scenario(world: World, watch: StateWatch) -> None:
         async with aclosing(watch.states()) as slow, aclosing(watch.states()) as quick:
@@ -122,18 +107,3 @@ def test_watching_goes_on_after_an_error_which_is_logged_once_if_it_is_unexpecte
     run(scenario)
     logged = [each.exc_info[1] for each in caplog.records if each.name == watching.__name__ and each.exc_info]
     assert logged == ([error] if isinstance(error, TypeError) else [])
-
-
-def test_an_older_state_is_never_returned_after_a_newer_one() -> None:
-    """Of many concurrent requests, one that read early and takes long must not replace the result of a later one."""
-
-    async def scenario(world: World, watch: StateWatch) -> None:
-        async def ask() -> int:
-            world.instances += 1
-            return int((await watch.current()).components[0].instances[0])
-
-        assert [await asyncio.create_task(ask()) for _ in range(3)] == [1, 2, 3]
-        found = await asyncio.gather(*(watch.current() for _ in range(8)))
-        assert {state.revision for state in found} == {3}
-
-    run(scenario)

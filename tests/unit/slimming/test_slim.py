@@ -54,13 +54,6 @@ def elf(*needed: str) -> bytes:
     return header + load + table + names + dynamic + b"symbols" * 50
 
 
-def test_list_needed_reads_the_libraries_that_an_elf_file_needs(library: bytes) -> None:
-    from elf import list_needed
-
-    assert list_needed(elf("libb.so.1", "libc.so.6")) == ["libb.so.1", "libc.so.6"]
-    assert "libc.so.6" in list_needed(library)
-
-
 def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path: Path) -> None:
     from elf import list_needed, strip
 
@@ -119,14 +112,6 @@ def test_a_file_stays_if_a_node_may_load_it(path: str, stays: bool) -> None:
     assert is_kept(path) is stays
 
 
-def test_only_pyi_files_of_our_own_packages_are_removed() -> None:
-    from slim import is_kept
-
-    source = ROOT / "src"
-    gone = [path for path in source.rglob("*.*") if not is_kept(path.relative_to(source).as_posix())]
-    assert {path.suffix for path in gone} == {".pyi"}
-
-
 def test_libraries_that_no_module_reaches_are_superfluous() -> None:
     from slim import find_unreached
 
@@ -141,53 +126,6 @@ def test_libraries_that_no_module_reaches_are_superfluous() -> None:
     }
     superfluous = find_unreached({name: (lambda content=content: content) for name, content in files.items()})
     assert superfluous == {"cmeel.prefix/lib/liba.so.1.2.3", "other.libs/libd.so", "other.libs/libe.so"}
-
-
-def test_libraries_that_ros_loads_by_name_stay_with_what_they_need() -> None:
-    from slim import find_unreached
-
-    files = {
-        "data/lib/libtf2_msgs__rosidl_typesupport_fastrtps_c.so": elf("libstd_msgs__rosidl_typesupport_fastrtps_c.so"),
-        "data/lib/libstd_msgs__rosidl_typesupport_fastrtps_c.so": elf("libfastcdr.so.2"),
-        "data/lib/libtf2_msgs__rosidl_typesupport_introspection_cpp.so": elf(),
-        "data/lib/libfastcdr.so": elf(),
-        "data/lib/libfastcdr.so.2": elf(),
-    }
-    superfluous = find_unreached({name: (lambda content=content: content) for name, content in files.items()})
-    assert superfluous == {"data/lib/libtf2_msgs__rosidl_typesupport_introspection_cpp.so", "data/lib/libfastcdr.so"}
-
-
-def test_of_a_library_in_several_ros_wheels_one_copy_stays() -> None:
-    from slim import find_repeated
-
-    files = [
-        "ros_rcl.libs/libssl-60.so.1",
-        "ros_a.libs/libssl-60.so.1",
-        "ros_a.libs/libx.so",
-        "numpy.libs/libssl-60.so.1",
-    ]
-    assert find_repeated(files) == {"ros_rcl.libs/libssl-60.so.1"}
-
-
-def test_slimming_covers_the_other_directories_of_an_environment_with_ros(tmp_path: Path) -> None:
-    from slim import slim
-
-    packages = tmp_path / "lib" / "python3.11" / "site-packages"
-    stays = [
-        "bin/python",
-        "bin/fast-discovery-server",
-        "lib/libstd_msgs__rosidl_typesupport_fastrtps_c.so",
-        "lib/python3.11/site-packages/ros_wheels_bootstrapper/__init__.py",
-        "share/ament_index/resource_index/rmw_typesupport/rmw_fastrtps_cpp",
-    ]
-    goes = ["bin/fastdds", "include/std_msgs/std_msgs/msg/string.h", "lib/libother.so", "share/std_msgs/msg/String.msg"]
-    for name in [*stays, *goes]:
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_bytes(elf())
-    slim(packages)
-    assert sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()) == sorted(
-        stays
-    )
 
 
 def test_slimming_a_directory_again_changes_nothing(tmp_path: Path) -> None:
@@ -271,52 +209,3 @@ def test_wheels_are_downloaded_again_only_when_the_dependencies_change(
     monkeypatch.setattr(wheelhouse, "requirements", lambda: ["numpy", "scipy"])
     wheelhouse.main(target)
     assert len(downloads) == 2
-
-
-def test_a_download_that_fails_leaves_the_wheelhouse_as_it_was(
-    wheelhouse: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(_directory: Path) -> None:
-        raise subprocess.CalledProcessError(1, "pip")
-
-    monkeypatch.setattr(wheelhouse, "download", fail)
-    (tmp_path / "old.whl").write_bytes(b"")
-    with pytest.raises(subprocess.CalledProcessError, match="pip"):
-        wheelhouse.main(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["old.whl"]
-
-
-def test_a_wheelhouse_with_other_files_is_not_replaced(wheelhouse: ModuleType, tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(SystemExit, match=r"holds thesis.tex, which is no wheel"):
-        wheelhouse.main(tmp_path)
-    assert (tmp_path / "thesis.tex").exists()
-
-
-def test_ros_wheels_are_added_on_request_unless_another_version_exists(
-    wheelhouse: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def collect(directory: Path) -> None:
-        for name in ("one-2", "ros_rclpy-7"):
-            with zipfile.ZipFile(directory / f"{name}-py3-none-any.whl", "w") as wheel:
-                wheel.writestr(f"{name}.dist-info/RECORD", "")
-
-    ros = tmp_path / "ros"
-    ros.mkdir()
-    monkeypatch.setattr(wheelhouse, "ROS_WHEELS", ros)
-    monkeypatch.setattr(wheelhouse.ros_wheels, "fill", collect)
-    monkeypatch.setattr(wheelhouse, "download", fill)
-    target = tmp_path / "wheels"
-    names = ["one-1-py3-none-any.whl", "two-1-py3-none-any.whl"]
-    for wanted, found in ((True, [*names[:1], "ros_rclpy-7-py3-none-any.whl", *names[1:]]), (False, names)):
-        wheelhouse.main(target, ros=wanted)
-        assert sorted(path.name for path in target.glob("*.whl")) == found
-
-
-def test_the_wheelhouse_requires_the_dependencies_of_the_project() -> None:
-    import wheelhouse
-
-    wanted = wheelhouse.requirements()
-    assert wanted.count("pybullet==3.2.7") == wanted.count("mujoco-core==4.0.0") == 1
-    assert any(name.startswith("setuptools") for name in wanted)
-    assert not [name for name in wanted if name.startswith(("pytest", "ruff"))]

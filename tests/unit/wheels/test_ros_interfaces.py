@@ -4,7 +4,6 @@ import re
 import sys
 import tarfile
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -68,50 +67,3 @@ def test_the_source_archive_carries_definitions_and_licences_and_is_the_same_twi
     assert {"PKG-INFO", "pyproject.toml", "LICENSE", "LICENSE.BSD", "builder/__init__.py"} <= names
     assert "definitions/tf2_msgs/msg/TFMessage.msg" in names
     assert "definitions/std_srvs/srv/Trigger.srv" not in names
-
-
-def refusal(capsys: pytest.CaptureFixture[str]) -> str:
-    from builder import build_wheel, get_requires_for_build_wheel, prepare_metadata_for_build_wheel
-
-    said = set()
-    for hook in (get_requires_for_build_wheel, prepare_metadata_for_build_wheel, build_wheel):
-        with pytest.raises(SystemExit) as ended:
-            hook(*[] if hook is get_requires_for_build_wheel else ["/nowhere"])
-        said.add(str(ended.value.code))
-    (sentence,) = said
-    assert capsys.readouterr() == ("", "")
-    assert "\n" not in sentence
-    assert sentence.endswith(".")
-    return sentence
-
-
-@pytest.mark.parametrize(
-    ("where", "value", "sentence"),
-    [
-        ("platform.machine", lambda: "aarch64", "are for Linux on x86-64 alone, and this is Linux aarch64"),
-        ("platform.system", lambda: "Darwin", "and this is Darwin x86_64"),
-        ("platform.libc_ver", lambda: ("", ""), "need glibc 2.28 or later, and this machine has another C library"),
-        ("platform.libc_ver", lambda: ("glibc", "2.17"), "this machine has glibc 2.17"),
-        ("sys.version_info", (3, 12, 1), "make the virtual environment with python3.11"),
-        ("sys.implementation", SimpleNamespace(name="pypy"), "is for CPython 3.11 alone"),
-        ("shutil.which", lambda _: None, "there is no C compiler: install g++"),
-        ("sysconfig.get_path", lambda _: "/nowhere", "headers are missing (/nowhere/Python.h): install them"),
-    ],
-)
-def test_a_machine_that_cannot_build_gets_one_sentence(
-    where: str, value: object, sentence: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    import builder
-
-    assert builder
-    if sys.version_info[:2] != (3, 11):
-        monkeypatch.setattr("sys.version_info", (3, 11, 2))
-    monkeypatch.setattr(where, value)
-    assert sentence in refusal(capsys)
-
-
-def test_a_missing_compiler_is_an_error_that_names_it(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("CXX", "no-such-compiler -O3")
-    assert "CXX names no-such-compiler, which is not there" in refusal(capsys)

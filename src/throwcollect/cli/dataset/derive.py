@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
-from throwcollect.cli.printing import align, format_number, print_result, tell
+from throwcollect.cli.printing import align, format_number, print_result
 from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
@@ -27,14 +27,10 @@ def merge_datasets(
     output: OutputArgument,
     json: JsonOption = False,
 ) -> None:
-    """Put the trials of several datasets one after the other."""
+    """Put the trials of several datasets into one."""
     from throwcollect.derive.selection import merge
 
-    found = merge(directories, output)
-    if found.repeated:
-        twice = format_count(found.repeated, "trial")
-        tell(f"warning: in more than one of the datasets, and so more than once in the new one: {twice}")
-    _show(output, found, json=json)
+    _show(output, merge(directories, output), json=json)
 
 
 def filter_dataset(

@@ -47,9 +47,10 @@ def replay_dataset(
     if plot is not None and engine is None:
         raise ConfigError("--plot: should be given with --engine")
     dataset = Dataset.open(directory)
+    known = dataset.throws["trial"].to_pylist()
     for trial in trials or ():
-        if not 0 <= trial < len(dataset.throws):
-            raise ConfigError(f"{directory}: no trial {trial}", expected=f"0 to {len(dataset.throws) - 1}")
+        if trial not in known:
+            raise ConfigError(f"{directory}: no trial {trial}", expected=f"trials from {known[0]} to {known[-1]}")
         # A trial without an episode is refused here, before any throw is simulated.
         dataset.episode(trial)
     chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)

@@ -7,11 +7,9 @@ import shlex
 import typer
 
 from throwcollect.cli.options import RunOption
-from throwcollect.cli.ros.graph_actions import action_app
-from throwcollect.cli.ros.graph_nodes import node_app
-from throwcollect.cli.ros.graph_services import service_app
+from throwcollect.cli.ros.calls import action_app, service_app
 from throwcollect.cli.ros.graph_topics import topic_app
-from throwcollect.cli.ros.params import param_app
+from throwcollect.cli.ros.nodes import node_app, param_app
 from throwcollect.files import write_secret
 
 ros_app = typer.Typer(help="Look into the ROS graph, as the command `ros2` does.", no_args_is_help=True)

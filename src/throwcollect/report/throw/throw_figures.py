@@ -8,6 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from throwcollect.dataset.motion import Joint
+from throwcollect.dataset.throw import BallEvent, Throw
 from throwcollect.report.figures import (
     BLUE,
     LEGEND_ABOVE,
@@ -19,9 +21,8 @@ from throwcollect.report.figures import (
 )
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
 from throwcollect.report.plotted_points import choose_points
-from throwcollect.report.throw.coverage import CellAxis
-from throwcollect.report.throw.episodes import BallPath, JointMotion, Residuals
-from throwcollect.report.throw.landings import Landings
+from throwcollect.report.throw.episodes import Residuals
+from throwcollect.report.throw.landings import CellAxis, Landings
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 _SCALE = "Viridis"
@@ -160,9 +161,9 @@ def draw_residuals(residuals: Residuals) -> go.Figure:
     return figure.update_layout(height=300, bargap=0)
 
 
-def draw_ball_views(paths: Sequence[BallPath], landing_height_m: float | None) -> tuple[go.Figure, go.Figure]:
+def draw_ball_views(throws: Sequence[Throw], landing_height_m: float | None) -> tuple[go.Figure, go.Figure]:
     """Draw paths of the ball as seen from the robot's right, and from above."""
-    side, above = _draw_paths(paths, 2), _draw_paths(paths, 1)
+    side, above = _draw_paths(throws, 2), _draw_paths(throws, 1)
     if landing_height_m is not None:
         side.add_hline(y=landing_height_m, line={"color": NEUTRAL, "width": 1})
     side.update_yaxes(title="z, up [m]")
@@ -170,18 +171,19 @@ def draw_ball_views(paths: Sequence[BallPath], landing_height_m: float | None) -
     return side, above
 
 
-def _draw_paths(paths: Sequence[BallPath], axis: int) -> go.Figure:
+def _draw_paths(throws: Sequence[Throw], axis: int) -> go.Figure:
     """Draw paths of the ball: x against another coordinate."""
     letter = "xyz"[axis]
     figure = go.Figure()
-    landed = [path.trial for path in paths if path.outcome == LANDED]
-    for path in paths:
-        name, colour = f"trial {path.trial}, {in_words(path.outcome)}", style_of(path.outcome).colour
-        if path.outcome == LANDED:
-            name = f"trial {path.trial}"
-            colour = _SHADES[landed.index(path.trial) * (len(_SHADES) - 1) // max(len(landed) - 1, 1)]
-        x, y = single_precision(path.positions[:, 0]), single_precision(path.positions[:, axis])
-        release = len(x) - 1 if path.release is None else path.release
+    landed = [throw.trial for throw in throws if throw.outcome == LANDED]
+    for throw in throws:
+        name, colour = f"trial {throw.trial}, {in_words(throw.outcome)}", style_of(throw.outcome).colour
+        if throw.outcome == LANDED:
+            name = f"trial {throw.trial}"
+            colour = _SHADES[landed.index(throw.trial) * (len(_SHADES) - 1) // max(len(landed) - 1, 1)]
+        x, y = (single_precision(throw.ball.position[:, each]) for each in (0, axis))
+        left = throw.events.release
+        release = len(x) - 1 if left is None else int(np.searchsorted(throw.ball.time_s, left.time_s))
         hover = f"x %{{x:.3f}} m, {letter} %{{y:.3f}} m<extra>{name}</extra>"
         common = {"legendgroup": name, "name": name, "hovertemplate": hover}
         # Both lines include the sample of the release, so that they meet.
@@ -189,7 +191,7 @@ def _draw_paths(paths: Sequence[BallPath], axis: int) -> go.Figure:
         line = {"color": colour, "width": 1, "dash": "dot"}
         figure.add_scatter(x=x[held], y=y[held], mode="lines", line=line, showlegend=False, **common)
         figure.add_scatter(x=x[free], y=y[free], mode="lines", line={"color": colour, "width": 2}, **common)
-        if path.release is not None:
+        if left is not None:
             at = slice(release, release + 1)
             marker = {"color": colour, "size": 8, "symbol": "circle-open", "line": {"width": 2}}
             figure.add_scatter(x=x[at], y=y[at], mode="markers", marker=marker, showlegend=False, **common)
@@ -198,23 +200,33 @@ def _draw_paths(paths: Sequence[BallPath], axis: int) -> go.Figure:
     return figure.update_layout(height=480, legend=LEGEND_ABOVE)
 
 
-def draw_joint(motion: JointMotion, column: int) -> go.Figure:
-    """Draw commanded and measured position of one joint."""
+def draw_joint(joint: Joint, commanded: NDArray[np.float64], release: BallEvent | None) -> go.Figure:
+    """Draw commanded [rad] and measured position of one joint."""
     figure = go.Figure()
     for values, name, line in (
-        (motion.measured, "measured", {"color": "#56B4E9", "width": 4}),
-        (motion.commanded, "commanded", {"color": "#D55E00", "width": 1.5, "dash": "dash"}),
+        (joint.position, "measured", {"color": "#56B4E9", "width": 4}),
+        (commanded, "commanded", {"color": "#D55E00", "width": 1.5, "dash": "dash"}),
     ):
         figure.add_scatter(
-            x=single_precision(motion.times_s),
-            y=single_precision(np.degrees(values[:, column])),
+            x=single_precision(joint.time_s),
+            y=single_precision(np.degrees(values)),
             mode="lines",
             name=name,
             line=line,
             hovertemplate=f"%{{x:.3f}} s, %{{y:.2f}}°<extra>{name}</extra>",
         )
-    if motion.release_s is not None:
-        figure.add_vline(x=motion.release_s, line=MOMENT_LINE, name="release")
+    if release is not None:
+        figure.add_vline(x=release.time_s, line=MOMENT_LINE, name="release")
     figure.update_xaxes(title="time [s]")
-    figure.update_yaxes(title="position [°]", range=list(motion.span(column)))
+    figure.update_yaxes(
+        title="position [°]", range=_choose_span(np.degrees(np.concatenate([commanded, joint.position])))
+    )
     return figure.update_layout(height=230, showlegend=False)
+
+
+def _choose_span(positions: NDArray[np.float64]) -> list[float]:
+    """Choose the range of positions to show [°]: at least 6°, so that a joint at rest looks at rest."""
+    finite = positions[np.isfinite(positions)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    room = max(0.05 * (high - low), 3.0 - (high - low) / 2)
+    return [low - room, high + room]

@@ -9,23 +9,17 @@ from markupsafe import Markup
 
 from throwcollect.config.sweep import LANDING_HEIGHT
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throw import Throw
 from throwcollect.report.amounts import format_share
 from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.plotted_points import MOST_POINTS
 from throwcollect.report.throw import throw_figures
-from throwcollect.report.throw.coverage import Coverage, count_throws
-from throwcollect.report.throw.episodes import (
-    BallPath,
-    JointMotion,
-    Residuals,
-    choose_examples,
-    measure_residuals,
-    read_motion,
-    read_paths,
-)
-from throwcollect.report.throw.landings import Landings, read_landings
+from throwcollect.report.throw.episodes import Residuals, choose_examples, measure_residuals
+from throwcollect.report.throw.landings import Coverage, Landings, count_throws, read_landings
 from throwcollect.robots.description import robot_of
+from throwcollect.robots.quintic_curve import sample_positions
+from throwcollect.tasks.task import trajectory_of
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 from throwcollect.wording import format_count
 
@@ -36,11 +30,9 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     throws, swept = dataset.throws, LANDING_HEIGHT in dataset.plan.keys
     height_m = None if swept else dataset.config.scene.landing_height_m
     landings = read_landings(throws, outcomes)
-    planned = landings[outcomes.are(LANDED)[landings.trial]]
+    planned = landings[outcomes.are(LANDED)[landings.row]]
     coverage = count_throws(planned, throws, target=dataset.config.sweep.target)
-    examples = choose_examples(dataset, planned, outcomes)
-    paths = tuple(read_paths(dataset, examples))
-    motion = read_motion(dataset, _choose_middle(paths)) if paths else None
+    examples = [dataset[trial] for trial in choose_examples(dataset, planned, outcomes)]
     return TaskReport(
         subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by {robot.introduction}",
         tiles=tuple(_show_key_numbers(planned, outcomes)),
@@ -49,16 +41,16 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
             _show_releases(landings, outcomes),
         ),
         episodes=(
-            _show_examples(paths, motion, tool=dataset.config.tool.name, height_m=height_m),
+            _show_examples(dataset, examples, height_m=height_m),
             _show_physics(measure_residuals(dataset)),
         ),
     )
 
 
-def _choose_middle(paths: Sequence[BallPath]) -> int:
-    """Choose, of the trials that landed, the one in the middle; the first of all if none landed."""
-    landed = [path.trial for path in paths if path.outcome == LANDED]
-    return landed[len(landed) // 2] if landed else paths[0].trial
+def _choose_middle(throws: Sequence[Throw]) -> Throw:
+    """Choose, of the throws that landed, the one in the middle; the first of all if none landed."""
+    landed = [throw for throw in throws if throw.outcome == LANDED]
+    return landed[len(landed) // 2] if landed else throws[0]
 
 
 def _show_key_numbers(landings: Landings, outcomes: Outcomes) -> Iterator[Tile]:
@@ -131,33 +123,34 @@ def _say_how_many(landings: Landings) -> str:
     return f"{MOST_POINTS:,} of {count:,} throws, chosen at random." if count > MOST_POINTS else ""
 
 
-def _show_examples(
-    paths: Sequence[BallPath], motion: JointMotion | None, *, tool: str, height_m: float | None
-) -> ReportSection:
+def _show_examples(dataset: Dataset, throws: Sequence[Throw], *, height_m: float | None) -> ReportSection:
     title = "A few throws"
-    if motion is None:
+    if not throws:
         return ReportSection("throws", "Throws", title, "No trial has an episode.")
-    text = f"Dotted while the {tool} holds the ball; a ring marks the release."
-    if (landed := sum(path.outcome == LANDED for path in paths)) > 1:
+    text = f"Dotted while the {dataset.config.tool.name} holds the ball; a ring marks the release."
+    if (landed := sum(throw.outcome == LANDED for throw in throws)) > 1:
         text = f"{landed} throws that landed, from the nearest to the farthest. {text}"
-    side, above = throw_figures.draw_ball_views(paths, height_m)
+    side, above = throw_figures.draw_ball_views(throws, height_m)
     views = (
         Panel("side", "The ball from the side", side, picture="ball_paths"),
         Panel("above", "The ball from above", above),
     )
-    note = f"Joints of trial {motion.trial}: measured (blue) and commanded (orange, dashed)"
-    note += "; the vertical line is the release." if motion.release_s is not None else "."
-    errors = np.degrees(np.abs(motion.measured - motion.commanded).max(axis=0))
+    middle = _choose_middle(throws)
+    release, trajectory = middle.events.release, trajectory_of(dataset.plan.config_of(dataset.plan.trial(middle.trial)))
+    note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
+    note += "; the vertical line is the release." if release is not None else "."
+    commanded = dict(zip(trajectory.joints, sample_positions(trajectory, middle.joints.time_s).T, strict=True))
+    errors = {name: np.degrees(np.abs(middle.joints[name].position - goal).max()) for name, goal in commanded.items()}
     joints = tuple(
         Panel(
-            key=joint,
-            title=joint,
-            figure=throw_figures.draw_joint(motion, column),
-            text=f"Largest tracking error: {errors[column]:.2g}°.",
+            key=name,
+            title=name,
+            figure=throw_figures.draw_joint(middle.joints[name], goal, release),
+            text=f"Largest tracking error: {errors[name]:.2g}°.",
             picture="joint_tracking",
             small=True,
         )
-        for column, joint in enumerate(motion.joints)
+        for name, goal in commanded.items()
     )
     return ReportSection("throws", "Throws", title, text, (views, note, joints))
 

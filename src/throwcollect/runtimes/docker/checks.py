@@ -15,7 +15,6 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.runtimes.docker.address import engine_address
 from throwcollect.runtimes.docker.container_options import (
-    ROUTER_PORT,
     RUN_LABEL,
     RunPlace,
     image,
@@ -42,10 +41,6 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> str:
         begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
     sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
     image_id = _check(client, image(config), sections)
-    twice = [port for port in (str(ROUTER_PORT), f"{ROUTER_PORT}/tcp") if port in config.containers.router.ports]
-    if config.run.router_port and twice:
-        wrong = "should be left out, as run.router_port publishes the same port"
-        raise ConfigError([Problem(wrong, f"containers.router.ports.{port}") for port in twice])
     if config.run.router_port and not begun:
         # The engine binds the port later; trying it here gives an error that names the key of the configuration.
         reserve_port(config.run).close()

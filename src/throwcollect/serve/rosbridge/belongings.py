@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import Generic, Protocol, TypeVar
 
-from throwcollect.errors import ConfigError
 from throwcollect.serve.rosbridge.peer import Peer
-
-_MOST = 1000
-"""Most belongings of one kind; each more makes the next one slower, for all clients, as Zenoh has to announce them."""
 
 
 class Belonging(Protocol):
@@ -49,8 +45,3 @@ class Belongings(Generic[ABelonging]):
         for belonging in self._by_name.values():
             belonging.close()
         self._by_name.clear()
-
-    def _require_room(self, what: str) -> None:
-        """Refuse one more belonging if the client has too many."""
-        if len(self._by_name) >= _MOST:
-            raise ConfigError(f"{what}: this client has {_MOST} of these already, which is the limit")

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import logging
+import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.serve.rosbridge.client_goals import Goal, Goals
-from throwcollect.serve.rosbridge.codec import Frame, read_frame
-from throwcollect.serve.rosbridge.file_server import GET_FILE, give_file
-from throwcollect.serve.rosbridge.inbox import Inbox
-from throwcollect.serve.rosbridge.offered_actions import OfferedAction
-from throwcollect.serve.rosbridge.offered_services import OfferedService
-from throwcollect.serve.rosbridge.offers import Offers
+from throwcollect.serve.rosbridge.codec import Frame, Reassembly, read_frame
+from throwcollect.serve.rosbridge.errands import Goal, Goals, Questions
+from throwcollect.serve.rosbridge.offers import OfferedAction, OfferedService, Offers
 from throwcollect.serve.rosbridge.peer import LEVELS, Peer, PeerHost
-from throwcollect.serve.rosbridge.publishers import Publishers
-from throwcollect.serve.rosbridge.questions import Questions
-from throwcollect.serve.rosbridge.reassembly import Reassembly
 from throwcollect.serve.rosbridge.request import BridgeRequest, Form, RequestId, sentence
-from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, Answer, Rosapi
+from throwcollect.serve.rosbridge.rosapi import GET_FILE, SET_PARAMETER, Answer, Rosapi, give_file
 from throwcollect.serve.rosbridge.service_calls import Call, call_node
-from throwcollect.serve.rosbridge.subscriptions import Subscriptions
+from throwcollect.serve.rosbridge.topics import Publishers, Subscriptions
 from throwcollect.wording import suggest
+
+_MOST_FRAMES = 1000
+_MOST_BYTES = 32 * 2**20
+"""Limits of frames that wait while the run has no router."""
+
 
 Operation = Callable[[BridgeRequest], None]
 
@@ -189,3 +189,39 @@ class BridgeClient(Peer):
     def _authenticate(self, request: BridgeRequest) -> None:
         """Refuse the operation by which clients of ROS 1 authenticate themselves."""
         raise ConfigError(f"{request.op}: clients do not authenticate here", expected="the token in the address")
+
+
+class Inbox:
+    """A queue of frames, which any thread may use."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._frames: deque[Frame] = deque()
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the frames that wait have reached a limit; who must not lose a frame may add it nevertheless."""
+        return len(self._frames) >= _MOST_FRAMES or self._bytes >= _MOST_BYTES
+
+    def put(self, frame: Frame) -> None:
+        """Add a frame."""
+        with self._lock:
+            self._frames.append(frame)
+            self._bytes += len(frame)
+
+    def take(self) -> Frame:
+        """Take the oldest frame."""
+        with self._lock:
+            frame = self._frames.popleft()
+            self._bytes -= len(frame)
+            return frame
+
+    def clear(self) -> None:
+        """Forget all frames."""
+        with self._lock:
+            self._frames.clear()
+            self._bytes = 0

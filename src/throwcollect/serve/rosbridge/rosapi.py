@@ -1,18 +1,23 @@
-"""The services of rosapi, by which clients look around in the ROS graph; the bridge itself answers them."""
+"""The services of rosapi, by which clients look around in the ROS graph, and that of ROS# that gives meshes."""
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable, Iterable, Mapping
-from typing import Literal
+from typing import Any, Literal
 
 from rclzenoh.interfaces import message_definition
+from rclzenoh.interfaces.catalog import structure
 from rclzenoh.names import join
 from throwcollect import ros
-from throwcollect.ros.graph_names import absolute_name, full_name, is_hidden
+from throwcollect.errors import ConfigError
+from throwcollect.robots.urdf import PACKAGE
+from throwcollect.ros.graph_names import absolute_name, find_interface, full_name, is_hidden
+from throwcollect.ros.message_values import array_parts
+from throwcollect.serve.robot_files import find_mesh
+from throwcollect.serve.rosbridge.errands import Questions
 from throwcollect.serve.rosbridge.guarded import is_guarded
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.questions import Questions
-from throwcollect.serve.rosbridge.rosapi_details import describe_message, describe_service
 from throwcollect.serve.rosbridge.rosapi_parameters import Parameters
 from throwcollect.serve.rosbridge.service_calls import Call
 from throwcollect.units import NS_PER_S
@@ -192,3 +197,69 @@ def _find_definition(type_name: str) -> str:
         return message_definition(type_name)
     except ValueError:
         return ""
+
+
+GET_FILE = "file_server/get_file"
+"""Name of the service, without a slash at its beginning."""
+
+
+def give_file(call: Call) -> None:
+    """Answer a call with the bytes of a mesh that it names as ``package://NAME/PATH``."""
+    url = call.fields.text("name")
+    name, _, rest = url.removeprefix(PACKAGE).partition("/")
+    if not url.startswith(PACKAGE):
+        raise ConfigError(f"{url}: not a file of a robot's description", expected=f"{PACKAGE}NAME/PATH")
+    path = find_mesh(name, rest)
+    data = path.read_bytes()
+    call.reply({"value": base64.b64encode(data).decode() if call.form.compression == "none" else data})
+
+
+Definition = Mapping[str, object]
+"""Fields of rosapi_msgs/msg/TypeDef."""
+
+
+def describe_message(name: str) -> list[Definition]:
+    """Describe a message, named in full or as ``pkg/Type``."""
+    return _describe(full_name("msg", name), find_interface("msg", name), [])
+
+
+def describe_service(name: str, part: Literal["Request", "Response"]) -> list[Definition]:
+    """Describe the request or the response of a service, named in full or as ``pkg/Type``."""
+    service = find_interface("srv", name)
+    return _describe(f"{full_name('srv', name)}_{part}", getattr(service, part), [])
+
+
+def _describe(name: str, message_class: Any, seen: list[str]) -> list[Definition]:
+    seen.append(name)
+    message, kinds, lengths, examples = message_class(), [], [], []
+    types = message_class.get_fields_and_field_types()
+    for field, kind in types.items():
+        parts = array_parts(kind)
+        kinds.append(parts[0] if parts else kind)
+        # In rosapi, -1 stands for no array, and 0 for an array of any length.
+        lengths.append(-1 if parts is None else parts[2] or 0)
+        examples.append("[]" if parts else "{}" if "/" in kind else str(getattr(message, field)))
+    constants = _find_constants(name)
+    package, _, short = name.replace("/", " ").split()
+    definition = {
+        "type": f"{package}/{short}",
+        "fieldnames": list(types),
+        "fieldtypes": kinds,
+        "fieldarraylen": lengths,
+        "examples": examples,
+        "constnames": list(constants),
+        "constvalues": [str(value) for value in constants.values()],
+    }
+    found: list[Definition] = [definition]
+    for kind in kinds:
+        inner = full_name("msg", kind)
+        if "/" in kind and inner not in seen:
+            found += _describe(inner, ros.get_message(inner), seen)
+    return found
+
+
+def _find_constants(name: str) -> Mapping[str, object]:
+    try:
+        return structure(name).constants
+    except ValueError:
+        return {}

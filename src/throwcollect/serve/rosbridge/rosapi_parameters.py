@@ -12,9 +12,9 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, is_hidden
 from throwcollect.ros.message_values import plain
+from throwcollect.serve.rosbridge.errands import Questions
 from throwcollect.serve.rosbridge.guarded import refuse_leases
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.questions import Questions
 from throwcollect.serve.rosbridge.request import sentence
 from throwcollect.serve.rosbridge.service_calls import Call
 

@@ -9,9 +9,9 @@ from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, full_name
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.codec import plain_values
+from throwcollect.serve.rosbridge.errands import Questions
 from throwcollect.serve.rosbridge.guarded import refuse_secrets
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.questions import Questions
 from throwcollect.serve.rosbridge.request import BridgeRequest, Fields, Form
 
 

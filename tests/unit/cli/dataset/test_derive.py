@@ -10,10 +10,7 @@ from typer.testing import CliRunner
 
 from throwcollect.cli.main import dataset_app
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.source import source as find_source
 from throwcollect.derive.split import assign
-
-REPEATED = "warning: in more than one of the datasets, and so more than once in the new one"
 
 
 def run(*arguments: str | Path) -> str:
@@ -43,26 +40,11 @@ def test_commands_say_how_many_trials_without_an_episode_were_left_out(source: P
         r"left out, as they have no episode: 1 lost, 1 refused\n",
         text,
     )
-    merged = CliRunner().invoke(dataset_app, ["merge", str(source), str(tmp_path / "a"), str(tmp_path / "b"), "--json"])
+    run("filter", source, tmp_path / "b", "--where", "trial == 6")
+    merged = CliRunner().invoke(dataset_app, ["merge", *(str(tmp_path / each) for each in "abc"), "--json"])
     found = json.loads(merged.stdout)
     assert found.pop("digest")
-    assert found == {
-        "directory": str(tmp_path / "b"),
-        "trials": 9,
-        "offered": 11,
-        "without_episode": {"lost": 1, "refused": 1},
-        "repeated": 4,
-    }
-    assert merged.stderr == f"{REPEATED}: 4 trials\n"
-
-
-def test_the_command_merge_warns_only_of_trials_that_several_datasets_have(source: Path, tmp_path: Path) -> None:
-    for name, condition in (("even", "trial % 2 == 0"), ("odd", "trial % 2 == 1"), ("late", "trial > 3")):
-        run("filter", source, tmp_path / name, "--where", condition)
-    assert "warning" not in run("merge", tmp_path / "even", tmp_path / "odd", tmp_path / "whole")
-    twice = run("merge", tmp_path / "late", tmp_path / "odd", tmp_path / "late", tmp_path / "twice")
-    # Of the trials 4 to 6, one was lost.
-    assert f"{REPEATED}: 2 trials\n" in twice
+    assert found == {"directory": str(tmp_path / "c"), "trials": 5, "offered": 5, "without_episode": {}}
 
 
 def test_the_command_sample_takes_the_same_trials_for_the_same_seed_and_others_for_another(
@@ -88,7 +70,7 @@ def test_the_command_split_says_what_each_part_has_and_passes_the_seed_on(source
     assert told == [(name, str(part["dataset"]["trials"]), str(part["cells"])) for name, part in found["parts"].items()]
     assert found["without_episode"] == {"lost": 1, "refused": 1}
     options: Any = {"fractions": "a=0.5,b=0.5", "cells": ["trial=2"]}
-    first, second = (assign(find_source(Dataset.open(source)), **options, seed=seed) for seed in (1, 2))
+    first, second = (assign(Dataset.open(source), **options, seed=seed) for seed in (1, 2))
     for name, trials in first.items():
         assert trials_of(tmp_path / "parts" / name) == trials_of(tmp_path / "again" / name) == list(trials)
     assert first != second

@@ -58,7 +58,7 @@ def test_a_throw_that_replays_differently_is_an_error_and_its_differences_are_pr
 
 @pytest.mark.usefixtures("chosen")
 def test_replaying_a_trial_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ConfigError, match="data: no trial 20\n  expected: 0 to 19"):
+    with pytest.raises(ConfigError, match="data: no trial 20\n  expected: trials from 0 to 19"):
         replay_dataset(Path("data"), [20], everything=False, sample=None, json=False)
 
 

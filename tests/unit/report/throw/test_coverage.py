@@ -1,3 +1,5 @@
+"""Coverage of the plane by landings."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -5,15 +7,16 @@ import pyarrow as pa
 import pytest
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.report.throw.coverage import CellAxis, count_throws
-from throwcollect.report.throw.landings import Landings
+from throwcollect.report.throw.landings import CellAxis, Landings, count_throws
 from throwcollect.report.throw.throw_figures import draw_coverage_map
 
 
 def make_landings(distance: list[float], angle: list[float]) -> Landings:
     count, zero = len(distance), np.zeros(len(distance))
     trials = np.arange(count)
-    return Landings(trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0)
+    return Landings(
+        trials, trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0
+    )
 
 
 def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
@@ -24,7 +27,7 @@ def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
             "hit_angle_rad": {"min": 0, "max": 1, "bins": 1},
         }
     )
-    throws = pa.table({"scene.landing_height_m": [0.2, 0.7, 1.0, 0.1]})
+    throws = pa.table({"scene_landing_height_m": [0.2, 0.7, 1.0, 0.1]})
     found = count_throws(make_landings([1.2, 1.2, 2.0, 2.1], [0.5, 0.5, 1.0, 0.5]), throws, target=target)
     assert found is not None
     assert found.counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height

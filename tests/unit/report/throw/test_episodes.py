@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.throw.episodes import choose_examples, measure_residuals, read_motion, read_paths
+from throwcollect.report.throw.episodes import choose_examples, measure_residuals
 from throwcollect.report.throw.landings import read_landings
 
 
@@ -24,24 +24,12 @@ def test_example_throws_have_an_episode_and_are_in_order_of_distance(collection:
     nearest = landings.trial[np.argsort(landings.distance_m)].tolist()
     examples = choose_examples(dataset, landings, outcomes)
     assert list(examples) == nearest
-    assert [path.trial for path in read_paths(dataset, examples)] == nearest
-    motion = read_motion(dataset, 3)
-    assert motion.trial == 3
-    assert np.abs(motion.measured - motion.commanded).max() < 1e-9
 
 
 def test_flights_of_a_sound_dataset_are_ballistic(collected: Path) -> None:
     residuals = measure_residuals(Dataset.open(collected))
     assert (residuals.episodes, residuals.checked, len(residuals.distance_m)) == (7, 7, 7)
     assert residuals.distance_m.max() < 1e-12
-
-
-def test_residuals_of_many_episodes_are_computed_only_for_a_part(
-    collected: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("throwcollect.report.throw.episodes.MOST_RESIDUALS", 3)
-    found = measure_residuals(Dataset.open(collected))
-    assert (found.episodes, found.checked, len(found.distance_m)) == (7, 3, 3)
 
 
 def test_a_kick_in_a_flight_shows_in_its_residual(collection: Any, tmp_path: Path) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -12,9 +10,7 @@ import pytest
 from tests.unit.runtimes.apptainer.test_archive import write_archive
 
 import throwcollect
-from throwcollect.errors import ConfigError, DatasetError, WorkerError
-from throwcollect.extras import MissingExtraError
-from throwcollect.runtimes.apptainer import sif
+from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtimes.apptainer.sif import make_sif
 from throwcollect.runtimes.apptainer.sif_contents import check_sif, read_labels
 from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL, digest_sources, source_root
@@ -132,90 +128,12 @@ def test_the_base_image_of_a_sif_may_be_a_file_or_a_directory(apptainer: Path, t
         assert f"bootstrap={bootstrap}" in (apptainer / "asked").read_text().splitlines()
 
 
-def test_without_the_docker_package_a_sif_is_built_only_from_the_clone(
-    apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def import_client(**_: object) -> None:
-        raise ModuleNotFoundError("No module named 'docker'", name="docker")
-
-    monkeypatch.setattr("throwcollect.runtimes.docker.docker_engine.connect", import_client)
-    assert "the package docker is not installed" in make(tmp_path / "it.sif")[0]
-    with pytest.raises(MissingExtraError):
-        make(tmp_path / "it.sif", image="mine")
-
-
-def test_making_a_sif_of_a_named_image_needs_a_docker_engine(apptainer: Path, tmp_path: Path) -> None:
-    with pytest.raises(WorkerError, match="no Docker engine answers"):
-        make(tmp_path / "it.sif", image="mine")
-
-
-def test_a_disk_that_fills_up_while_apptainer_builds_gives_a_hint_at_tmpdir(apptainer: Path, tmp_path: Path) -> None:
-    write_program(apptainer, 'echo "FATAL: write /a/b: no space left on device" >&2; exit 255')
-    with pytest.raises(WorkerError, match=r"it\.sif: cannot be made: no space left on device") as caught:
-        make(tmp_path / "it.sif")
-    assert "TMPDIR" in str(caught.value.hint)
-
-
-def test_a_disk_that_is_full_before_apptainer_begins_gives_a_hint_at_tmpdir(
-    apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fill(_archive: Path, _directory: Path) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/somewhere")
-
-    monkeypatch.setattr(sif, "unpack_archive", fill)
-    archive = write_archive(tmp_path / "image.tar", "throwcollect")
-    with pytest.raises(WorkerError, match=r"it\.sif: cannot be made: No space left on device") as caught:
-        make(tmp_path / "it.sif", archive=archive)
-    assert "TMPDIR" in str(caught.value.hint)
-    assert archive.exists()
-
-
-def test_a_base_image_of_a_sif_that_cannot_be_pulled_gives_a_hint(apptainer: Path, tmp_path: Path) -> None:
-    write_program(
-        apptainer, 'echo "FATAL:   While performing build: conveyor failed to get: no such host" >&2; exit 255'
-    )
-    with pytest.raises(WorkerError, match="conveyor failed to get: no such host") as caught:
-        make(tmp_path / "it.sif")
-    assert "--base" in str(caught.value.hint)
-
-
-def test_making_a_sif_without_a_temporary_directory_is_refused(
-    apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
-    with pytest.raises(ConfigError, match="no directory for temporary files can be written"):
-        make(tmp_path / "it.sif")
-
-
 def test_making_a_sif_without_apptainer_and_singularity_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(WorkerError, match="neither apptainer nor singularity is installed"):
         make(tmp_path / "it.sif")
-
-
-def test_singularity_is_used_if_apptainer_is_missing(apptainer: Path, tmp_path: Path) -> None:
-    (apptainer / "apptainer").rename(apptainer / "singularity")
-    make(tmp_path / "it.sif")
-    assert (tmp_path / "it.sif").exists()
-
-
-def test_a_file_that_is_no_sif_is_not_replaced(apptainer: Path, tmp_path: Path) -> None:
-    (tmp_path / "throws.yaml").write_text("trials: 2\n")
-    for name in ("throws.yaml", "apptainer"):
-        with pytest.raises(ConfigError, match="exists and is no SIF"):
-            make(tmp_path / name)
-    assert (tmp_path / "throws.yaml").read_text() == "trials: 2\n"
-    with pytest.raises(DatasetError, match="cannot be written: No such file or directory"):
-        make(tmp_path / "missing" / "it.sif")
-
-
-def test_an_archive_of_another_image_is_not_converted(apptainer: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="holds an image that is not of throwcollect"):
-        make(tmp_path / "it.sif", archive=write_archive(tmp_path / "image.tar", "bash"))
-    assert not (apptainer / "asked").exists()
-    assert not list(tmp_path.glob("it.sif*"))
 
 
 def test_a_sif_of_another_version_or_of_other_sources_is_refused(apptainer: Path, tmp_path: Path) -> None:
@@ -242,11 +160,3 @@ def test_a_sif_of_another_version_or_of_other_sources_is_refused(apptainer: Path
         check_sif(sif)
     write_inspection(own)
     assert read_labels(sif)[VERSION_LABEL] == throwcollect.__version__
-
-
-def test_checking_a_file_that_is_no_sif_is_an_error(apptainer: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"it\.sif: No such file or directory"):
-        check_sif(tmp_path / "it.sif")
-    (tmp_path / "it.sif").write_text("trials: 2\n")
-    with pytest.raises(ConfigError, match=r"it\.sif: is no SIF"):
-        check_sif(tmp_path / "it.sif")

@@ -78,14 +78,6 @@ def test_the_client_connects_to_the_engine_of_the_context(tmp_path: Path, monkey
         assert engine.accept()[0].recv(3) == b"GET"
 
 
-@pytest.mark.parametrize("host", ["unix://{}", "tcp://127.0.0.1:1", "ssh://lab"])
-def test_an_address_of_a_possible_engine_passes_the_check_of_the_socket(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, host: str
-) -> None:
-    monkeypatch.setenv("DOCKER_HOST", host.format(tmp_path))
-    check_socket()
-
-
 def test_the_docker_client_is_not_imported_without_an_engine(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", CHOOSES],

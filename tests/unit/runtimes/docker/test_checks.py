@@ -93,14 +93,3 @@ def test_a_device_link_to_a_device_that_is_not_allowed_is_refused(
     assert problems(options={"devices": ["/dev/nvidia99:/dev/nvidia99:rw"]}) == [
         "options.devices.0: /dev/nvidia99 does not exist on this machine"
     ]
-
-
-@pytest.mark.parametrize("port", ["7447", "7447/tcp"])
-def test_publishing_the_port_of_the_router_twice_is_refused(engine: Engine, port: str) -> None:
-    published = {"containers": {"image": "image", "router": {"ports": {port: 7450, "80": 8080}}}}
-    with closing(connect()) as client:
-        check(client, RunPlace("run", "/data"), Config.model_validate(published))
-        with pytest.raises(
-            ConfigError, match=f"^containers.router.ports.{port}: should be left out, as run.router_port"
-        ):
-            check(client, RunPlace("run", "/data"), Config.model_validate({**published, "run": {"router_port": 7448}}))

@@ -85,10 +85,6 @@ def test_nodes_of_an_open_run_connect_without_a_key_but_still_have_it() -> None:
     assert environment["THROWCOLLECT_KEY"] == "/key"
 
 
-def test_a_volume_may_hold_the_datasets_of_several_runs() -> None:
-    assert (DIRECTORY.data, VOLUME.data) == ("/data", "/data/throws-1a2b")
-
-
 def test_a_simulation_is_bound_to_its_core_unless_the_configuration_binds_it() -> None:
     assert options("sim_1", core=3)["cpuset_cpus"] == "3"
     assert options("sim_1", core=3, sim={"cpuset": "0-1"})["cpuset_cpus"] == "0-1"

@@ -33,11 +33,6 @@ def test_an_error_of_the_docker_engine_is_raised_in_plain_words(error: Exception
         raise error
 
 
-def test_errors_that_are_not_of_the_docker_engine_pass_unchanged() -> None:
-    with pytest.raises(KeyError, match="a mistake"), engine_errors("sim_0"):
-        raise KeyError("a mistake")
-
-
 def test_connecting_without_an_engine_names_its_address_and_a_hint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

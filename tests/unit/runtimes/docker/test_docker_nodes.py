@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,7 +16,6 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.runtimes.docker import docker_nodes as module
-from throwcollect.runtimes.docker import engine_clock as docker_clock
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
@@ -32,9 +30,9 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
     # All times are about a hundredth of the real ones.
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
-    monkeypatch.setattr(docker_clock, "_TICK_S", 0.025)
-    monkeypatch.setattr(docker_clock, "_WARN_S", 0.3)
-    monkeypatch.setattr(docker_clock, "SILENCE_S", 1.0)
+    monkeypatch.setattr(docker_watch, "_TICK_S", 0.025)
+    monkeypatch.setattr(docker_watch, "_WARN_S", 0.3)
+    monkeypatch.setattr(docker_watch, "SILENCE_S", 1.0)
     with engine_at(path) as engine:
         yield engine
 
@@ -71,29 +69,12 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
 def until(condition: Callable[[], Any], *, runtime: DockerNodes | None = None) -> list[NodeExit]:
     """Wait for a condition, and meanwhile ask for ended nodes as a supervisor does."""
     exits: list[NodeExit] = []
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < deadline, "did not happen"
         exits += runtime.exits() if runtime else []
         time.sleep(0.01)
     return exits
-
-
-def test_an_engine_that_answers_only_some_requests_is_not_silent(
-    engine: Engine, make: Callable[[], DockerNodes], warnings: list[str]
-) -> None:
-    runtime = make()
-    # Requests that watch the nodes get no answer; requests that start nodes do.
-    engine.withheld = "GET /containers/json|GET /events"
-    began = time.monotonic()
-    number = 0
-    while time.monotonic() < began + 1.2:
-        runtime.start(NodeSpec(f"sim_{number}", ("sim",), NodeRole.EXPENDABLE))
-        until(lambda: f"throwcollect-run-1a2b-sim_{number}" in engine.names(), runtime=runtime)  # noqa: B023
-        number += 1
-        time.sleep(0.1)
-    assert not warnings
-    assert not runtime.exits()
 
 
 def test_a_slow_engine_is_waited_for_with_a_warning(
@@ -108,19 +89,6 @@ def test_a_slow_engine_is_waited_for_with_a_warning(
     assert warnings[1:] == ["the Docker engine answers again"]
     runtime.close()
     assert runtime.cleared
-
-
-def test_a_silent_engine_is_given_up_even_if_warnings_cannot_be_printed(
-    engine: Engine, make: Callable[[], DockerNodes], warnings: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def break_pipe(_: str) -> None:
-        raise BrokenPipeError
-
-    runtime = make()
-    monkeypatch.setattr(runtime._clock, "_warn", break_pipe)
-    engine.withheld = "."
-    with pytest.raises(WorkerError, match="has not answered for 1 s"):
-        until(lambda: False, runtime=runtime)
 
 
 def test_giving_up_a_silent_engine_names_left_containers_and_how_to_go_on(
@@ -144,14 +112,6 @@ def test_giving_up_a_silent_engine_names_left_containers_and_how_to_go_on(
     assert engine.names() == ["throwcollect-run-1a2b-sim_0"]
 
 
-def test_time_in_which_the_launcher_was_stopped_does_not_count_as_silence(
-    make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    runtime = make()
-    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: time.monotonic() + 3600))
-    assert runtime.exits() == []
-
-
 def test_a_container_that_is_created_late_is_removed_at_the_end(
     engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -165,24 +125,6 @@ def test_a_container_that_is_created_late_is_removed_at_the_end(
     runtime.close()
     assert engine.names() == []
     assert runtime.cleared
-
-
-def test_a_late_engine_is_reported_as_no_answer_in_time(
-    engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    engine.withheld = "version"
-    with pytest.raises(WorkerError, match=r"no Docker engine answers at unix://\S+: no answer in time"):
-        docker_engine.connect(timeout_s=0.1)
-    engine.answer_all()
-    engine.released.clear()
-    monkeypatch.setattr(docker_clock, "SILENCE_S", 0.3)
-    runtime = make()
-    engine.withheld = "POST /containers/create"
-    monkeypatch.setattr(docker_clock, "SILENCE_S", 10.0)
-    runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
-    ends: list[NodeExit] = []
-    until(lambda: ends.extend(runtime.exits()) or ends)
-    assert [end.reason for end in ends] == ["cannot be started: no answer in time"]
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import io
 import re
-import shutil
 import subprocess
 import tarfile
-import tempfile
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
@@ -16,20 +14,14 @@ from typing import Any
 
 import pytest
 from docker.errors import APIError, ImageNotFound
-from docker.utils.build import exclude_paths
 
 import throwcollect
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.runtimes.docker import image
 from throwcollect.runtimes.docker.image import build, default_tag, ensure, is_outdated
 from throwcollect.runtimes.image_sources import (
-    DEFAULT_BASE,
     SOURCES_LABEL,
     digest_sources,
     find_address,
-    find_revision,
-    source_root,
-    write_context,
 )
 
 ROOT = Path(__file__).parents[4]
@@ -87,10 +79,6 @@ def wheelhouse(tmp_path: Path) -> Path:
     return directory
 
 
-def test_the_default_base_image_is_that_of_the_dockerfile() -> None:
-    assert re.findall(r"^ARG BASE_IMAGE=(.*)$", DOCKERFILE, re.MULTILINE) == [DEFAULT_BASE]
-
-
 def test_a_build_uses_the_target_and_the_arguments_of_the_dockerfile(said: list[str]) -> None:
     engine = Engine("base")
     build(engine, "mine", base="base", say=said.append)
@@ -118,40 +106,6 @@ def test_the_build_context_holds_only_what_the_dockerfile_copies(said: list[str]
     assert {member.uid for member in engine.context.values()} == {0}
 
 
-def test_files_of_the_build_context_are_readable_even_from_a_private_clone(tmp_path: Path) -> None:
-    for name in ("src", "configs", "packaging", "docker"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    for path in tmp_path.rglob("*"):
-        path.chmod(path.stat().st_mode & 0o700)
-    with tempfile.TemporaryFile() as archive:
-        write_context(archive, tmp_path, None)
-        archive.seek(0)
-        with tarfile.open(fileobj=archive) as context:
-            modes = {member.name: member.mode for member in context}
-    assert modes["docker/apptainer.sh"] == modes["src/throwcollect/version.py"] == 0o644
-    assert modes["docker/base.sh"] == modes["src"] == 0o755
-    assert set(modes.values()) == {0o644, 0o755}
-
-
-def test_the_dockerignore_file_excludes_nothing_that_the_dockerfile_copies() -> None:
-    patterns = (ROOT / ".dockerignore").read_text().splitlines()
-    sent = exclude_paths(str(ROOT), patterns)
-    assert "src" in COPIED
-    # A directory of wheels exists only if somebody has filled one.
-    for source in (each for each in COPIED if "*" not in each):
-        assert any(path == source or path.startswith(f"{source}/") for path in sent), source
-
-
-def test_a_build_prints_one_line_per_step_and_returns_the_size(said: list[str]) -> None:
-    output = [{"stream": "Step 1/2 : RUN a  \\\n"}, {"stream": " ---> Running in 1\n"}, {"stream": "noise\n"}]
-    engine = Engine("base", answers=[*output, {"stream": "Step 2/2 : RUN " + 200 * "b" + "\n"}])
-    assert build(engine, "mine", base="base", say=said.append) == 1234
-    assert said[0] == "step 1/2: RUN a \\"
-    assert [line[:9] for line in said] == ["step 1/2:", "step 2/2:"]
-    assert max(map(len, said)) < 120
-
-
 def test_a_failed_build_step_shows_the_end_of_its_output_without_colours(said: list[str]) -> None:
     output = [{"stream": f"\x1b[91mline {number}\n\x1b[0m"} for number in range(100)]
     engine = Engine("base", answers=[*output, {"stream": "Removing intermediate container 1\n"}, {"error": "code: 1"}])
@@ -160,17 +114,6 @@ def test_a_failed_build_step_shows_the_end_of_its_output_without_colours(said: l
     assert caught.value.evidence is not None
     assert caught.value.evidence.splitlines()[-1] == "line 99"
     assert "line 0" not in caught.value.evidence.splitlines()
-
-
-def test_a_missing_wheel_is_named_with_the_wheelhouse_or_index_that_lacks_it(said: list[str], wheelhouse: Path) -> None:
-    answers = [{"stream": "ERROR: No matching distribution found for scipy>=1.11\n"}, {"error": "code: 1"}]
-    with pytest.raises(WorkerError, match=rf"{wheelhouse} lacks scipy>=1.11") as caught:
-        build(Engine("base", answers=answers), "mine", base="base", wheelhouse=wheelhouse, say=said.append)
-    assert caught.value.hint == f"python docker/wheelhouse.py --ros {wheelhouse}"
-    with pytest.raises(WorkerError, match=r"the package index gives no scipy>=1.11") as caught:
-        build(Engine("base", answers=answers), "mine", base="base", say=said.append)
-    assert caught.value.hint is not None
-    assert "--wheelhouse DIR" in caught.value.hint
 
 
 @pytest.mark.parametrize("exists", [True, False])
@@ -183,61 +126,11 @@ def test_a_wheelhouse_without_wheels_is_refused_before_anything_is_built(
     assert not engine.options
 
 
-def test_a_wheelhouse_without_ros_is_refused_before_anything_is_built(said: list[str], wheelhouse: Path) -> None:
-    for wheel in wheelhouse.glob("throwcollect_ros_interfaces-*.whl"):
-        wheel.unlink()
-    engine = Engine("base")
-    with pytest.raises(ConfigError, match="holds no wheels of genuine ROS 2, which the image has") as caught:
-        build(engine, "mine", base="base", wheelhouse=wheelhouse, say=said.append)
-    assert caught.value.hint is not None
-    assert caught.value.hint.endswith(f"docker/wheelhouse.py --ros {wheelhouse}")
-    assert not engine.options
-
-
-def test_a_base_image_that_is_missing_is_pulled(said: list[str]) -> None:
-    engine = Engine(registry=("base",))
-    build(engine, "mine", base="base", say=said.append)
-    assert engine.pulled == ["base"]
-    assert said[0] == "pulling base"
-
-
-def test_a_base_image_that_cannot_be_pulled_is_an_error_with_a_hint(said: list[str]) -> None:
-    with pytest.raises(WorkerError, match="base image base is not here and cannot be pulled: no such host") as caught:
-        build(Engine(), "mine", base="base", say=said.append)
-    assert caught.value.hint is not None
-    assert "--base" in caught.value.hint
-
-
-def test_the_sources_of_a_build_are_not_found_outside_a_clone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.image_sources._PACKAGE", tmp_path / "lib" / "throwcollect")
-    with pytest.raises(ConfigError, match="is not in a clone of the project"):
-        source_root()
-
-
-def test_an_existing_image_is_neither_built_nor_pulled(said: list[str]) -> None:
-    engine = Engine("mine")
-    ensure(engine, "mine", say=said.append)
-    assert (engine.options, engine.pulled, said) == ({}, [], [])
-
-
-def test_a_missing_default_image_is_built_after_one_line_that_says_so(said: list[str]) -> None:
-    engine = Engine(DEFAULT_BASE)
-    ensure(engine, default_tag(), say=said.append)
-    assert engine.options["tag"] == default_tag()
-    assert len(said) == 1
-    assert default_tag() in said[0]
-
-
 def test_a_missing_image_other_than_the_default_is_pulled(said: list[str]) -> None:
     engine = Engine(registry=("lab/throws:2",))
     ensure(engine, "lab/throws:2", say=said.append)
     assert engine.pulled == ["lab/throws:2"]
     assert said == ["image lab/throws:2 is not here; pulling it"]
-
-
-def test_a_named_image_that_cannot_be_pulled_is_an_error(said: list[str]) -> None:
-    with pytest.raises(WorkerError, match="lab/throws:2 is not here and cannot be pulled: no such host"):
-        ensure(Engine(), "lab/throws:2", say=said.append)
 
 
 def test_without_a_clone_a_missing_default_image_is_an_error(
@@ -251,21 +144,6 @@ def test_without_a_clone_a_missing_default_image_is_an_error(
 def git(root: Path, *arguments: str) -> str:
     identity = ["-c", "user.name=t", "-c", "user.email=t@example.org"]
     return subprocess.run(["git", "-C", root, *identity, *arguments], check=True, capture_output=True, text=True).stdout
-
-
-def test_the_revision_of_an_image_is_the_commit_and_marks_changed_files(tmp_path: Path) -> None:
-    assert find_revision(tmp_path) is None
-    git(tmp_path, "init", "-q")
-    (tmp_path / "pyproject.toml").write_text("")
-    git(tmp_path, "add", ".")
-    git(tmp_path, "commit", "-qm", "first")
-    commit = git(tmp_path, "rev-parse", "HEAD").strip()
-    assert find_revision(tmp_path) == commit
-    (tmp_path / "notes").write_text("not part of the image")
-    assert find_revision(tmp_path) == commit
-    (tmp_path / "src").mkdir()
-    (tmp_path / "src" / "new.py").write_text("")
-    assert find_revision(tmp_path) == f"{commit}-dirty"
 
 
 @pytest.mark.parametrize(
@@ -290,26 +168,6 @@ def test_the_source_address_of_an_image_is_public_and_has_no_secrets(
     if origin is not None:
         git(tmp_path, "remote", "add", "origin", origin)
     assert find_address(tmp_path) == address
-
-
-def test_an_image_without_a_source_address_has_no_label_for_it(
-    said: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for address, labels in (("https://example.org/x", {image.SOURCE_LABEL: "https://example.org/x"}), (None, {})):
-        monkeypatch.setattr(image, "find_address", lambda _, address=address: address)
-        engine = Engine("base")
-        build(engine, "mine", base="base", say=said.append)
-        assert engine.options["labels"] == labels
-
-
-def test_every_docker_build_in_the_documents_names_a_target() -> None:
-    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
-    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
-    # Images on top of ours are built from a file of their own.
-    builds = re.findall(r"docker build (?!-t throwcollect-planar-arm)[^`\n]*(?:\n[^`\n]*)?", text)
-    assert builds
-    # The last stage of the file is the one with ROS.
-    assert not [build for build in builds if "--target" not in build]
 
 
 def test_an_image_is_outdated_if_its_label_names_other_sources(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -47,13 +47,6 @@ def test_a_missing_or_outdated_image_is_built_before_it_is_saved(
     assert saved_image.build.call_args.kwargs["base"] == "base"
 
 
-def test_an_outdated_image_that_is_named_is_saved_with_a_warning(client: Mock, tmp_path: Path) -> None:
-    saved_image.is_outdated.return_value = True
-    assert "it is used, as it is named" in save(tmp_path / "image.tar", "mine")[0]
-    saved_image.ensure.assert_called_once()
-    saved_image.build.assert_not_called()
-
-
 def test_errors_of_the_engine_and_of_the_disk_while_saving_differ(
     client: Mock, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

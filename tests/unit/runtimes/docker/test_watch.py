@@ -24,8 +24,3 @@ from throwcollect.runtimes.docker.watch import ContainerState
 def test_the_end_of_a_container_is_described_in_words(state: ContainerState, memory: str | None, words: str) -> None:
     assert state.ended
     assert end_in_words(state, memory) == words
-
-
-@pytest.mark.parametrize("status", ["created", "running", "paused", "restarting"])
-def test_a_container_that_may_run_on_has_not_ended(status: str) -> None:
-    assert not ContainerState(status).ended

@@ -26,7 +26,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.serve.rosbridge import Bridge, attend
 from throwcollect.serve.server_process import WEBSOCKETS
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 def wait_for(condition: Callable[[], Any], what: str = "") -> Any:

@@ -15,8 +15,7 @@ from throwcollect.ros import Context, Node, SingleThreadedExecutor, get_message,
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.serve.rosbridge import Bridge, inbox
-from throwcollect.serve.rosbridge.inbox import Inbox
+from throwcollect.serve.rosbridge import Bridge, bridge_client
 
 String: Any = get_message("std_msgs/msg/String")
 
@@ -103,7 +102,7 @@ def test_topics_services_and_actions_of_a_client_survive_a_router_restart(router
 def test_requests_beyond_a_limit_are_dropped_without_a_router_and_the_client_is_told_once(
     routers: Routers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inbox, "_MOST_FRAMES", 3)
+    monkeypatch.setattr(bridge_client, "_MOST_FRAMES", 3)
     bridge = Bridge(None)
     party = Party(bridge)
     for number in range(6):
@@ -115,36 +114,6 @@ def test_requests_beyond_a_limit_are_dropped_without_a_router_and_the_client_is_
     party.next(id="after")
     assert [each["id"] for each in party.got() if each["op"] == "service_response"] == [0, 1, 2, "after"]
     assert len([each for each in party.got() if each.get("level") == "error"]) == 1
-    bridge.close()
-
-
-def test_requests_without_a_router_are_limited_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(inbox, "_MOST_BYTES", 10)
-    waiting = Inbox()
-    for frame, is_full in (("1234", False), ("567890", True)):
-        waiting.put(frame)
-        assert waiting.is_full == is_full
-    assert (waiting.take(), waiting.is_full) == ("1234", False)
-    waiting.put("1234")
-    waiting.clear()
-    assert (len(waiting), waiting.is_full) == (0, False)
-
-
-def test_a_client_keeps_its_service_after_a_router_restart_although_another_asks_for_it_first(routers: Routers) -> None:
-    bridge = Bridge(routers.connection)
-    # The bridge restores clients in this order, and handles what the first one has asked meanwhile.
-    greedy, owner = Party(bridge), Party(bridge)
-    offer = {"op": "advertise_service", "service": "/same", "type": "std_srvs/Trigger"}
-    owner.ask(**offer)
-    owner.call("rosapi/get_time")
-    routers.end()
-    assert greedy.next(op="status")["msg"].startswith("the router of the run has gone")
-    greedy.ask(**offer)
-    bridge.move(replace(routers.connection, endpoint=routers.begin("tcp/127.0.0.1:0")))
-    greedy.next(op="status", level="info")
-    assert "/same is offered already" in greedy.next(op="status", level="error")["msg"]
-    greedy.ask(op="call_service", service="/same")
-    assert owner.next(op="call_service")["service"] == "/same"
     bridge.close()
 
 
@@ -163,17 +132,6 @@ def test_each_bridge_is_in_its_own_run(routers: Routers, bridge: Bridge, connect
     other.close()
     for talker in talkers:
         talker.context.try_shutdown()
-
-
-def test_a_bridge_joins_the_run_again_after_its_context_was_shut_down(routers: Routers) -> None:
-    bridge = Bridge(routers.connection)
-    party = Party(bridge)
-    party.call("rosapi/get_time")
-    bridge.session._context.request_shutdown()
-    assert party.next(op="status", level="error")
-    assert party.next(op="status", level="info")
-    party.call("rosapi/get_time")
-    bridge.close()
 
 
 def test_a_closed_bridge_withdraws_its_topics_and_ignores_requests(routers: Routers) -> None:

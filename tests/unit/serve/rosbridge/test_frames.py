@@ -20,10 +20,17 @@ from tests.unit.serve.rosbridge.conftest import Party
 from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.interfaces.catalog import _JAZZY, DEFINITIONS
 from throwcollect.errors import ConfigError
-from throwcollect.ros.message_values import array_parts, fill
-from throwcollect.serve.rosbridge.codec import encode, fragments, json_text, plain_values, read_frame
+from throwcollect.ros.message_values import fill
+from throwcollect.serve.rosbridge.codec import (
+    LONGEST_FRAME,
+    Reassembly,
+    encode,
+    fragments,
+    json_text,
+    plain_values,
+    read_frame,
+)
 from throwcollect.serve.rosbridge.feed import Sample
-from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME, Reassembly
 from throwcollect.serve.rosbridge.request import BridgeRequest
 
 
@@ -81,16 +88,9 @@ def test_octets_and_numbers_are_written_as_in_rosbridge() -> None:
     ("frame", "said"),
     [
         ("", "neither JSON nor CBOR"),
-        ("{", "neither JSON nor CBOR"),
-        (b"", "neither JSON nor CBOR"),
-        (b"\xff\xff", "neither JSON nor CBOR"),
-        (b'{"op": "', "neither JSON nor CBOR"),
-        ("[1]", "a frame should be an object with an op, got [1]"),
         ("{}", "frame: op should be a text, got nothing"),
-        ('{"op": 1}', "frame: op should be a text, got 1"),
         ('{"op": "png"}', "no operation png; docs/rosbridge.md lists all"),
         ('{"op": "auth", "mac": "x"}', "auth: clients do not authenticate here"),
-        ('{"op": "set_level", "level": "loud"}', "set_level: no level loud; expected: info"),
         ('{"op": "fragment", "id": "a"}', "fragment: should have an id, the text data, and num below total"),
         ("[" * 100_000, "neither JSON nor CBOR"),
         (b"\x81" * 100_000, "neither JSON nor CBOR"),
@@ -154,16 +154,3 @@ def test_fragments_that_do_not_fit_together_are_refused() -> None:
     assert refusal.value.expected == f"at most {LONGEST_FRAME} characters together"
     assert whole.add(part(1, 2, "y")) == "x" * (LONGEST_FRAME // 2) + "y"
     assert whole.add(part(0, 1, "x" * (LONGEST_FRAME - 100))) is not None
-
-
-def test_array_parts_splits_an_array_type_into_element_and_sizes() -> None:
-    assert array_parts("sequence<double, 5>") == ("double", 5, None)
-    assert array_parts("sequence<std_msgs/Header>") == ("std_msgs/Header", None, None)
-    assert array_parts("float[36]") == ("float", None, 36)
-    assert array_parts("string<5>") is None
-
-
-@pytest.mark.parametrize(("name", "values"), [("Float64", 10**400), ("Float64MultiArray", [10**400])])
-def test_a_number_too_large_for_a_float_is_refused(name: str, values: object) -> None:
-    with pytest.raises(ConfigError, match=r"data: should be .*double"):
-        fill(message_class(f"std_msgs/msg/{name}")(), {"data": values})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import threading
 import time
@@ -17,8 +16,8 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
-from throwcollect.serve.rosbridge import Bridge, belongings, subscriptions
-from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscribedTopic, SubscriptionRequest
+from throwcollect.serve.rosbridge import Bridge, topics
+from throwcollect.serve.rosbridge.topics import RateLimit, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -44,23 +43,6 @@ def data(party: Party) -> list[str]:
     return [each["msg"]["data"] for each in party.got() if each["op"] == "publish"]
 
 
-def test_messages_carry_the_topic_name_that_the_client_used(party: Party, node: Node) -> None:
-    say = words(node)
-    party.ask(op="subscribe", topic="words", type="std_msgs/String")
-    say("a")
-    assert party.next(op="publish") == {"op": "publish", "topic": "words", "msg": {"data": "a"}}
-
-
-def test_each_late_client_hears_a_latched_topic(bridge: Bridge, party: Party, node: Node) -> None:
-    node.create_publisher(String, "/latched", LATCHED).publish(String(data="urdf"))
-    other = Party(bridge)
-    for each in (party, other):
-        wait_for(lambda party=each: "/latched" in party.call("rosapi/topics")["topics"])
-        each.ask(op="subscribe", topic="/latched")
-        assert each.next(op="publish")["msg"] == {"data": "urdf"}
-    other.client.close()
-
-
 def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
     bridge: Bridge, party: Party, node: Node
 ) -> None:
@@ -77,29 +59,13 @@ def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
     assert party.next(op="publish")["msg"]["data"] == "first"
 
 
-def test_a_topic_that_turns_out_to_be_latched_is_heard_from_its_beginning(party: Party, node: Node) -> None:
-    party.ask(op="subscribe", topic="/later", type="std_msgs/msg/String")
-    publisher = node.create_publisher(String, "/later", LATCHED)
-    publisher.publish(String(data="at once"))
-    assert party.next(op="publish")["msg"] == {"data": "at once"}
-    wait_for(
-        lambda: (
-            [each.qos_profile.durability for each in node.get_subscriptions_info_by_topic("/later")]
-            == [DurabilityPolicy.TRANSIENT_LOCAL]
-        )
-    )
-
-
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
         ({"topic": "/nobody"}, "/nobody is published by nobody, and no type is named; expected: a type"),
         ({"topic": "/rosout", "type": "std_msgs/String"}, "/rosout is no std_msgs/msg/String; expected: rcl_inter"),
-        ({"topic": "/x", "type": "std_msgs/Strin"}, "unknown interface 'std_msgs/msg/Strin'"),
-        ({"topic": "/x y"}, "'/x y' is no name in ROS"),
         ({}, "subscribe: topic should be a text, got nothing"),
         ({"topic": "/x", "type": "std_msgs/String", "throttle_rate": -1}, "throttle_rate should be a number from 0 on"),
-        ({"topic": "/x", "type": "std_msgs/String", "compression": "png"}, "no compression png; expected: none, cbor"),
         ({"topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "nobody but the coordinator may have this"),
         ({"topic": "parameter_events"}, "it tells the signed leases"),
     ],
@@ -146,29 +112,9 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
     assert data(party)[before:] in ([], ["i"])
 
 
-def test_queued_messages_are_sent_at_even_times_despite_late_timers(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 100.0
-    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
-    waiting: list[tuple[float, Callable[[], None]]] = []
-    sent: list[tuple[Any, float]] = []
-    pace = RateLimit(
-        lambda sample: sent.append((sample, now)), lambda seconds, action: waiting.append((now + seconds, action))
-    )
-    pace.change(SubscriptionRequest(throttle_s=0.03, queue_length=100))
-    samples: list[Any] = list(range(20))
-    for sample in samples:
-        pace.offer(sample)
-    while waiting:
-        due, action = waiting.pop()
-        now = due + 0.005
-        action()
-    assert [sample for sample, _ in sent] == samples
-    assert [time_s for _, time_s in sent[1:]] == pytest.approx([100.005 + 0.03 * number for number in range(1, 20)])
-
-
 def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
-    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(topics, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
     sent: list[float] = []
     pace = RateLimit(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
@@ -182,49 +128,6 @@ def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pyte
         now = arrives
         pace.offer(sample)
     assert len(sent) == pytest.approx(1800, abs=60)
-
-
-@pytest.mark.parametrize("end", ["close", "lose"])
-def test_messages_that_wait_for_their_time_are_forgotten_when_their_subscription_or_its_session_ends(end: str) -> None:
-    timers: list[Callable[[], None]] = []
-    sent: list[str] = []
-    feed = SimpleNamespace(remove=lambda _: None)
-    client: Any = SimpleNamespace(
-        host=SimpleNamespace(
-            session=SimpleNamespace(listen=lambda _topic, _type, listener: heard.append(listener) or feed),
-            later=lambda _seconds, action: timers.append(action),
-        ),
-        send=lambda frame, _size: sent.append(frame),
-    )
-    heard: list[Callable[[Any], None]] = []
-    topic = SubscribedTopic(client, "/words", "std_msgs/msg/String")
-    topic.want(None, SubscriptionRequest(throttle_s=60.0, queue_length=10))
-    topic.open()
-
-    def hear(word: str) -> None:
-        heard[-1](SimpleNamespace(frame=lambda _topic, _compression: word))
-
-    for word in "abc":
-        hear(word)
-    getattr(topic, end)()
-    timers.pop()()
-    assert (sent, timers) == (["a"], [])
-    # In a new session, messages wait as before.
-    topic.open()
-    hear("d")
-    timers.pop()()
-    assert sent == ["a", "d"]
-
-
-def test_a_long_message_comes_in_fragments_of_the_requested_size(party: Party, node: Node) -> None:
-    say = words(node)
-    party.ask(op="subscribe", topic="/words", type="std_msgs/String", fragment_size=100)
-    say("ä" * 1000)
-    wait_for(lambda: [each for each in party.got() if each.get("num") == each.get("total", 0) - 1], "the last part")
-    parts = [each for each in party.got() if each["op"] == "fragment"]
-    assert {len(each["data"]) for each in parts[:-1]} == {100}
-    assert {(each["total"], each["id"]) for each in parts} == {(len(parts), parts[0]["id"])}
-    assert json.loads("".join(each["data"] for each in parts))["msg"] == {"data": "ä" * 1000}
 
 
 def test_messages_come_as_cbor_with_typed_arrays_or_as_raw_bytes(party: Party, node: Node) -> None:
@@ -292,12 +195,9 @@ def test_a_latched_message_reaches_late_subscribers_until_it_is_withdrawn(party:
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"op": "advertise", "topic": "/t"}, "advertise: type should be a text, got nothing"),
         ({"op": "advertise", "topic": "/t", "type": "std_msgs/Header"}, "/t is no std_msgs/msg/Header; expected: std_"),
         ({"op": "publish", "topic": "/nowhere", "msg": {}}, "/nowhere is published by nobody, and no type is named"),
         ({"op": "publish", "topic": "/t", "msg": {"dat": 1}}, "dat: no such field; did you mean 'data'?"),
-        ({"op": "publish", "topic": "/t", "msg": {"data": []}}, "data: should be string, got []"),
-        ({"op": "publish", "topic": "/t", "msg": 7}, "values: should be fields with values, got 7"),
         ({"op": "advertise", "topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "but the coordinator"),
         ({"op": "publish", "topic": "/sim_0/episode", "msg": {}}, "nobody but the coordinator may have this topic"),
     ],
@@ -325,52 +225,3 @@ def test_a_leaving_client_withdraws_its_topics_services_and_actions(bridge: Brid
     wait_for(lambda: all(there()))
     party.client.close()
     wait_for(lambda: not any(there()))
-
-
-def test_a_subscription_does_not_list_all_topics(party: Party, node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Thousands of subscriptions would otherwise take time that grows with their square."""
-    publisher = node.create_publisher(String, "/listed", 10)
-    party.call("rosapi/get_time")
-    lists: list[str] = []
-
-    def list_all() -> list[Any]:
-        lists.append("all")
-        return []
-
-    monkeypatch.setattr(party.client.host.session.node, "get_topic_names_and_types", list_all)
-    party.ask(op="subscribe", topic="/listed", type="std_msgs/String")
-    wait_for_listener(publisher)
-    publisher.publish(String(data="heard"))
-    assert party.next(op="publish")["msg"] == {"data": "heard"}
-    assert lists == []
-
-
-def test_a_client_has_a_limited_number_of_topics_services_and_actions(
-    party: Party, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(belongings, "_MOST", 2)
-    kinds = {
-        "subscribe": ("topic", "std_msgs/String"),
-        "advertise": ("topic", "std_msgs/String"),
-        "advertise_service": ("service", "std_srvs/SetBool"),
-        "advertise_action": ("action", "control_msgs/FollowJointTrajectory"),
-    }
-    for op, (word, kind) in kinds.items():
-        for name in ("/many_1", "/many_2", "/many_3", "/many_2"):
-            party.ask(op=op, id=f"{op} {name}", type=kind, **{word: name})
-        assert party.next(op="status")["msg"].startswith(f"{op}: /many_3: this client has 2 of these already")
-    party.call("rosapi/get_time")
-    assert len([each for each in party.got() if each["op"] == "status"]) == len(kinds)
-
-
-def test_requests_of_one_client_do_not_keep_another_waiting(bridge: Bridge, party: Party) -> None:
-    other, begin = Party(bridge), threading.Event()
-    party.call("rosapi/get_time")
-    bridge.submit(lambda: begin.wait(PATIENCE_S))
-    party.ask(op="call_service", service="/rosapi/get_time")
-    other.ask(op="call_service", service="/rosapi/get_time")
-    party.ask(op="call_service", service="/rosapi/get_time")
-    begin.set()
-    wait_for(lambda: len(party.times) == 3 and other.times)
-    assert other.times[0] < party.times[2]
-    other.client.close()

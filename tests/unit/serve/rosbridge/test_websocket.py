@@ -9,12 +9,12 @@ from typing import Any
 
 import psutil
 import pytest
-from tests.unit.serve.rosbridge.conftest import PATIENCE_S, serve_by_websocket, wait_for, wait_for_listener
+from tests.unit.serve.rosbridge.conftest import PATIENCE_S, wait_for, wait_for_listener
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
 
 from throwcollect.ros import HistoryPolicy, Node, QoSProfile, get_message, get_service
-from throwcollect.serve.rosbridge import Bridge, websocket
+from throwcollect.serve.rosbridge import websocket
 from throwcollect.serve.rosbridge.websocket import Outbox
 
 String: Any = get_message("std_msgs/msg/String")
@@ -119,18 +119,6 @@ def test_memory_for_a_client_that_never_reads_is_bounded(url: str, node: Node) -
             memory.append(process.memory_info().rss)
         # After 100 MiB, the queue of the stalled client is full.
         assert max(memory) - max(memory[:100]) < 2**25, [each >> 20 for each in memory[::25]]
-
-
-def test_a_client_that_leaves_after_many_requests_is_taken_off_the_list_without_a_router() -> None:
-    bridge = Bridge(None)
-    with serve_by_websocket(bridge) as address:
-        with connect(address) as socket:
-            for _ in range(300):
-                socket.send(json.dumps({"op": "publish", "topic": "/x", "msg": {}}))
-            # The client leaves only once the bridge has it.
-            wait_for(lambda: bridge._clients)
-        wait_for(lambda: not bridge._clients, "the bridge sees that the client has left")
-    bridge.close()
 
 
 def test_the_outbox_is_bounded_in_frames_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
