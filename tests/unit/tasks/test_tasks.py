@@ -11,8 +11,8 @@ from throwcollect.config.target_columns import is_target
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.members import load_member, load_part, names_of
 from throwcollect.robots.description import robot_of
-from throwcollect.tasks.first_motion import find_first_motion
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
+from throwcollect.tasks.starter import find_first_motion
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import unit_of_name
 
