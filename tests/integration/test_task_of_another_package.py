@@ -120,8 +120,8 @@ def few(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 def test_until_counts_the_success_outcome_of_the_task(throwcollect: Command, reached: Path) -> None:
     info: dict[str, Any] = json.loads(throwcollect("dataset", "info", reached, "--json"))
-    assert info["trials"] == 128  # of 200 possible ones: two rounds already had more than the 30 wanted successes
-    assert info["outcomes"]["reached"] >= info["wanted"] == 30
+    assert info["trials"] == 41  # of 200 possible ones: the last one is the thirtieth success
+    assert info["outcomes"]["reached"] == info["wanted"] == 30
     assert set(info["outcomes"]) == {"reached", "missed"}
     assert (info["success"], info["noun"], info["landing"]) == ("reached", "trial", None)
     assert "landing" not in throwcollect("dataset", "info", reached)
@@ -162,7 +162,7 @@ def test_a_dataset_of_the_task_can_be_exported_and_reported(
     assert "simulated trials of the task reach" in (tmp_path / "parquet" / "README.md").read_text()
     throwcollect("dataset", "report", reached, "--output", tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text()
-    assert "128 simulated trials of the task reach by the humanoid robot Talos" in page
+    assert "41 simulated trials of the task reach by the humanoid robot Talos" in page
     assert "How trials end, and where failures lie" in page
     assert "Where the balls land" not in page
 
