@@ -52,7 +52,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
         for number in source.trials
     ]
     points = Points(tuple(keys), np.array(rows, np.float64), _gather_targets(sources))
-    sweep = SweepConfig(sampler="list", file=TRIALS)
+    sweep = SweepConfig(sampler="list", file=TRIALS, target=configs[0].sweep.target)
     config = configs[0].without_run().model_copy(update={"sweep": sweep, "trials": None, "until": None})
     return config, points
 
