@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 from throwcollect import ros
 from throwcollect.config import shape
+from throwcollect.config.document import compose
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
-from throwcollect.config.yaml_nodes import compose
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError, WorkerError

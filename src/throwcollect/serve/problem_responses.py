@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from http import HTTPStatus
-from typing import Any, get_origin
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from fastapi.routing import APIRoute
-from pydantic import BaseModel, ValidationError, create_model
 from starlette.exceptions import HTTPException
 
-from throwcollect.config.problems import findings
-from throwcollect.config.shape import ValueShape
 from throwcollect.errors import (
     ConfigError,
     ConflictError,
@@ -101,66 +98,12 @@ def add_handlers(app: FastAPI) -> None:
         return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
 
     @app.exception_handler(RequestValidationError)
-    async def invalid(request: Request, error: RequestValidationError) -> ProblemResponse:
-        found = _find_problems_of_body(request, error) or _find_problems_of_query(request)
-        return answer(ConfigError(found or [Problem("the request is not as it should be")]))
+    async def invalid(_: Request, error: RequestValidationError) -> ProblemResponse:
+        return answer(ConfigError([_describe(each) for each in error.errors()]))
 
 
-def _find_problems_of_body(request: Request, error: RequestValidationError) -> list[Problem]:
-    """Put into words what is wrong with the body of a request; empty if the error is not in the body."""
-    wrong = next((each for each in error.errors() if each["loc"][0] == "body"), None)
-    model = _find_model_of_body(request)
-    if wrong is None or model is None:
-        return []
-    if wrong["type"] == "json_invalid":
-        return [Problem(f"the body is not valid JSON: {wrong['ctx']['error']}")]
-    if isinstance(error.body, bytes):
-        return [Problem("the body should be JSON, and the header Content-Type should be application/json")]
-    return _find_problems(model, error.body, "the body ")
-
-
-def _find_problems_of_query(request: Request) -> list[Problem]:
-    """Put into words what is wrong with the parameters of a request."""
-    parameters = request.scope["route"].dependant.query_params
-    fields: dict[str, Any] = {each.name: (each.field_info.annotation, each.field_info) for each in parameters}
-    model = create_model("Query", **fields)
-    given = request.query_params
-    values = {
-        each.name: given.getlist(each.name) if get_origin(each.field_info.annotation) is list else given[each.name]
-        for each in parameters
-        if each.name in given
-    }
-    return _find_problems(model, values, "the query ")
-
-
-def _find_problems(model: type[BaseModel], values: object, what: str) -> list[Problem]:
-    """Find values that do not fit a model; `what` begins the sentence if the values are wrong as a whole."""
-    try:
-        model.model_validate(values)
-    except ValidationError as found:
-        schema = model.model_json_schema()
-        shape = ValueShape(_resolve(schema, schema.get("$defs", {})))
-        return [
-            Problem(each.sentence if each.key else f"{what}{each.sentence}", key=each.key)
-            for each in findings(found, values, shape=shape, page="docs/serve.md")
-        ]
-    return []
-
-
-def _resolve(node: Any, definitions: dict[str, Any]) -> Any:
-    """Replace references by the definitions that they name, because a shape resolves only those of configurations."""
-    if isinstance(node, list):
-        return [_resolve(each, definitions) for each in node]
-    if not isinstance(node, dict):
-        return node
-    if "$ref" in node:
-        node = definitions[node["$ref"].rpartition("/")[2]]
-    return {key: _resolve(value, definitions) for key, value in node.items() if key != "$defs"}
-
-
-def _find_model_of_body(request: Request) -> type[BaseModel] | None:
-    """The model that the body of a request should fit; None if its route has none."""
-    route = request.scope.get("route")
-    field = route.body_field if isinstance(route, APIRoute) else None
-    model = None if field is None else field.field_info.annotation
-    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
+def _describe(error: Mapping[str, Any]) -> Problem:
+    """Describe one value of a request that FastAPI refuses; the first part of its place is ``body`` or ``query``."""
+    part, *place = error["loc"]
+    key = "" if error["type"] == "json_invalid" else ".".join(map(str, place))
+    return Problem(error["msg"] if key else f"{part}: {error['msg']}", key=key)
