@@ -17,10 +17,9 @@ from typing import TypeVar
 
 import zenoh
 
-from rclzenoh.domain import domain_of_environment
 from rclzenoh.exceptions import NoRouterError, NotInitializedException
 from rclzenoh.graph import Graph
-from rclzenoh.session_config import environment_config, in_words
+from rclzenoh.session_config import domain_of_environment, environment_config, in_words
 
 _T = TypeVar("_T")
 

@@ -1,4 +1,4 @@
-"""Makes configurations of Zenoh sessions, from values of a program or from the environment.
+"""Makes configurations of Zenoh sessions, from values of a program or from the environment, and reads its domain.
 
 The environment variables are those of rmw_zenoh_cpp: ``ZENOH_SESSION_CONFIG_URI`` names a whole configuration file and
 ``ZENOH_CONFIG_OVERRIDE`` (``key=json5;key=json5``) is applied after it.
@@ -18,6 +18,10 @@ import zenoh
 
 from rclzenoh.exceptions import ConfigurationError, UnreadableKeyError
 
+DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
+_LARGEST_DOMAIN = 232
+
+
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
 """Where the router of a host listens."""
 
@@ -29,8 +33,6 @@ PROTECTED = "tls/"
 """Beginning of the endpoints whose router lets nobody in without a key."""
 LISTENS_OF_RMW = ("tcp/localhost:0",)
 """Endpoints at which a session of rmw_zenoh_cpp listens, even as a client, unless its environment sets others."""
-NOT_IN_PATHS = ";?"
-"""Characters that a path to a key must not have, because Zenoh puts paths into endpoints, where they are separators."""
 
 _TLS = "transport/link/tls"
 _DEFAULT_MODE = "peer"
@@ -192,3 +194,15 @@ def _insert(config: zenoh.Config, key: str, value: str, where: str) -> None:
         config.insert_json5(key, value)
     except zenoh.ZError as error:
         raise ConfigurationError(f"{where}: {key} cannot be {value}: {in_words(error)}") from error
+
+
+def domain_of_environment() -> int:
+    """Domain identifier that the environment names; 0 if none.
+
+    Raises:
+        ConfigurationError: If it is no number of a domain.
+    """
+    text = os.environ.get(DOMAIN_VARIABLE) or "0"
+    if not text.isdecimal() or int(text) > _LARGEST_DOMAIN:
+        raise ConfigurationError(f"{DOMAIN_VARIABLE} must be a number from 0 to {_LARGEST_DOMAIN}, got {text!r}")
+    return int(text)

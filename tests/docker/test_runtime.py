@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import socket
 import subprocess
 import sys
 import time
@@ -33,14 +32,13 @@ from tests.docker.collection import (
 from tests.e2e.collection import collect_here
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.container_options import KEY_LABEL
 from throwcollect.runtimes.docker.docker_engine import connect
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.docker.held_runs import find_held_runs, remove
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeRole, NodeSpec
-from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.supervisor import Supervisor
 
 pytestmark = pytest.mark.docker
@@ -250,23 +248,6 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
         remove(client, run, volumes=True)
 
 
-def test_a_published_router_listens_only_on_the_loopback_interface(bare: Any, client: DockerClient) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
-        with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used"):
-            bare(f"run.router_port={port}")
-    runtime = bare(f"run.router_port={port}")
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-    until(lambda: runtime.logs.tail(ROUTER) != "")
-    assert runtime.endpoint is not None
-    assert split_address(runtime.endpoint) == ("127.0.0.1", port)
-    socket.create_connection(("127.0.0.1", port), 5).close()
-    ports = client.containers.get(runtime.handle(ROUTER)).attrs["NetworkSettings"]["Ports"]
-    assert ports == {"7447/tcp": [{"HostIp": "127.0.0.1", "HostPort": str(port)}]}
-    runtime.stop([ROUTER])
-    assert runtime.endpoint is None
-
-
 def test_a_node_gets_the_key_as_private_files_that_the_engine_does_not_show(
     bare: Any, client: DockerClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -292,21 +273,6 @@ def test_a_node_gets_the_key_as_private_files_that_the_engine_does_not_show(
     runtime.close()
     with pytest.raises(NotFound):
         volume.reload()
-
-
-def test_missing_images_networks_and_mounts_are_found_before_the_start(bare: Any, tmp_path: Path) -> None:
-    with pytest.raises(WorkerError, match="the Docker engine has no image nobody/has:this"):
-        bare("containers.image=nobody/has:this")
-    sock = tmp_path / "link"
-    sock.symlink_to("/var/run")
-    with pytest.raises(ConfigError, match="does not exist") as caught:
-        bare(f"containers.sim.mounts=[/no/where:/x, {sock}:/y]", "containers.router.networks=[nowhere]")
-    assert [str(problem) for problem in caught.value.problems] == [
-        "containers.router.networks.0: the Docker engine has no network nowhere; create it first",
-        "containers.sim.mounts.0: /no/where does not exist on this machine",
-        f"containers.sim.mounts.1: {sock}, which is /run, is refused, as /run belongs to the system; "
-        "mounts are for data",
-    ]
 
 
 def test_a_container_gets_the_configured_mounts_environment_and_networks(
@@ -355,7 +321,7 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.engine_clock.SILENCE_S", 3.0)
+    monkeypatch.setattr("throwcollect.runtimes.docker.watch.SILENCE_S", 3.0)
     runtime = bare(through=connect())
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.logs.tail(ROUTER) != "")

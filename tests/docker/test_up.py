@@ -140,18 +140,3 @@ def test_ctrl_c_leaves_no_containers_networks_or_keys_behind(
     running.process.send_signal(signal.SIGINT)
     code, _, err = running.finish()
     assert (code, "interrupted; finished throws are in" in err) == (130, True), err
-
-
-def test_a_detached_run_is_followed_scaled_and_waited_for(
-    config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
-) -> None:
-    directory = tmp_path / "data"
-    begun = call("up", "-d", "-n", "1", config, "--runtime", "docker", "--output", directory)
-    assert begun.returncode == 0, begun.stderr
-    assert "sim_0" in call_here("ps").stdout
-    assert call_here("scale", "2", "--run", directory).returncode == 0
-    done = call("wait", "--run", directory)
-    assert done.returncode == 0, done.stderr
-    assert fingerprints(directory) == expected
-    told = call_here("logs", "--run", directory).stdout
-    assert "sim_0" in told

@@ -156,21 +156,6 @@ def test_an_interruption_finishes_the_running_trials(
     assert_goes_on(tmp_path / "data", reference)
 
 
-def test_an_interrupted_trial_gets_the_configured_grace_time(
-    config: Path, reference: Path, tmp_path: Path, started: list[Running]
-) -> None:
-    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.grace_s=0.5")
-    in_the_middle(running, whole=reference)
-    # The trial of a suspended simulation never ends.
-    running.node("--name", "sim_0").suspend()
-    running.process.send_signal(signal.SIGTERM)
-    code, _, _ = running.finish()
-    assert code == 130
-    assert_gone(nodes)
-    # The coordinator ended by itself; some seconds later, it would have been killed.
-    assert "interrupted; what is finished is in" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
-
-
 def test_a_second_ctrl_c_does_not_wait_for_trials(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:

@@ -260,15 +260,6 @@ def test_a_machine_without_the_token_cannot_join(tmp_path: Path, machines: list[
     running.finish()
 
 
-def test_joining_with_other_sources_is_refused_with_the_reason(tmp_path: Path) -> None:
-    from throwcollect.runs.token import JoinToken
-
-    token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, "bullet", build="another").encode()
-    done = call_here("join-run", token)
-    assert done.returncode == 2
-    assert "run many-1234: this machine has other sources, another build of the engine bullet" in done.stderr
-
-
 def test_a_token_is_read_from_standard_input() -> None:
     done = subprocess.run(command("join-run", "-"), input="tc2.e30\n", capture_output=True, text=True, check=False)
     assert done.returncode == 2

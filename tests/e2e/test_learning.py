@@ -177,34 +177,6 @@ def test_a_wrong_learning_command_gives_one_message(place: Path, arguments: list
     assert not (place / "new").exists()
 
 
-def test_a_cell_without_a_finite_number_is_an_error_with_its_line(place: Path) -> None:
-    (place / "cells.csv").write_text("landing_x_m,landing_y_m\n1,0\n1,nan\n")
-    said = call_here("aim", place / "model", "--targets", place / "cells.csv")
-    assert said.returncode == 2
-    assert "cells.csv:3: landing_y_m: should be a number, got 'nan'" in said.stderr
-
-
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"task.duration_s": 90}, "task.duration_s is 90\n  expected: about "),
-        ({"landing_x_m": 1500}, "landing_x_m is 1500, landing_y_m is "),
-        ({"landing_x_m": 2e6}, "landing_x_m: 2e+06\n  expected: a number of at most 1e+06"),
-    ],
-)
-def test_a_measured_throw_far_from_all_others_is_an_error_with_its_line(
-    place: Path, changed: dict[str, float], message: str
-) -> None:
-    model = throwcollect.load_model(place / "model")
-    (aim,) = model.aim([[float(number) for number in middle(place).split(",")]])
-    good = aim.parameters | dict(zip(model.targets, aim.target.tolist(), strict=True))
-    rows = [",".join(map(str, row.values())) for row in (good, good | changed)]
-    (place / "slip.csv").write_text("\n".join([",".join(good), "", *rows]))
-    said = call_here("adapt", place / "model", place / "slip.csv", "-o", place / "new")
-    assert said.returncode == 2
-    assert f"slip.csv:4: {message}" in said.stderr
-
-
 def test_throws_of_another_robot_are_refused(place: Path) -> None:
     shutil.copytree(place / "model", place / "other")
     path = place / "other" / "model.json"
@@ -221,49 +193,12 @@ def test_a_target_out_of_reach_is_reported_with_the_nearest_throw(place: Path) -
     assert re.search(told, said.stderr), said.stderr
 
 
-def test_after_20_targets_out_of_reach_the_others_are_only_counted(place: Path) -> None:
-    (place / "far.csv").write_text("landing_x_m,landing_y_m\n" + "9,0\n" * 30 + middle(place))
-    said = call_here("aim", place / "model", "--targets", place / "far.csv", "-o", place / "far_throws.csv")
-    assert said.returncode == 1
-    assert len(re.findall(r"^target \d+ of 31 is out of reach", said.stderr, re.M)) == 20
-    assert said.stderr.endswith("\nand 10 more; 30 of 31 targets are out of reach\n")
-
-
-def test_each_target_out_of_reach_is_reported_with_its_predicted_end(place: Path) -> None:
-    said = call_here("aim", place / "model", "--at", middle(place), "--at", "9,0", "--at", "0,-9", "--json")
-    found = json.loads(said.stdout)
-    assert [each["reachable"] for each in found] == [True, False, False]
-    ends = [",".join(f"{value:.3f}" for value in each["predicted"]) for each in found]
-    told = re.findall(r"^target (\d) of 3 is out of reach: .*\n  .*; predicted end: (\S+)$", said.stderr, re.M)
-    assert told == [("2", ends[1]), ("3", ends[2])]
-
-
 def test_fit_learns_the_same_model_from_a_directory_and_a_loaded_dataset(place: Path) -> None:
     directory = place / "data"
     by_path, loaded = throwcollect.fit(str(directory)), throwcollect.fit(throwcollect.load(directory))
     assert by_path.file.model_dump_json() == loaded.file.model_dump_json()
     with pytest.raises(throwcollect.DatasetError, match="holds no dataset"):
         throwcollect.fit(place / "nowhere")
-
-
-def test_targets_are_read_from_a_list_that_aiming_wrote(place: Path) -> None:
-    aim = call_here("aim", place / "model", "--at", middle(place), "-o", place / "written.csv")
-    assert aim.returncode == 0, aim.stderr
-    again = call_here("aim", place / "model", "--targets", place / "written.csv", "-o", place / "again.csv")
-    assert again.returncode == 0, again.stderr
-    assert (place / "again.csv").read_text() == (place / "written.csv").read_text()
-
-
-def test_a_missing_target_column_is_an_error_with_both_possible_names(place: Path) -> None:
-    (place / "half.csv").write_text("landing_x_m\n1\n")
-    said = call_here("aim", place / "model", "--targets", place / "half.csv")
-    assert "half.csv:1: no column landing_y_m\n" in said.stderr
-    assert "columns landing_x_m, landing_y_m, or target_y_m for landing_y_m" in said.stderr
-
-
-def test_adapt_prints_the_median_miss_with_its_unit(place: Path) -> None:
-    said = call_here("adapt", place / "model", place / "data", "-o", place / "told")
-    assert re.search(r"^median miss before: [\d.e-]+ cm", said.stdout, re.M), said.stdout
 
 
 def test_the_python_program_of_the_page_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 import psutil
 import pytest
 
-from tests.commands import start_command
 from tests.e2e.collection import (
     FAST,
     call,
@@ -254,29 +253,6 @@ def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, re
     assert "interrupted: finishing the running trials; once more ends at once" in err
 
 
-def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "--trials", "12")
-    following = start_command("logs", "-f", stderr=None)
-    documents = start_command("events", "--json", stderr=None)
-    out, _ = following.communicate(timeout=120)
-    assert records.get(run).status == "ended"
-    lines = out.splitlines()
-    assert {line.split(" | ")[0].rstrip() for line in lines} == {"router", "coordinator", "sim_0", "sim_1"}
-    # On a busy machine, one of them may be told to end before it is ready, as the other has done all trials.
-    assert {"sim_0       | sim_0 is ready", "sim_1       | sim_1 is ready"} & set(lines)
-    assert any(line.startswith("coordinator | 12/12 throws: 12 landed") for line in lines)
-    assert sorted(call_here("logs", "--run", run).stdout.splitlines()) == sorted(lines)
-    only = call_here("logs", "sim_1").stdout.splitlines()
-    assert only == [line for line in lines if line.startswith("sim_1 ")]
-    unknown = call_here("logs", "sim_7")
-    assert unknown.returncode == 2
-    assert f"throwcollect: run {run}: no node 'sim_7' has printed anything" in unknown.stderr
-    events = [json.loads(line) for line in documents.communicate(timeout=30)[0].splitlines()]
-    assert {event["run"] for event in events} == {run}
-    assert [event["event"] for event in events if "node" not in event] == ["started", "finished"]
-    assert (tmp_path / "data" / "logs" / "launcher.log").read_text() == ""
-
-
 def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -293,17 +269,6 @@ def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
         assert message in err
     assert list((tmp_path / "state" / "runs").iterdir()) == []
     assert not (tmp_path / "datasets").exists()
-
-
-def test_ctrl_c_during_the_start_ends_a_detached_run(config: Path, records: Records, tmp_path: Path) -> None:
-    starting = start_command("up", "-d", config, "--output", tmp_path / "data")
-    log = tmp_path / "data" / "logs" / "launcher.log"
-    until(log.exists)
-    starting.send_signal(signal.SIGINT)
-    out, err = starting.communicate(timeout=60)
-    assert (starting.returncode, out) == (130, "")
-    assert "throwcollect: interrupted" in err
-    assert [run.status for run in records.all() if run.lives] == []
 
 
 @pytest.fixture

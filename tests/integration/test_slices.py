@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import shutil
 import subprocess
@@ -221,22 +220,6 @@ def test_slices_of_another_plan_are_not_joined(frozen: Path, config: Path, tmp_p
     shutil.copytree(other / SLICES, frozen / SLICES, dirs_exist_ok=True)
     with pytest.raises(DatasetError, match=r"1-of-2: was collected with another plan"):
         join(frozen)
-
-
-def test_slices_need_no_locks(config: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some file systems of clusters have no locks; slices work without them, but a run of one collection does not."""
-
-    def refuse(descriptor: int, _: int) -> None:
-        if str(tmp_path) in os.readlink(f"/proc/self/fd/{descriptor}"):
-            raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    prepare(load(config), tmp_path / "data", sweep_directory=tmp_path)
-    collect(tmp_path / "data", "0/2", "1/2")
-    join(tmp_path / "data")
-    assert fingerprints(tmp_path / "data") == fingerprints(whole)
-    with pytest.raises(DatasetError, match=r"cannot be locked[\s\S]*has locks"):
-        runs.prepare(config, overrides=INPROCESS, output=tmp_path / "one")
 
 
 def test_a_full_disk_ends_the_attempt_and_a_later_one_goes_on_with_its_episodes(

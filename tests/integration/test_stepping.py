@@ -88,13 +88,6 @@ def test_the_clock_shows_steps_to_the_nanosecond(steps: int, robot: Robot) -> No
     assert stamps == sorted(set(stamps))
 
 
-def test_a_request_for_zero_steps_succeeds(robot: Robot, action: ActionClient) -> None:
-    robot.put_into(PAUSED)
-    assert robot.step(0).result == Result.RESULT_OK
-    assert end(robot, begin(robot, action, 0)) == (SUCCEEDED, Result.RESULT_OK, "")
-    assert robot.now_ns() == 0
-
-
 def test_more_steps_than_a_caller_would_wait_for_are_refused_by_the_service(robot: Robot) -> None:
     robot.put_into(PAUSED)
     for steps in (100_001, 2**64 - 1):

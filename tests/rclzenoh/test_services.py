@@ -13,7 +13,6 @@ from rclzenoh.keys import data_key
 from rclzenoh.qos import QoSProfile
 from rclzenoh.task import Future
 
-Trigger = get_service("std_srvs/srv/Trigger")
 SetBool = get_service("std_srvs/srv/SetBool")
 
 
@@ -190,19 +189,6 @@ def test_a_client_sends_no_more_requests_than_the_service_keeps(rig, pair):
     futures = [client.call_async(SetBool.Request(data=number % 2 == 0)) for number in range(100)]
     assert rig.spin(lambda: all(future.done() for future in futures))
     assert [future.result().success for future in futures] == [number % 2 == 0 for number in range(100)]
-
-
-def test_requests_that_get_no_answer_let_those_that_wait_be_sent(rig, pair):
-    server, _, client = pair
-    unanswered = [client.call_async(SetBool.Request()) for _ in range(30)]
-    # Each ends at once, as nobody offers the service yet.
-    assert rig.spin(lambda: not client._unsent)
-    server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(5)
-    last = client.call_async(SetBool.Request(data=True))
-    assert rig.spin(last.done)
-    assert last.result().success
-    assert not any(future.done() for future in unanswered)
 
 
 def test_a_request_that_is_not_handled_gets_an_error_with_the_reason(rig, pair):

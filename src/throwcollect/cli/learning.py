@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from throwcollect.learning.model import Model
     from throwcollect.learning.score import Score
 
-_MOST_PRINTED = 20
-"""Largest number of targets out of reach that are printed; further ones are only counted."""
-
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
 ModelOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="MODEL", help="Directory to write; must be new or empty.")
@@ -234,14 +231,13 @@ def adapt(
 ) -> None:
     """Correct a model by a few throws of another robot or simulation."""
     from throwcollect.learning.adapting import FarThrowError
-    from throwcollect.learning.lists import read_table, refuse_large_targets
+    from throwcollect.learning.lists import read_table
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
 
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
     rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))
-    refuse_large_targets(rows, model.targets)
     try:
         adapted = model.adapt(
             [{key: row.numbers[key] for key in keys} for row in rows],
@@ -315,14 +311,12 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
 
 
 def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
-    """Print which targets are out of reach, and why; only count those beyond the first `_MOST_PRINTED`."""
-    from throwcollect.learning.reach import explain_reach
+    """Print which targets are out of reach, and why."""
+    from throwcollect.learning.aiming import explain_reach
 
-    far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]
-    for number, aim in far[:_MOST_PRINTED]:
-        tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
-    if len(far) > _MOST_PRINTED:
-        tell(f"and {len(far) - _MOST_PRINTED} more; {len(far)} of {len(aims)} targets are out of reach")
+    for number, aim in enumerate(aims, start=1):
+        if not aim.reachable:
+            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
 
 
 def _describe_score(score: Score) -> list[str]:

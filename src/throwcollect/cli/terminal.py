@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 from throwcollect.coordinator.onlooker import Onlooker
 
 if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
-
     from throwcollect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
@@ -61,7 +59,6 @@ class _Bar(Onlooker):
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console
-        from rich.live import Live
         from rich.table import Column
         from rich.text import Text
 
@@ -83,17 +80,13 @@ class _Bar(Onlooker):
             console=console,
         )
         self._task = self._progress.add_task("waiting for simulations", total=None)
-        self._live = Live(console=console, get_renderable=self._draw, refresh_per_second=10)
-
-    def _draw(self) -> RenderableType:
-        return _InPlace(self._progress.make_tasks_table(self._progress.tasks))
 
     def __enter__(self) -> _Bar:
-        self._live.start()
+        self._progress.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._live.stop()
+        self._progress.stop()
 
     def update(self, progress: Progress) -> None:
         completed, total = progress.steps
@@ -106,25 +99,3 @@ class _Bar(Onlooker):
 
     def warn(self, line: str) -> None:
         self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
-
-
-class _InPlace:
-    """A line that is erased completely even if the terminal is narrowed, and breaks it into several rows.
-
-    The cursor rests at the start of the line. It stays there when the terminal breaks the line, so everything to erase
-    is behind it. From the end of the line, the number of rows to go up would be unknown, because some terminals break
-    lines and others cut them. While rich does not know the new width yet, the terminal cuts the line at its edge.
-    """
-
-    def __init__(self, line: RenderableType) -> None:
-        self._line = line
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        from rich.segment import ControlType, Segment
-
-        (segments,) = console.render_lines(self._line, options, pad=False)
-        # rich has erased this row, and has no names for these codes: they erase the rows below and switch wrapping off.
-        # They begin below the first row, because tmux keeps a screen in its history that is erased from there on.
-        yield Segment("\x1b7\x1b[B\x1b[J\x1b8\x1b[?7l", None, [(ControlType.ERASE_IN_LINE, 0)])
-        yield from segments
-        yield Segment("\x1b[?7h\r", None, [(ControlType.CARRIAGE_RETURN,)])

@@ -151,15 +151,6 @@ def cancel(jobs: Sequence[str]) -> None:
     _run("scancel", "--quiet", *jobs)
 
 
-def find_largest_array() -> int | None:
-    """Find the limit of Slurm for the size of an array; None if Slurm does not tell it."""
-    for line in _run("scontrol", "show", "config").splitlines():
-        name, _, value = line.partition("=")
-        if name.strip() == "MaxArraySize" and value.strip().isdigit():
-            return int(value)
-    return None
-
-
 def _read_indexes(text: str) -> list[int | None]:
     """Read the indexes of array tasks, such as ``4``, ``4-7%2`` or ``1,4-7``; ``[None]`` for a job that is no array."""
     found: list[int | None] = []

@@ -8,15 +8,14 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import read_text, write_file
+from throwcollect.errors import ConfigError
+from throwcollect.files import write_file
 from throwcollect.sweep.slice import Slice
 
 CLUSTER = "cluster"
 """Name of the directory of scripts and logs, inside the directory of a dataset."""
 
 _FILE = "submission.json"
-_MOST_BYTES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -74,10 +73,9 @@ def read_submission(directory: Path) -> Submission:
     """Read the record of a dataset."""
     path = directory / CLUSTER / _FILE
     try:
-        return _JSON.validate_json(read_text(path, most_bytes=_MOST_BYTES))
-    except (DatasetError, ValidationError) as error:
-        reason = error.message if isinstance(error, DatasetError) else "it is damaged"
-        raise ConfigError(f"{path}: does not say what was submitted: {reason}") from error
+        return _JSON.validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise ConfigError(f"{path}: does not say what was submitted: {error}") from error
 
 
 def write_submission(directory: Path, submission: Submission) -> None:

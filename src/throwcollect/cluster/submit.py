@@ -78,8 +78,6 @@ def submit(
         onlooker: Is told what is planned and submitted.
     """
     directory = directory.absolute()
-    if not str(directory).isprintable():
-        raise ConfigError(f"{str(directory)!r}: cannot be named in a batch script", expected="printable characters")
     with load_locating_errors(config, overrides) as read, ExitStack() as undo:
         complete = read.model_copy(update={"cluster": with_site(read.cluster)})
         check_closed(complete)
@@ -96,8 +94,6 @@ def submit(
             raise ConfigError(
                 f"{directory}: was submitted already", hint=f"{command('resume', directory)} submits what is missing"
             )
-        if not live:
-            _check_size(tasks)
         made, planned = not directory.exists(), not (directory / PLAN).exists()
         _freeze(complete, directory, config.parent, onlooker)
         # Only from here on, because a directory that was refused holds the files of somebody else.
@@ -200,22 +196,10 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
             raise ConfigError(
                 [Problem(f"there is no image {image}", key="cluster.image")], hint="throwcollect image sif makes one"
             )
-        if wrong := sorted(set(":,") & set(str(directory))):
-            raise ConfigError(
-                f"{directory}: Apptainer binds no directory with {' or '.join(wrong)} in its name",
-                expected="another directory, or cluster.image: null",
-            )
         # Many login nodes have no Apptainer, though the nodes of tasks have.
         if shutil.which("apptainer") is not None:
             check_sif(image)
     return BatchScripts(config, directory, directory / CLUSTER / _LOGS, tuple(make_command()), image)
-
-
-def _check_size(tasks: int) -> None:
-    largest = slurm.find_largest_array()
-    # Indexes begin at 0, and the largest one is below this number.
-    if largest is not None and tasks > largest:
-        raise ConfigError(f"--tasks {tasks}: is more than Slurm takes here", expected=f"at most {largest}")
 
 
 def _freeze(config: Config, directory: Path, sweep_directory: Path, onlooker: Onlooker) -> None:

@@ -99,7 +99,6 @@ class ThrowsTable:
 
     Attributes:
         schema: Columns with their types and descriptions.
-        later: Names of the columns that datasets of earlier versions lack.
 
     The parameters are the swept keys, and the targets columns of targets, in their order.
 
@@ -115,7 +114,6 @@ class ThrowsTable:
         self._outcomes = task.outcomes
         with explain_failure("tasks", config.task.name, "declare its results"):
             self._columns = task.columns
-        self.later = frozenset(each.name for each in self._columns.columns if each.later)
         self.schema = pa.schema(
             [
                 make_field("trial", pa.int64(), "Number of the trial."),
@@ -167,14 +165,8 @@ class ThrowsTable:
 
 
 def read_throws_table(path: Path, plan: Plan) -> pa.Table:
-    """Read a table of throws with the columns of a plan, whatever trials its rows are of.
-
-    The table of an earlier version lacks the columns that came later.
-    """
-    table = read_parquet(path)
-    expected = ThrowsTable.of(plan)
-    lacking = expected.later - set(table.schema.names)
-    schema = pa.schema([field for field in expected.schema if field.name not in lacking])
+    """Read a table of throws with the columns of a plan, whatever trials its rows are of."""
+    table, schema = read_parquet(path), ThrowsTable.of(plan).schema
     # Metadata are not compared: descriptions of columns may have been worded otherwise when the table was written.
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"

@@ -19,7 +19,7 @@ from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.lerobot_statistics import Frames, summarise_all, summarise_episode
-from throwcollect.export.parquet_series import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
+from throwcollect.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.signals import unit_of
 from throwcollect.export.throw_source import ExportSource, ThrowSeries

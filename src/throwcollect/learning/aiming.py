@@ -1,8 +1,8 @@
-"""Aims: finds, for a target, the parameters of a trial that ends there."""
+"""Aims: finds, for a target, the parameters of a trial that ends there, and says why a target is out of reach."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import KeyRole, LearnedMap, find_nearest
+from throwcollect.learning.score import format_length
 from throwcollect.reproducible_math import matmul, solve
 
 REACH = 0.05
@@ -196,3 +197,33 @@ def _weigh(learned: LearnedMap, choice: Choice, inputs: Array, steps: Array) -> 
         steps = slopes.reshape(len(slopes), -1)
     squares: Array = (steps**2).sum(axis=1)
     return squares
+
+
+def explain_reach(learned: LearnedMap, aim: Aim) -> str:
+    """Say why a target is out of reach and, unless predictions say nothing there, what comes nearest to it."""
+    ends, given = np.split(aim.target, [len(learned.targets)])
+    away, missed = (float(np.linalg.norm(place - ends)) for place in (aim.nearest, aim.predicted))
+    outside = [
+        f"{axis.key} was {axis.minimum:g} to {axis.maximum:g} in all throws"
+        for axis, value in zip(learned.axes_of(KeyRole.CONTEXT), given.tolist(), strict=True)
+        if not axis.minimum <= value <= axis.maximum
+    ]
+    if outside:
+        # Far outside of what was collected, the polynomial gives any place at all.
+        return f"{_join_numbers(aim.target)}; {'; '.join(outside)}"
+    reasons = []
+    if away > REACH:
+        reasons.append(
+            f"no throw came within {format_length(REACH, learned.targets)}, so predictions there are uncertain"
+        )
+    if missed > TOLERANCE:
+        reasons.append(f"the best parameters are predicted to miss it by {format_length(missed, learned.targets)}")
+    return (
+        f"{_join_numbers(aim.target)}; {'; '.join(reasons)}\n"
+        f"  the nearest throw ends at {_join_numbers(aim.nearest)} "
+        f"({format_length(away, learned.targets)} away); predicted end: {_join_numbers(aim.predicted)}"
+    )
+
+
+def _join_numbers(values: Iterable[float]) -> str:
+    return ",".join(f"{value:.3f}" for value in values)

@@ -1,16 +1,25 @@
-"""Distils aiming, from a target to parameters, into one polynomial, which a robot's controller can evaluate."""
+"""Distils aiming, from a target to parameters, into one polynomial, also as a graph of ONNX for controllers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
+from throwcollect.extras import lazily
 from throwcollect.learning.arrays import Array, Vector
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
 from throwcollect.learning.polynomial import SAMPLES_PER_TERM, Polynomial, fit_polynomial, list_exponents, list_terms
 from throwcollect.reproducible_math import matmul, solve
+
+ONNX = "model.onnx"
+_OPERATORS, _FORMAT = 13, 8
+"""Versions of the operators and of the file, which are old enough for the runtimes of controllers."""
+
+helper, numpy_helper = lazily("onnx.helper"), lazily("onnx.numpy_helper")
+
 
 _DEGREE = 4
 """Degree of the polynomial, if there are enough throws; higher degrees hit no better."""
@@ -37,14 +46,6 @@ class DistilledMap:
     low: Vector
     high: Vector
     polynomial: Polynomial
-
-    def has_shape(self, targets: int, context: int, parameters: int) -> bool:
-        """Whether ranges and polynomial fit these numbers of targets, of keys that are given, and of parameters."""
-        return (
-            len(self.low) == len(self.high) == targets
-            and bool((self.low < self.high).all())
-            and self.polynomial.has_shape(targets + context, parameters)
-        )
 
     def aim(self, targets: Array, context: Array) -> Array:
         """Scaled parameters for targets, clipped to their ranges, shape ``(n, n_parameters)``.
@@ -111,3 +112,53 @@ def _step(learned: LearnedMap, terms: Array, squares: Array, raw: Array, context
 
 def _scale_inputs(targets: Array, context: Array, low: Array, high: Array) -> Array:
     return np.hstack([(targets - low) / (high - low) * 2.0 - 1.0, context])
+
+
+def encode_onnx(learned: LearnedMap, distilled: DistilledMap) -> bytes:
+    """Encode a distilled map as a graph of 32-bit floats; the map that it was distilled from has the ranges.
+
+    Its input ``target`` has the shape ``(n, n_targets + n_context)``, its output ``parameters``
+    ``(n, n_parameters)``, both in the order and the units that ``model.json`` has.
+    Parameters stay inside of their ranges.
+    """
+    chosen, given = learned.axes_of(KeyRole.PARAMETER), learned.axes_of(KeyRole.CONTEXT)
+    low = np.array([*distilled.low.tolist(), *(axis.minimum for axis in given)])
+    high = np.array([*distilled.high.tolist(), *(axis.maximum for axis in given)])
+    least, most = (np.array([getattr(axis, end) for axis in chosen]) for end in ("minimum", "maximum"))
+    polynomial = distilled.polynomial
+    constants = {
+        "scale": 2.0 / (high - low),
+        "middle": (high + low) / 2.0,
+        "exponents": polynomial.exponents,
+        "coefficients": polynomial.coefficients,
+        "minus_one": np.array(-1.0),
+        "one": np.array(1.0),
+        "half_range": (most - least) / 2.0,
+        "amid": (most + least) / 2.0,
+    }
+    nodes = [
+        helper.make_node("Sub", ["target", "middle"], ["moved"]),
+        helper.make_node("Mul", ["moved", "scale"], ["scaled"]),
+        helper.make_node("Unsqueeze", ["scaled", "axis"], ["rows"]),
+        helper.make_node("Pow", ["rows", "exponents"], ["powers"]),
+        # In this version of the operators, the axes of ReduceProd are an attribute, and those of Unsqueeze an input.
+        helper.make_node("ReduceProd", ["powers"], ["terms"], axes=[2], keepdims=0),
+        helper.make_node("MatMul", ["terms", "coefficients"], ["raw"]),
+        helper.make_node("Clip", ["raw", "minus_one", "one"], ["inside"]),
+        helper.make_node("Mul", ["inside", "half_range"], ["stretched"]),
+        helper.make_node("Add", ["stretched", "amid"], ["parameters"]),
+    ]
+    float32 = 1  # TensorProto.FLOAT
+    numbers = [numpy_helper.from_array(values.astype(np.float32), name) for name, values in constants.items()]
+    axis: NDArray[np.int64] = np.array([1], np.int64)
+    graph = helper.make_graph(
+        nodes,
+        "from a target to parameters",
+        [helper.make_tensor_value_info("target", float32, ["n", len(low)])],
+        [helper.make_tensor_value_info("parameters", float32, ["n", len(chosen)])],
+        [*numbers, numpy_helper.from_array(axis, "axis")],
+    )
+    operators = [helper.make_opsetid("", _OPERATORS)]
+    model = helper.make_model(graph, producer_name="throwcollect", opset_imports=operators, ir_version=_FORMAT)
+    encoded: bytes = model.SerializeToString(deterministic=True)
+    return encoded

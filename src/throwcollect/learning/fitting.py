@@ -18,9 +18,8 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap, no_correction, scale_values
 from throwcollect.learning.polynomial import Validation, cross_validate, fit_polynomial
-from throwcollect.wording import format_count, join_names, suggest
+from throwcollect.wording import format_count, suggest
 
-MOST_PARAMETERS = 20
 EFFORT = "effort_peak_share"
 """Column of the largest share of a joint's torque limit."""
 _THROWS_PER_PARAMETER = 3
@@ -175,12 +174,6 @@ def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) ->
         raise ConfigError(
             f"{dataset.directory}: no parameter of the task varies",
             expected="a sweep of task.… keys, or other parameters",
-        )
-    if len(chosen) > MOST_PARAMETERS:
-        raise ConfigError(
-            f"{len(chosen)} parameters: {join_names(chosen)}",
-            expected=f"at most {MOST_PARAMETERS}",
-            hint="choose some of them as parameters; the others count as unknown",
         )
     if len(throws) < (needed := count_needed_throws(len(chosen))):
         raise ConfigError(

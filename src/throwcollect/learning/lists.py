@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.target_columns import LARGEST_TARGET
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
@@ -72,18 +71,7 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
     """
     aliases = {column.of: column.name for column in task.target_columns if column.of in names}
     rows = read_table(path, names, aliases=aliases)
-    refuse_large_targets(rows, names)
     return [[row.numbers[name] for name in names] for row in rows]
-
-
-def refuse_large_targets(rows: Sequence[Row], names: Sequence[str]) -> None:
-    """Refuse rows with numbers that are so large that their powers are not finite."""
-    for row in rows:
-        for name in names:
-            if abs(row.numbers[name]) > LARGEST_TARGET:
-                raise ConfigError(
-                    f"{row.place}: {name}: {row.numbers[name]:g}", expected=f"a number of at most {LARGEST_TARGET:g}"
-                )
 
 
 def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:
@@ -92,8 +80,6 @@ def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: Task
     `names` are those of the numbers of a target: columns of the table of throws, and keys that are given. The list has
     columns only for targets that the task declares.
     """
-    if path.suffix != ".csv":
-        raise ConfigError(f"{path}: lists are written only as CSV", expected="a name with .csv")
     columns = {column.name: names.index(column.of) for column in task.target_columns if column.of in names}
     if task.find_wrong_targets(columns):
         columns = {}

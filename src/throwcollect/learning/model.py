@@ -148,16 +148,13 @@ class Model:
             processes: How many processes simulate.
 
         Raises:
-            ConfigError: If a number is out of its range, or what should simulate is no simulator.
+            ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
         for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
             check_whole_number(name, number, least=1)
         check_whole_number("seed", seed, least=0)
         _check_scatter(scatter)
-        for name, given in (("simulator", simulator), ("world", world)):
-            if not isinstance(given, Simulates) and (given is not None or name == "simulator"):
-                raise refuse_argument(name, f"got {show_value(given)}", expected="a throwcollect.Simulator")
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
             score_model(

@@ -12,11 +12,11 @@ from pydantic import ValidationError
 
 from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory, read_text, write_file
+from throwcollect.learning.distilling import ONNX, encode_onnx
 from throwcollect.learning.fitting import EFFORT
 from throwcollect.learning.learned_map import LearnedMap
 from throwcollect.learning.model_card import describe_model
 from throwcollect.learning.model_file import MODEL, ModelFile, read_model_file
-from throwcollect.learning.onnx_file import ONNX, encode_onnx
 from throwcollect.learning.score import Score
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 
@@ -53,16 +53,10 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
     file = read_model_file(directory)
     path = directory / POINTS
     table = read_parquet(path)
-    # A target may also be a key, or the effort; then it has only one column.
-    names = list(dict.fromkeys(["trial", *(axis.key for axis in file.axes), *file.targets, EFFORT]))
-    if table.column_names != names or not all(
-        pa.types.is_floating(field.type) or (field.name == "trial" and pa.types.is_integer(field.type))
-        for field in table.schema
-    ):
-        raise DatasetError("does not have the columns of this model", path=path, expected=", ".join(names))
-    columns = {name: table[name].to_numpy() for name in names}
-    if not len(table) or not all(np.isfinite(column).all() for column in columns.values()):
-        raise DatasetError("has rows without finite numbers, or no rows", path=path)
+    names = {"trial", *(axis.key for axis in file.axes), *file.targets, EFFORT}
+    if set(table.column_names) != names:
+        raise DatasetError("does not have the columns of this model", path=path, expected=", ".join(sorted(names)))
+    columns = {name: table[name].to_numpy() for name in table.column_names}
     learned = LearnedMap(
         file.kind,
         file.axes,

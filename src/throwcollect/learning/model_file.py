@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, FiniteFloat, ValidationError, model_validator
+from pydantic import Field, FiniteFloat, ValidationError
 
 from throwcollect.dataset.directory import has_files
 from throwcollect.dataset.miss_quantiles import find_median
@@ -111,24 +111,6 @@ class ModelFile(ModelEntry):
     trained_on: TrainedOn
     adaptation: AdaptationEntry | None
     distilled: DistilledMap | None = Field(default=None, repr=False)
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> ModelFile:
-        inputs, targets = len(self.axes), len(self.targets)
-        roles = [axis.role for axis in self.axes]
-        parameters, context, latents = (roles.count(role) for role in KeyRole)
-        if not (
-            self.forward.has_shape(inputs, targets)
-            and self.effort.has_shape(inputs, 1)
-            and len(self.correction.bias) == parameters > 0
-            and len(self.correction.latents) == latents
-            and len(self.correction.offset) == targets
-            and roles == sorted(roles, key=list(KeyRole).index)
-            and all(axis.minimum < axis.maximum for axis in self.axes)
-            and (self.distilled is None or self.distilled.has_shape(targets, context, parameters))
-        ):
-            raise ValueError("axes, targets, polynomials and correction do not belong together")
-        return self
 
 
 def read_model_file(directory: Path) -> ModelFile:

@@ -40,11 +40,6 @@ class Polynomial:
         """Highest sum of the exponents of a term."""
         return int(self.exponents.sum(axis=1).max())
 
-    def has_shape(self, inputs: int, outputs: int) -> bool:
-        """Whether exponents and coefficients fit these numbers of inputs and outputs, and there is a term."""
-        terms = len(self.exponents)
-        return terms > 0 and self.exponents.shape == (terms, inputs) and self.coefficients.shape == (terms, outputs)
-
     def predict(self, inputs: Array) -> Array:
         """Values of the outputs, shape ``(n, n_outputs)``, for inputs of shape ``(n, n_inputs)``."""
         return matmul(list_terms(inputs, self.exponents), self.coefficients)

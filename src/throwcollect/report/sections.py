@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from markupsafe import Markup
 
-from throwcollect.dataset.directory import CONFIG, JOURNAL, PROVENANCE
+from throwcollect.dataset.directory import CONFIG, FORMAT, JOURNAL, PROVENANCE
 from throwcollect.dataset.inspect import summary
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.provenance import read_provenance
@@ -20,7 +21,6 @@ from throwcollect.members import explain_failure, is_own, load_part
 from throwcollect.report import figures
 from throwcollect.report.amounts import format_duration, format_share, format_size
 from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, TaskReport, Tile
-from throwcollect.report.failures import FailureGroup, group_failures
 from throwcollect.report.joint_peaks import KINDS, JointPeaks, summarise_peaks
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
@@ -30,6 +30,39 @@ from throwcollect.report.throughput import Throughput, measure_throughput
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest
 from throwcollect.tasks.task import task_of
+from throwcollect.wording import blank_numbers
+
+_EXAMPLES = 5
+
+
+@dataclass(frozen=True)
+class FailureGroup:
+    """A group of trials with the same outcome and, but for numbers, the same reason.
+
+    Attributes:
+        pattern: Their reason; if its numbers differ between the trials, ``#`` stands in place of each number.
+        examples: Numbers of the first of these trials.
+    """
+
+    outcome: str
+    pattern: str
+    count: int
+    examples: tuple[int, ...]
+
+
+def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[FailureGroup, ...]:
+    """Group trial, outcome and reason of each row, most frequent groups first; trials without a reason did not fail."""
+    groups: dict[tuple[str, str], list[tuple[int, str]]] = {}
+    for trial, outcome, reason in rows:
+        if reason is not None:
+            groups.setdefault((outcome, blank_numbers(reason)), []).append((trial, reason))
+    failures = []
+    for (outcome, pattern), members in groups.items():
+        trials, reasons = zip(*members, strict=True)
+        reason = pattern if len(set(reasons)) > 1 else reasons[0]
+        failures.append(FailureGroup(outcome, reason, len(trials), trials[:_EXAMPLES]))
+    return tuple(sorted(failures, key=lambda failure: (-failure.count, failure.outcome, failure.pattern)))
+
 
 _MOST_FAILURES = 40
 _MOST_CONFIG_BYTES = 10_000_000
@@ -94,7 +127,7 @@ def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
     return {
         "dataset digest": info.digest,
         "configuration digest": config_digest(dataset.config),
-        "layout": dataset.layout,
+        "layout": FORMAT,
         "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
         **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
     }

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rclzenoh.domain import DOMAIN_VARIABLE
-from rclzenoh.session_config import NOT_IN_PATHS, OVERRIDE_VARIABLE, PROTECTED, Key, client_override
+from rclzenoh.session_config import DOMAIN_VARIABLE, OVERRIDE_VARIABLE, PROTECTED, Key, client_override
 from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import KEY_VARIABLE, RunKey
@@ -54,11 +53,4 @@ class Connection:
 
 def session_key(endpoint: str, key: RunKey) -> Key | None:
     """The key of a run as a Zenoh session takes it; None if the router at the endpoint lets anybody in."""
-    if not endpoint.startswith(PROTECTED):
-        return None
-    if forbidden := sorted(set(NOT_IN_PATHS) & set(str(key.directory))):
-        raise ConfigError(
-            f"{key.directory}: Zenoh finds no key in a directory with {' or '.join(forbidden)} in its name",
-            expected=f"a path without {' and '.join(NOT_IN_PATHS)}, as of the directory that THROWCOLLECT_STATE names",
-        )
-    return Key(key.private_key, key.certificate)
+    return Key(key.private_key, key.certificate) if endpoint.startswith(PROTECTED) else None

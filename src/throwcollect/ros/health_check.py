@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import re
 import socket
 
 import zenoh
 
-from rclzenoh.domain import domain_of_environment
 from rclzenoh.health import node_answers
-from rclzenoh.session_config import OPEN, connect_endpoint, environment_config
+from rclzenoh.session_config import OPEN, connect_endpoint, domain_of_environment, environment_config
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import is_beating
 from throwcollect.ros.middleware import Middleware
@@ -24,7 +22,6 @@ TIMEOUT_S = 3.0
 """Time to open the session, and again to get the answer."""
 
 _ROUTER, _COORDINATOR = "router", "coordinator"
-_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 
 
 def check(node: str | None = None) -> None:
@@ -35,11 +32,8 @@ def check(node: str | None = None) -> None:
             names.
     """
     name = node or os.environ.get(NODE_VARIABLE)
-    if not name or not _NAME.fullmatch(name):
-        raise ConfigError(
-            f"health: got {name!r} as node" if name else "health: no node is named",
-            expected=f"router, coordinator, or the name of a simulation; by default what {NODE_VARIABLE} says",
-        )
+    if not name:
+        raise ConfigError("health: no node is named", expected="router, coordinator, or the name of a simulation")
     is_fast_dds = Middleware.of_process().is_fast_dds
     if is_fast_dds and name != _ROUTER:
         # A request over DDS would cost too much. Instead, the loop of the node in this container keeps a heartbeat.

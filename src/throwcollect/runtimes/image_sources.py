@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-import shlex
 import subprocess
 import tarfile
 from pathlib import Path
@@ -28,8 +27,6 @@ _PACKAGE = Path(__file__).parents[1]
 _SOURCES = ("pyproject.toml", "configs/quickstart.yaml", "src")
 _INTERFACES = ("packaging/ros_interfaces", "packaging/ros_constraints.txt")
 """Further sources of the wheel with interfaces of ROS 2."""
-_WHEEL_OF_ROS = "throwcollect_ros_interfaces-*.whl"
-"""The wheel with these interfaces, which no package index has."""
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
 _SCHEMES = ("https", "http", "ssh", "git")
 _SSH_ADDRESS = re.compile(r"(?:[^@:/]+@)?([^@:/]{2,}):(?!//)/?(.+)")
@@ -71,23 +68,10 @@ def are_others(sources: str | None) -> bool:
     return sources not in (None, UNKNOWN, digest_sources(root))
 
 
-def check_wheelhouse(root: Path, wheelhouse: Path | None, *, ros: bool) -> None:
-    """Make sure that a directory holds wheels; None takes them from the package index.
-
-    With `ros`, it also has to hold the wheels of genuine ROS 2, some of which no package index has.
-    """
-    if wheelhouse is None:
-        return
-    lacking = "" if any(wheelhouse.glob("*.whl")) else "holds no wheels"
-    if not lacking and ros and not any(wheelhouse.glob(_WHEEL_OF_ROS)):
-        lacking = "holds no wheels of genuine ROS 2, which the image has"
-    if lacking:
-        raise ConfigError(f"{wheelhouse}: {lacking}", hint=fill_command(root / "docker", wheelhouse, ros=ros))
-
-
-def fill_command(docker: Path, wheelhouse: Path, *, ros: bool) -> str:
-    """The command that fills a directory of wheels, by the script in the directory `docker` of a clone."""
-    return shlex.join(["python", str(docker / "wheelhouse.py"), *["--ros"] * ros, str(wheelhouse)])
+def check_wheelhouse(wheelhouse: Path | None) -> None:
+    """Make sure that a directory holds wheels; None takes them from the package index."""
+    if wheelhouse is not None and not any(wheelhouse.glob("*.whl")):
+        raise ConfigError(f"{wheelhouse}: holds no wheels", hint="docker/wheelhouse.py --ros fills it")
 
 
 def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> None:

@@ -5,16 +5,12 @@ The launcher is the node ``/launcher`` meanwhile; setting its integer parameter 
 
 from __future__ import annotations
 
-import importlib
 import math
 import time
 from collections.abc import Callable
 
 from throwcollect import ros
-from throwcollect.config import shape
-from throwcollect.config.document import compose
 from throwcollect.config.loader import dump_yaml
-from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError, WorkerError
@@ -43,9 +39,7 @@ CONFIGURATION = "configuration"
 """Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
 MOST_SIMULATIONS = 256
 
-_POLL_S = 0.1
-_LAST_POLL_S = 0.005
-"""The time between polls once all known trials have ended: the coordinator ends soon, and the user waits for that."""
+_POLL_S = 0.05
 _MEET_S = 12.0
 _MEET_EACH_S = 0.5
 """Simulations that are ready are usually seen within a second, but many that start at once share cores and a router.
@@ -86,7 +80,6 @@ class NodeCollection:
         self._set_aside: set[str] = set()
         self._apart_since = math.inf
         self._started_again = False
-        self._ready_for_the_end = self._about_to_end = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
         self._listener = RunListener(self._report, name=LAUNCHER, reports=host.place.collects, on_connect=self._offer)
 
@@ -144,15 +137,10 @@ class NodeCollection:
             raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
     def _listen(self) -> None:
-        self._listener.spin(self._host.connection, _LAST_POLL_S if self._about_to_end else _POLL_S)
+        self._listener.spin(self._host.connection, _POLL_S)
 
     def _report(self, progress: Progress) -> None:
         self._session.update(progress)
-        # This is a good time for imports: the simulations are busy, and nobody waits for this process.
-        if progress.ended and not self._ready_for_the_end:
-            self._ready_for_the_end = True
-            _prepare_for_summary(self._host.config)
-        self._about_to_end = progress.ended >= progress.total
         self._check_that_nodes_meet(progress)
         self._supervisor.replace(progress.hung)
         for name in progress.set_aside.keys() - self._set_aside:
@@ -197,11 +185,3 @@ class NodeCollection:
     def _request_simulations(self, simulations: int) -> None:
         # `_follow` scales the run later, so that the client that sets the parameter does not wait for nodes to end.
         self._wanted = simulations
-
-
-def _prepare_for_summary(config: Config) -> None:
-    """Import modules and fill caches for the summary of the dataset, so that it comes soon after the last trial."""
-    importlib.import_module("throwcollect.dataset.inspect")
-    # The text of the dataset's ``config.yaml``, and the units of its columns.
-    compose(dump_yaml(config))
-    shape.root()

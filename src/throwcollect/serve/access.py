@@ -11,7 +11,6 @@ import hmac
 import logging
 import secrets
 import time
-from collections import Counter
 from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -28,8 +27,6 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
 _TOO_LONG = 413, f"a body may have at most {_MOST_BODY} bytes"
-_MOST = {"sockets": 128, "requests": 256, "requests without a token": 64}
-"""How many may be open at once; a page has up to four sockets."""
 MAY_ONLY_LOOK = 403, "this token may only look"
 """Status and sentence for a request to change something with the token that may only look."""
 _PLAIN = "/-_.~{}:@!$&'()*+,;="
@@ -104,7 +101,6 @@ class Access:
         self._app = app
         self._keys = keys
         self._hosts = hosts
-        self._open: Counter[str] = Counter()
         self._origins = origins | {f"{scheme}://{host}" for scheme in ("http", "https") for host in hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -117,20 +113,13 @@ class Access:
         scope.setdefault("state", {})["may_change"] = rights is Rights.CHANGE
         host = headers.get("host", "")
         answer = _Answer(scope, send, rights.value, _write_policy(host if host in self._hosts else None))
-        kind = "requests without a token" if rights is Rights.NONE else "requests"
-        if scope["type"] == "websocket":
-            kind = "sockets"
-        if refusal is None and self._open[kind] >= _MOST[kind]:
-            refusal = 503, f"{_MOST[kind]} {kind} are open, which is the limit"
         if refusal is not None:
             await _refuse(scope, receive, answer, *refusal)
             return
         body = _Body(receive)
-        self._open[kind] += 1
         try:
             await self._app(scope, body.receive, body.unless_too_long(answer))
         finally:
-            self._open[kind] -= 1
             if body.is_too_long:
                 await _refuse(scope, receive, answer, *_TOO_LONG)
 

@@ -13,14 +13,13 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel
 
 from throwcollect.serve.access import Keys
-from throwcollect.serve.bridges import Bridges
 from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
 from throwcollect.serve.models import Models, make_model_routes
 from throwcollect.serve.problem_responses import add_handlers, describe_problems, problem
-from throwcollect.serve.rosbridge_routes import make_rosbridge_routes
+from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import Lookout, WholeState
 from throwcollect.serve.view_routes import make_description_routes, make_view_routes

@@ -10,7 +10,6 @@ import select
 import signal
 import ssl
 import subprocess
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
@@ -21,7 +20,7 @@ from urllib.parse import urlsplit
 
 from pydantic import TypeAdapter
 
-from throwcollect.errors import DatasetError, WorkerError
+from throwcollect.errors import WorkerError
 from throwcollect.files import open_log, write_secret
 from throwcollect.own_process import make_command
 from throwcollect.state_directory import is_locked, state_directory
@@ -36,6 +35,7 @@ _END_S = 5.0
 """A server needs less to end."""
 _ANSWER_S = 5.0
 _POLL_S = 0.05
+_LOCK_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -65,42 +65,33 @@ class Address:
 def publish(address: Address) -> Iterator[None]:
     """Let programs of this user find this server as long as the block lasts.
 
-    If there is another server already, programs find this one only after the other one has ended.
+    If there is another server already, programs find that one.
     """
     path = _find_path()
     try:
         lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
         raise WorkerError(f"{path}: nobody would find this server: {error.strerror}") from error
-    # This server may get the lock just when it ends. `turn` prevents writing the file after it was removed.
-    turn, has_left = threading.Lock(), threading.Event()
-
-    def wait() -> None:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        with turn:
-            if has_left.is_set():
-                os.close(lock)
-                return
-            # The disk may be full by now, but this server works without the file.
-            with suppress(DatasetError):
-                write_secret(path, _ADDRESS.dump_json(address))
-
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        # The other server holds the lock until it ends, even if it is killed; a thread waits for that.
-        threading.Thread(target=wait, name="next to be found", daemon=True).start()
-    else:
+    # A server holds the lock until it ends, even if it is killed. `is_locked` of a program holds it for a moment.
+    deadline = time.monotonic() + _LOCK_S
+    while not (is_first := _lock(lock)) and time.monotonic() < deadline:
+        time.sleep(_POLL_S)
+    if is_first:
         write_secret(path, _ADDRESS.dump_json(address))
     try:
         yield
     finally:
-        with turn:
-            has_left.set()
-            # If this server has not got the lock yet, the file belongs to the other server, and stays.
-            if _read() == address:
-                path.unlink(missing_ok=True)
-                os.close(lock)
+        if is_first:
+            path.unlink(missing_ok=True)
+        os.close(lock)
+
+
+def _lock(file: int) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def log_path() -> Path:

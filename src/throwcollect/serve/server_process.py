@@ -22,7 +22,7 @@ from throwcollect.serve.app import make_app
 from throwcollect.serve.finding import Address, publish
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.models import Models
-from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
+from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 
 _PORT = 8080
 """Port to serve at if the user names none and it is free."""

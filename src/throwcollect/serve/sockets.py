@@ -1,4 +1,4 @@
-"""Sockets on which the server sends and the client only listens."""
+"""Sockets on which the server sends and the client only listens, until their run has ended."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError
+from throwcollect.runs.records import Run
+
+_LOOK_S = 1.0
+
 
 NOT_FOUND = 4404
 """Close code of a socket to something that does not exist."""
 MAY_NOT = 4403
 """Close code of a socket that would change something, if the client's token allows only looking."""
-FULL = 1013
-"""Close code of a socket beyond the largest number; a later attempt may succeed."""
 FAILED = 4503
 """Close code of a socket to something that does not answer."""
 BROKEN = 1011
@@ -83,3 +85,21 @@ async def _end(socket: WebSocket, error: BaseException) -> None:
         is_expected = is_expected or isinstance(error, RuntimeError)
     if not is_expected:
         _logger.error("telling a client failed", exc_info=error)
+
+
+def refuse_ended(run: Run) -> None:
+    """Refuse a run that has ended, so that nobody would ever answer."""
+    if run.status == "ended":
+        raise NotFoundError(f"run {run.id} has ended")
+
+
+async def wait_for_end(run: Run) -> None:
+    """Wait until a run has ended, which is told by an error.
+
+    Raises:
+        NotFoundError: If the run has ended, or was forgotten.
+        ConfigError: If its record is damaged.
+    """
+    while True:
+        refuse_ended(await asyncio.to_thread(run.now))
+        await asyncio.sleep(_LOOK_S)

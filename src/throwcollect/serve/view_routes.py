@@ -22,8 +22,7 @@ from throwcollect.serve.robot_files import (
     list_meshes,
     scene_of,
 )
-from throwcollect.serve.run_end import wait_for_end
-from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse
+from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse, wait_for_end
 from throwcollect.serve.throws import ThrowWatch
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}

@@ -97,8 +97,7 @@ class ResultColumns(Generic[AnyResult]):
         """Make the result whose values stand in a row of the table, by column."""
         measures = {}
         for name, columns, declared in self._fields:
-            # Rows of an earlier version have fewer columns.
-            values = [row.get(column.name) if column.later else row[column.name] for column in declared]
+            values = [row[column.name] for column in declared]
             measures[name] = None if None in values else columns.join(values, self._joints)
         return self._results(outcome, reason, **measures)
 

@@ -28,13 +28,11 @@ class Column:
         name: Name of the column.
         kind: Kind of its values: numbers, whole numbers, or text; null where nothing was measured.
         description: One sentence, with units.
-        later: Whether datasets of earlier versions lack this column.
     """
 
     name: str
     kind: Literal["number", "count", "text"]
     description: str
-    later: bool = False
 
 
 class Columns(ABC):
@@ -59,16 +57,14 @@ class Number(Columns):
 
     Attributes:
         description: One sentence, with the unit.
-        later: Whether datasets of earlier versions lack this column.
     """
 
     kind: ClassVar[Literal["number", "count"]] = "number"
     description: str
-    later: bool = False
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the column; see `Columns`."""
-        return [Column(name, self.kind, self.description, self.later)]
+        return [Column(name, self.kind, self.description)]
 
 
 class Count(Number):
@@ -118,7 +114,7 @@ def join_ball(values: Sequence[float]) -> BallState:
 
 @dataclass(frozen=True)
 class SpinColumns(Columns):
-    """An angular velocity of the ball: ``<field>_x_radps`` and so on. Datasets of earlier versions lack these columns.
+    """An angular velocity of the ball: ``<field>_x_radps`` and so on.
 
     Attributes:
         when: The instant, as the end of a sentence.
@@ -133,7 +129,6 @@ class SpinColumns(Columns):
                 f"{name}_{axis}_radps",
                 "number",
                 f"Angular velocity of the ball in world {self.when}, {axis} [rad/s].",
-                later=True,
             )
             for axis in "xyz"
         ]

@@ -41,7 +41,6 @@ def test_plan_with_json_still_warns_of_a_robot_below_the_ground(tmp_path: Path) 
 def test_submit_and_resume_with_json_print_only_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slurm, "submit", lambda *_: "7")
     monkeypatch.setattr(slurm, "check", lambda _: None)
-    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
     monkeypatch.setattr(slurm, "find_tasks", lambda: {})
     monkeypatch.setattr(slurm, "find_ended", lambda _: {})
     config = write_config(tmp_path, trials=2, text=SLICED, sim=FAST)

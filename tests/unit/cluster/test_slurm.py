@@ -40,12 +40,12 @@ scontrol: error: resolve_ctls_from_dns_srv: res_nsearch error: Unknown host
 scontrol: error: fetch_config: DNS SRV lookup failed
 scontrol: fatal: Could not establish a configuration source
 """
-    for name in ("scontrol", "sbatch"):
+    for name in ("squeue", "sbatch"):
         (tmp_path / name).write_text(f"#!/bin/sh\ncat >&2 <<END\n{said}END\nexit 1\n")
         (tmp_path / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    with pytest.raises(WorkerError, match="Slurm has no controller that scontrol can reach") as caught:
-        slurm.find_largest_array()
+    with pytest.raises(WorkerError, match="Slurm has no controller that squeue can reach") as caught:
+        slurm.find_tasks()
     assert "resolve_ctls" not in str(caught.value)
     with pytest.raises(ConfigError, match="Slurm has no controller that sbatch can reach") as refused:
         slurm.check(tmp_path / "script")

@@ -26,7 +26,6 @@ def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monk
 
     monkeypatch.setattr(slurm, "submit", answer)
     monkeypatch.setattr(slurm, "check", lambda _: None)
-    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
     monkeypatch.setattr(slurm, "cancel", cancelled.extend)
     with pytest.raises(WorkerError, match="too many jobs"):
         submit(config, tmp_path / "data", 2, onlooker=SILENT)
@@ -45,7 +44,6 @@ def test_jobs_are_cancelled_if_they_cannot_be_recorded(
     numbers, cancelled = iter("123"), list[str]()
     monkeypatch.setattr(slurm, "submit", lambda *_: next(numbers))
     monkeypatch.setattr(slurm, "check", lambda _: None)
-    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
     monkeypatch.setattr(slurm, "cancel", cancelled.extend)
     monkeypatch.setattr(module, "write_submission", fail)
     with pytest.raises(DatasetError, match="No space left"):
@@ -53,22 +51,6 @@ def test_jobs_are_cancelled_if_they_cannot_be_recorded(
     # The joining job waits for the end of the array, so it is the first one to be cancelled.
     assert cancelled == jobs
     assert not (tmp_path / "data").exists()
-
-
-@pytest.mark.parametrize(("tasks", "error", "said"), [(2, WorkerError, "submitted"), (3, ConfigError, "at most 2")])
-def test_an_array_with_more_tasks_than_slurm_allows_is_refused(
-    tasks: int, error: type[Exception], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    config = write_config(tmp_path, trials=6, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
-
-    def refuse(*_: object) -> str:
-        raise WorkerError("submitted")
-
-    monkeypatch.setattr(slurm, "submit", refuse)
-    monkeypatch.setattr(slurm, "check", lambda _: None)
-    monkeypatch.setattr(slurm, "find_largest_array", lambda: 2)
-    with pytest.raises(error, match=said):
-        submit(config, tmp_path / "data", tasks, onlooker=SILENT)
 
 
 @pytest.mark.parametrize(("scratch", "is_taken"), [("/nope", False), ("/tmp", True), ("$SCRATCH/mine", True)])

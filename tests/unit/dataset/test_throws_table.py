@@ -10,8 +10,6 @@ from tests.unit.dataset.conftest import Collection
 from throwcollect.config.schema import Config
 from throwcollect.dataset import throws_table
 from throwcollect.dataset.throws_table import EpisodePlace, RowsByTrial, ThrowsTable, read_throws
-from throwcollect.dataset.verify import verify
-from throwcollect.derive.selection import merge
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.tasks.result import Outcome
@@ -91,20 +89,11 @@ def test_a_task_that_lacks_a_required_outcome_is_refused(monkeypatch: pytest.Mon
         ThrowsTable((), Config())
 
 
-def test_a_table_of_throws_of_an_earlier_version_can_be_read_and_merged(collection: Collection, tmp_path: Path) -> None:
+def test_a_table_that_lacks_a_column_is_refused(collection: Collection, tmp_path: Path) -> None:
     directory = collection.collect(tmp_path / "dataset")
-    earlier = pq.read_table(directory / "throws.parquet").drop_columns(sorted(ThrowsTable.of(collection.plan).later))
+    table = pq.read_table(directory / "throws.parquet").drop_columns(["recontacts"])
     (directory / "throws.parquet").unlink()
-    pq.write_table(earlier, directory / "throws.parquet")
-    (directory / "datapackage.json").unlink()
-    assert read_throws(directory, collection.plan).equals(earlier)
-    assert not [finding for finding in verify(directory) if finding.file not in ("datapackage.json",)]
-    merge([directory, collection.collect(tmp_path / "new")], tmp_path / "merged")
-    merged = pq.read_table(tmp_path / "merged" / "throws.parquet")
-    assert merged["release_spin_y_radps"].null_count == 0
-    assert not verify(tmp_path / "merged")
-
-    pq.write_table(earlier.drop_columns(["recontacts"]), directory / "throws.parquet")
+    pq.write_table(table, directory / "throws.parquet")
     with pytest.raises(DatasetError, match=r"not the table of this plan: differs in \['recontacts'\]"):
         read_throws(directory, collection.plan)
 

@@ -1,9 +1,7 @@
 from __future__ import annotations
 
 import json
-import signal
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,8 +19,6 @@ from tests.unit.export.conftest import (
 from throwcollect.config.schema import Config
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
-from throwcollect.export import hdf5
-from throwcollect.export.export import export
 
 h5py = pytest.importorskip("h5py")
 BESIDE = {"time_s", "command_position_rad", "command_velocity_radps", "command_acceleration_radps2"}
@@ -86,23 +82,3 @@ def test_the_exported_table_has_all_trials(exported: Export, source: Path) -> No
             else:
                 missing = -1 if column.dtype.kind == "i" else np.nan
                 assert np.array_equal(column, [missing if value is None else value for value in values], equal_nan=True)
-
-
-def test_an_interruption_while_the_hdf5_file_is_written_to_ends_the_export(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write, interrupted = hdf5._Output.write, False
-
-    def be_interrupted(output: Any, data: Any) -> int:
-        nonlocal interrupted
-        # HDF5 writes compressed numbers, which begin so, when it closes their dataset.
-        if not interrupted and bytes(data[:1]) == b"\x78":
-            interrupted = True
-            signal.raise_signal(signal.SIGINT)
-        return write(output, data)
-
-    monkeypatch.setattr(hdf5._Output, "write", be_interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        export(source, tmp_path / "out", to="hdf5")
-    assert interrupted
-    assert list(tmp_path.iterdir()) == []

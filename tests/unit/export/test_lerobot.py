@@ -23,7 +23,7 @@ from tests.unit.export.conftest import (
 )
 
 from throwcollect.dataset.inspect import info
-from throwcollect.export import parquet_series
+from throwcollect.export import parquet
 from throwcollect.export.export import export
 
 POSITIONS = [f"{joint}.pos" for joint in MOVING]
@@ -214,8 +214,8 @@ def test_the_exported_table_also_has_trials_without_an_episode(exported: Export,
 def test_data_files_and_directories_are_split_at_their_limits(
     limit: str, least: int, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exported: Export
 ) -> None:
-    monkeypatch.setattr(parquet_series, limit, least)
-    monkeypatch.setattr(parquet_series, "FILES_PER_CHUNK", 3)
+    monkeypatch.setattr(parquet, limit, least)
+    monkeypatch.setattr(parquet, "FILES_PER_CHUNK", 3)
     export(source, tmp_path / "out", to="lerobot")
     names = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out" / "data").rglob("*.parquet"))
     assert names == [

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,7 @@ from tests.unit.export.conftest import HELD, MOVING, Export, moving_columns, tab
 
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.export import mat
 from throwcollect.export.export import export
-from throwcollect.export.throw_source import ExportSource
 
 FIELDS = ["N", "dt", "a_z", "a_x", "c", "sigma_2", "w", "tau", "goal", "y0", "fitted", "error"]
 WEIGHTS = [-758.2, -994.1, -1122.1, -1231.2, -1231.1, -1114.2, -858.3, -508.7, -155.7, 74.0, 57.6, -56.9]
@@ -150,22 +146,3 @@ def test_the_exported_table_has_all_trials_with_units(exported: Export, source: 
             )
     assert units["landing_vx_mps"][0] == "m/s"
     assert units["task_end_arm_right_4_joint"][0] == "rad"
-
-
-def test_a_recording_too_large_for_the_mat_format_is_refused(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(mat, "_LARGEST", 100_000)
-    with pytest.raises(
-        DatasetError, match=r"quick_00000\.mat: robot_throws would have .* GiB\n  expected: less than 2 GiB"
-    ):
-        export(source, tmp_path / "out", to="mat")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_column_whose_name_is_too_long_for_the_mat_format_is_named(source: Path, tmp_path: Path) -> None:
-    whole = ExportSource.open(source)
-    key = f"task.end.{'j' * 55}"
-    longer = replace(whole, table=whole.table.append_column(key, whole.table["landing_x_m"]))
-    with pytest.raises(ConfigError, match=rf"^to: mat has no room for the name of the column {key}"):
-        mat.write(longer, tmp_path)

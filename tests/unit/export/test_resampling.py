@@ -1,10 +1,12 @@
+"""Samples of exported throws at another rate."""
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
 from throwcollect.episode.record import Samples
-from throwcollect.export.resampling import count_resampled, resample
+from throwcollect.export.throw_source import count_resampled, resample
 
 
 def polynomial(rate_hz: int, count: int) -> Samples:

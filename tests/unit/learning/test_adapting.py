@@ -1,13 +1,11 @@
 """Adapting to worlds in closed form that differ from the one that was learned."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tests.unit.learning.worlds import KEYS, draw, land, learn, learn_with_drag
 
 from throwcollect.errors import ConfigError
-from throwcollect.learning.adapting import Adaptation, FarThrowError, Method, adapt, refuse_far_places
+from throwcollect.learning.adapting import Adaptation, Method, adapt
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
 
 BIAS = np.array([0.02, 0.06, -0.04])
@@ -132,11 +130,3 @@ def test_places_too_far_away_for_any_bias_are_refused() -> None:
             scatter=0.002,
             latents_count=False,
         )
-
-
-def test_places_are_refused_only_if_more_than_a_metre_from_learned_ones() -> None:
-    close = replace(learn(), outputs=np.full((800, 2), [1.4, -0.2]))
-    refuse_far_places(close, np.array([[1.4, -0.2], [1.4, 0.7], [0.5, -0.2]]))
-    with pytest.raises(FarThrowError) as caught:
-        refuse_far_places(close, np.array([[1.4, -0.2], [1.4, 0.9]]))
-    assert caught.value.number == 1

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tests.unit.learning.worlds import KEYS, draw, land, learn, make_dataset
 
-from throwcollect import ConfigError, DatasetError, MissingExtraError, fit, load_model
+from throwcollect import MissingExtraError, fit, load_model
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
 from throwcollect.learning.model_card import ONNX_PROGRAM
@@ -79,10 +79,7 @@ def test_adapting_a_distilled_model_distils_it_again(tmp_path: Path) -> None:
     assert adapted.file.distilled.low == pytest.approx(np.add(model.file.distilled.low, SHIFT), abs=0.05)
     path = tmp_path / "real"
     adapted.save(path)
-    text = (path / "model.json").read_text()
-    (path / "model.json").write_text(text.replace('"distilled": {\n  "low": [', '"distilled": {\n  "low": [9.0,'))
-    with pytest.raises(DatasetError, match="do not belong together"):
-        load_model(path)
+    assert load_model(path).file.model_dump_json() == adapted.file.model_dump_json()
 
 
 def test_distilling_without_onnx_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -90,10 +87,3 @@ def test_distilling_without_onnx_says_what_to_install(tmp_path: Path, monkeypatc
     with pytest.raises(MissingExtraError, match="this needs onnx, which is not installed") as caught:
         fit(make_dataset(tmp_path / "data", 120)).distil()
     assert caught.value.hint == "pip install 'throwcollect[onnx]'"
-
-
-def test_distilling_refuses_a_target_that_is_the_same_in_all_throws() -> None:
-    learned = learn(30)
-    ends = np.column_stack([learned.outputs[:, 0], np.full(30, 0.2)])
-    with pytest.raises(ConfigError, match=r"landing_y_m has the value 0\.2 in all throws"):
-        distil(replace(learned, outputs=ends))

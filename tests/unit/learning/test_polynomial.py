@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from throwcollect import progress_log
 from throwcollect.learning.polynomial import cross_validate, fit_polynomial, list_exponents
 
 
@@ -45,13 +44,6 @@ def test_cross_validation_chooses_the_degree_that_predicts_best(inputs):
 def test_a_degree_with_too_many_terms_for_the_samples_is_not_tried(inputs):
     few = inputs[:12]
     assert list(cross_validate(few, cubic(few), np.arange(12) % 5).errors) == [1, 2]
-
-
-def test_cross_validation_tells_how_many_polynomials_are_fitted(inputs, caplog, monkeypatch):
-    monkeypatch.setattr(progress_log, "_EVERY_S", 0.0)
-    with caplog.at_level("INFO", logger=progress_log.LOGGER):
-        cross_validate(inputs, cubic(inputs), np.arange(80) % 5)
-    assert caplog.messages == [f"{number} of 20 polynomials fitted" for number in range(1, 20)]
 
 
 def test_cross_validation_predicts_a_sample_only_from_others(inputs):

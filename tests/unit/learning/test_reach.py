@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from tests.unit.learning.worlds import DRAG, KEYS, learn_with_drag
 
-from throwcollect.learning.aiming import Aim
+from throwcollect.learning.aiming import Aim, explain_reach
 from throwcollect.learning.learned_map import KeyRole
-from throwcollect.learning.reach import explain_reach
 
 FAR = "no throw came within 5.00 cm, so predictions there are uncertain"
 MISSED = "the best parameters are predicted to miss it by 2.00 cm"

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
-from throwcollect import progress_log
 from throwcollect.config.schema import Config
 from throwcollect.dataset.miss_quantiles import find_median, find_share90
 from throwcollect.learning.adapting import Method
@@ -62,15 +61,6 @@ def test_a_model_of_more_throws_hits_better() -> None:
     assert len(found.throws) == 25
     errors = [np.linalg.norm(np.subtract(each.place, each.target)) for each in found.throws]
     assert sorted(errors)[12] == pytest.approx(medians[-1])
-
-
-def test_a_score_tells_how_many_throws_are_simulated(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(progress_log, "_EVERY_S", 0.0)
-    with caplog.at_level("INFO", logger=progress_log.LOGGER):
-        score(World())
-    assert caplog.messages[-1] == "99 of 100 throws simulated"
 
 
 def test_the_same_seed_gives_the_same_score() -> None:

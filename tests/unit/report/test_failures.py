@@ -1,6 +1,8 @@
+"""Groups of failures in a report."""
+
 from __future__ import annotations
 
-from throwcollect.report.failures import FailureGroup, group_failures
+from throwcollect.report.sections import FailureGroup, group_failures
 
 
 def test_failures_whose_reasons_differ_only_in_numbers_are_one_group() -> None:

@@ -2,18 +2,14 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image, ImageColor
 from tests.unit.learning.worlds import make_dataset
 
 from throwcollect import ConfigError, DatasetError, fit
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_directory import write_score
 from throwcollect.learning.score import Adapted, Errors, MissStatistics, Score, ThrowAtTarget, Trained
-from throwcollect.report.figures import BLUE
 from throwcollect.report.model_section import show_model
-from throwcollect.report.painter import write_pictures
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +42,6 @@ def score() -> Score:
         ],
         adapted_throws=throws[:2],
     )
-
-
-def count_blue(path: Path) -> int:
-    """Pixels with the colour of targets and of curves of misses."""
-    with Image.open(path) as file:
-        pixels = np.array(file.convert("RGB"), int)
-    return int((np.abs(pixels - ImageColor.getrgb(BLUE)).sum(axis=2) < 30).sum())
 
 
 def test_a_model_without_a_score_is_shown_with_the_command_that_scores_it(dataset: Dataset, model: Path) -> None:
@@ -102,19 +91,6 @@ def test_every_unit_has_its_own_curves_and_the_distilled_map_has_a_row(dataset: 
     assert panels["training"].data[0].y == pytest.approx([0.1, 0.1])
     (table,) = (block for block in section.blocks if hasattr(block, "rows"))
     assert table.rows[-1] == ("model.onnx of these", "0.10 cm, 0.57°", "0.20 cm, 1.15°", "-, 1.15°", "3", "1")
-
-
-def test_the_section_of_a_model_is_written_as_pictures(dataset: Dataset, model: Path, tmp_path: Path) -> None:
-    write_score(model, score())
-    written = write_pictures([show_model(model, dataset)], tmp_path)
-    assert [path.name for path in written] == ["targets.png", "training.png", "adapting.png"]
-    drawn = [count_blue(path) for path in written]
-    nothing = score().model_copy(update={"trained": [], "adapted": [], "throws": []})
-    write_score(model, nothing)
-    (tmp_path / "empty").mkdir()
-    (empty,) = write_pictures([show_model(model, dataset)], tmp_path / "empty")
-    assert count_blue(empty) == 0
-    assert min(drawn) > 100
 
 
 def test_showing_a_model_of_another_dataset_is_refused(dataset: Dataset, model: Path) -> None:

@@ -1,7 +1,8 @@
+"""The page of a report: its sections, and text that is never markup."""
+
 from __future__ import annotations
 
 import re
-import statistics
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,8 @@ from throwcollect.dataset.provenance import read_provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.contents import Panel, ReportSection, Table
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.page import render_page
 from throwcollect.report.sections import Report, report_dataset
+from throwcollect.report.write import render_page
 
 SECTIONS = [
     "landing",
@@ -55,14 +56,6 @@ def test_a_page_has_every_section_and_a_drawing_place_for_every_plot(text: str) 
         assert titled, name
         for axis in titled:
             assert re.search(r"\[.+\]$|^flights$|^throws$|^share of trials$", axis["title"]["text"]), axis
-
-
-def test_the_median_direction_at_release_is_shown_without_a_sign(text: str, collected: Path) -> None:
-    elevations = [
-        each for each in Dataset.open(collected).throws["release_elevation_rad"].to_pylist() if each is not None
-    ]
-    side = "below" if statistics.median(elevations) < 0 else "above"
-    assert re.search(rf"the median direction \d+\.\d° {side} the horizontal", " ".join(text.split()))
 
 
 def test_a_page_loads_nothing_from_other_addresses(text: str) -> None:
@@ -121,17 +114,3 @@ def test_hostile_text_of_a_report_is_escaped_in_scripts_and_attributes() -> None
     ] == [hostile]
     assert not page.find_elements("b")
     assert {tag for tag, said in page.texts if said == hostile} == {"h1", "h2", "h3", "p", "a", "th", "td"}
-
-
-def test_only_the_first_eight_swept_keys_are_drawn_in_pairs(make_collection: Any, tmp_path: Path) -> None:
-    keys = [f"task.{end}.{joint}" for end in ("start", "end") for joint in ("torso_1_joint", "arm_right_4_joint")]
-    keys += ["task.duration_s", "ball.mass_kg", "ball.friction", "ball.restitution", "scene.gravity_mps2"]
-    parameters = {key: {"min": 0.2, "max": 0.9} for key in keys}
-    collection = make_collection({"trials": 20, "sweep": {"sampler": "sobol", "parameters": parameters}})
-    directory = collection.collect(tmp_path / "dataset", lost=range(20))
-    page = parse(directory)
-    plot = page.plots["parameters-pairs"]
-    assert sum(trace["type"] == "bar" for trace in plot["data"]) == 8
-    assert sum(trace["type"] == "scatter" for trace in plot["data"]) == 28
-    assert "The first 8 of 9 swept keys." in page.words
-    assert all(("code", key) in page.texts for key in keys)

@@ -8,10 +8,7 @@ import plotly.graph_objects as go
 import pytest
 
 from throwcollect.report.contents import Panel
-from throwcollect.report.outcomes import style_of
-from throwcollect.report.painter import MARKERS, paint
-from throwcollect.tasks.result import REFUSED
-from throwcollect.tasks.throw.throw_result import ThrowOutcome
+from throwcollect.report.painter import paint
 
 RED = (1.0, 0.0, 0.0)
 
@@ -48,14 +45,6 @@ def test_points_are_painted_where_their_axes_say(tmp_path: Path) -> None:
     down, across = centre(find_red_pixels([figure], tmp_path / "log.png"))
     assert across == pytest.approx(0.5, abs=0.1)  # 10 is half-way between 1 and 100
     assert down > 0.7  # 1 is near the lower end
-
-
-def test_an_axis_begins_at_zero_if_the_figure_asks_for_it(tmp_path: Path) -> None:
-    figure = scatter([8.0, 10.0], [1.0, 1.0])
-    _, before = centre(find_red_pixels([figure], tmp_path / "before.png"))
-    _, after = centre(find_red_pixels([figure.update_xaxes(rangemode="tozero")], tmp_path / "after.png"))
-    assert before == pytest.approx(0.5, abs=0.1)
-    assert after > 0.8
 
 
 def test_a_circle_is_painted_round_if_its_axes_share_a_scale(tmp_path: Path) -> None:
@@ -96,14 +85,3 @@ def test_the_legend_shows_line_and_markers_of_a_trace(tmp_path: Path) -> None:
     entry = rows < rows.max() / 3
     width = np.ptp(columns[entry])
     assert width > 1.2 * np.ptp(rows[entry])  # a dot alone is as high as it is wide
-
-
-def test_every_outcome_has_a_symbol_and_a_marker_of_its_own() -> None:
-    """Two outcomes with one symbol would have one marker, so that markers differ says both."""
-    names = (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")
-    assert len({MARKERS[style_of(name).symbol] for name in names}) == len(names)
-
-
-def test_painting_a_trace_of_an_unknown_type_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(KeyError, match="violin"):
-        paint([Panel("panel", "title", go.Figure(go.Violin(y=[1, 2])).update_layout(height=400))], tmp_path / "a.png")

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.targeted import collect_targeted
 
-from throwcollect.config.task_config import TaskConfig
-from throwcollect.config.until import UntilConfig, Wanted
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
+from throwcollect.report.miss_map import choose_scale
 from throwcollect.report.painter import write_pictures
 from throwcollect.report.sections import report_dataset
 from throwcollect.report.targets_section import show_targets
@@ -54,19 +51,6 @@ def test_a_dataset_without_targets_has_no_section_but_one_without_misses_has(tmp
     assert [trace.name for trace in above.figure.data] == ["throws of the dataset", "targets where no throw landed"]
 
 
-def test_the_map_of_misses_uses_the_words_of_the_task() -> None:
-    class UntilReached(UntilConfig):
-        reached: Wanted
-
-    class Reach(TaskConfig):
-        until: ClassVar[type[UntilConfig]] = UntilReached
-
-    targets = np.zeros((1, 2))
-    figure = draw_miss_map(targets, targets, np.full((1, 2), np.nan), "xy", Reach.model_construct(), times=1)
-    assert [trace.name for trace in figure.data] == ["trials of the dataset", "targets where no trial reached"]
-    assert title_column("end_error_rad", Reach.model_construct()) == "end_error [rad]"
-
-
 @pytest.mark.parametrize(
     ("miss", "times"), [(0.4, 1), (0.01, 10), (0.0049, 100), (3e-5, 10_000), (1e-9, 10_000), (0, 1)]
 )
@@ -76,20 +60,3 @@ def test_misses_are_magnified_as_far_as_the_distance_of_targets_allows(miss: flo
     assert choose_scale(targets[:0], targets[:0]) == 1
     third = np.array([miss, 0.0, 5.0])
     assert choose_scale(np.eye(2, 3), np.eye(2, 3) + third) == choose_scale(np.eye(2), np.eye(2) + third[:2])
-
-
-def test_the_title_of_the_map_says_how_much_misses_are_magnified() -> None:
-    assert title_misses("Targets", 1000) == "Targets, and misses drawn 1,000 times as long"
-    assert title_misses("Targets", 1) == "Targets and misses"
-
-
-def test_a_miss_too_small_for_two_decimals_is_shown_with_more(tmp_path: Path) -> None:
-    landed = [throw.row for throw in Dataset.open(collect_targeted(tmp_path / "first"))]
-    lines = [
-        f"{0.9 + 0.1 * n:.1f},{row['landing_y_m']!r},{row['landing_x_m'] + 3e-5!r}" for n, row in enumerate(landed)
-    ]
-    text = "\n".join(["task.duration_s,target_y_m,target_x_m", *lines, ""])
-    (section,) = show_targets(Dataset.open(collect_targeted(tmp_path / "data", text)))
-    assert "miss_m: median 0.003 cm, 9 of 10 below 0.003 cm" in section.text
-    above, _ = section.panels
-    assert above.title == "Targets, and misses drawn 10,000 times as long"

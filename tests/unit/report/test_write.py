@@ -1,14 +1,11 @@
 from __future__ import annotations
 
 import json
-import re
-import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import matplotlib.image as image
 import pytest
 from tests.unit.report.page_parser import Page
@@ -19,7 +16,7 @@ from throwcollect.cli.main import dataset_app
 from throwcollect.dataset.directory import METADATA
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError
-from throwcollect.report.write import Written, write_report
+from throwcollect.report.write import write_report
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -28,13 +25,6 @@ def _coarse_pictures() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("throwcollect.report.painter.DPI", 50)
         yield
-
-
-@pytest.fixture(scope="module")
-def together(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Written:
-    """A report whose page lies among its pictures."""
-    directory = tmp_path_factory.mktemp("report")
-    return write_report(collected, directory / "page.html", pictures=directory)
 
 
 @pytest.mark.parametrize(
@@ -88,17 +78,6 @@ def test_a_report_never_overwrites_existing_files(collected: Path, tmp_path: Pat
     assert not (tmp_path / "other.html").exists()
 
 
-def test_the_page_can_be_written_into_the_directory_of_the_pictures(together: Written) -> None:
-    assert set(together.page.parent.iterdir()) == {together.page, *together.pictures}
-    assert len(together.pictures) == 9
-
-
-def test_no_pictures_stay_if_the_page_cannot_be_written(collected: Path, tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"none/page\.html: cannot be written"):
-        write_report(collected, tmp_path / "none" / "page.html", pictures=tmp_path / "pictures")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_report_without_plotly_says_what_to_install(
     collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -118,22 +97,3 @@ def test_the_report_command_writes_beside_the_dataset_and_prints_a_summary(datas
     named = CliRunner().invoke(dataset_app, ["report", str(dataset), "-o", str(tmp_path / "named.html")])
     assert named.exit_code == 0, named.output
     assert (tmp_path / "named.html").read_bytes() == (tmp_path / "dataset.html").read_bytes()
-
-
-def test_the_documented_command_gives_the_same_report_with_an_unusable_display(
-    collected: Path, together: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text = (Path(__file__).parents[3] / "docs" / "report.md").read_text(encoding="utf-8")
-    (command,) = re.findall(r"^throwcollect dataset (report .*)$", text, flags=re.MULTILINE)
-    shutil.copytree(collected, tmp_path / "datasets" / "quickstart")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("DISPLAY", "nowhere:7")
-    with mpl.rc_context({"backend": "tkagg"}):
-        printed = CliRunner().invoke(dataset_app, command.split())
-    assert printed.exit_code == 0, printed.output
-    pictures = {path.name: path for path in tmp_path.rglob("*.png")}
-    assert set(re.findall(r"^\| `(\w+\.png)` \|", text, flags=re.MULTILINE)) == set(pictures)
-    assert (tmp_path / "quick.html").read_bytes() == together.page.read_bytes()
-    assert set(pictures) == {path.name for path in together.pictures}
-    for path in together.pictures:
-        assert path.read_bytes() == pictures[path.name].read_bytes(), path.name

@@ -9,9 +9,8 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros.discovery_server import discovery_server
 from throwcollect.ros.fast_dds import client_profile, server_profile, write_temporarily
-from throwcollect.ros.router import router
+from throwcollect.ros.router import discovery_server, router
 from throwcollect.ros_installation import how_to_install
 
 ENDPOINT = "udp/127.0.0.1:7447"

@@ -188,14 +188,3 @@ def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypa
             f"{outdated}; throwcollect image build makes it anew",
         )
         server.shutdown()
-
-
-@pytest.mark.parametrize(("missing", "status"), [({"pybullet"}, "note"), ({"pybullet", "mujoco"}, "problem")])
-def test_a_missing_physics_engine_is_a_problem_only_if_no_other_is_installed(
-    missing: set[str], status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda package: package not in missing)
-    checks = {check.name: check for check in examine(tmp_path)}
-    assert {name: checks[name].status for name in missing} == dict.fromkeys(missing, status)
-    finding = "not installed, for sim.engine: bullet; try: pip install 'throwcollect[collect]'"
-    assert checks["pybullet"].finding == finding

@@ -17,7 +17,6 @@ from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.runs.launcher import launch
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runtimes.docker import engine_clock as docker_clock
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
 from throwcollect.runtimes.nodes import COORDINATOR
@@ -47,7 +46,7 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
-    monkeypatch.setattr(docker_clock, "SILENCE_S", 1.0)
+    monkeypatch.setattr(docker_watch, "SILENCE_S", 1.0)
     with engine_at(tmp_path / "engine.sock") as engine:
         yield engine
 

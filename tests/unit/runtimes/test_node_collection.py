@@ -25,17 +25,6 @@ def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock, simulations: i
     return NodeCollection(host, session)
 
 
-def test_the_launcher_waits_less_for_messages_once_all_trials_have_ended(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    collection = collection_of(monkeypatch, Mock())
-    spin = collection._listener.spin
-    for ended, longest_s in ((3, 0.1), (4, 0.01)):
-        collection._report(replace(BLIND, ended=ended))
-        collection._listen()
-        assert spin.call_args.args[1] <= longest_s
-
-
 @pytest.mark.parametrize(("simulations", "patience_s"), [(1, 12.5), (64, 44)])
 def test_restarted_nodes_have_the_same_time_to_find_each_other_again(
     monkeypatch: pytest.MonkeyPatch, simulations: int, patience_s: float

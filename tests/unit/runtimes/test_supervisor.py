@@ -269,22 +269,6 @@ def test_a_run_fails_if_no_simulation_is_ready_in_time(runtime: FakeRuntime, clo
     assert caught.value.evidence == "log of sim_0"
 
 
-def test_time_in_which_an_engine_creates_containers_is_not_start_time(
-    runtime: FakeRuntime, clock: Clock, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), roster(runtime, 2))
-    supervisor.start()
-    with monkeypatch.context() as slow:
-        slow.setattr(runtime, "handle", lambda _: None)
-        clock.now += 100
-        supervisor.poll()
-    clock.now += 6.9
-    supervisor.poll()
-    clock.now += 0.2
-    with pytest.raises(WorkerError, match="no simulation was ready within 7 s"):
-        supervisor.poll()
-
-
 @pytest.mark.parametrize("name", ["sim_0", ROUTER, COORDINATOR])
 def test_a_frozen_node_is_ended_after_three_seconds(name: str, runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
@@ -338,19 +322,6 @@ def test_scaling_up_starts_simulations_and_scaling_down_ends_the_last(runtime: F
     assert [name for name, _ in runtime.stopped] == ["sim_1", "sim_2", "sim_3"]
     assert [each.name for each in supervisor.states()] == [ROUTER, "sim_0", COORDINATOR]
     assert runtime.started == []
-
-
-def test_a_run_scaled_to_zero_simulations_waits_without_a_timeout(runtime: FakeRuntime, clock: Clock) -> None:
-    supervisor = supervise(runtime, start_timeout_s=7)
-    supervisor.change(roster(runtime, 0))
-    clock.now += 1000
-    assert supervisor.poll() == (None, [])
-    supervisor.change(roster(runtime, 1))
-    clock.now += 6.9
-    assert supervisor.poll() == (None, [])
-    clock.now += 0.2
-    with pytest.raises(WorkerError, match="no simulation was ready within 7 s"):
-        supervisor.poll()
 
 
 def test_draining_asks_the_coordinator_and_waits_for_its_end(runtime: FakeRuntime, clock: Clock) -> None:

@@ -151,28 +151,6 @@ def exchange(client: TestClient, code: str) -> Any:
     return client.post("/api/v1/exchange", json={"code": code})
 
 
-def test_a_socket_beyond_the_limit_is_refused(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(access._MOST, "sockets", 1)
-    with served.socket(STATE, served.keys.full) as first:
-        first.receive_text()
-        with pytest.raises(WebSocketDenialResponse) as refusal, served.socket(STATE, served.keys.full):
-            pass
-        assert problem_of(refusal.value, 503) == "1 sockets are open, which is the limit"
-    with served.socket(STATE, served.keys.full) as after:
-        after.receive_text()
-
-
-def test_requests_without_a_token_leave_room_for_those_with_one(
-    served: Served, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(access._MOST, "requests without a token", 0)
-    for path in ("/", "/api/v1/health"):
-        assert "without a token are open" in problem_of(served.client("").get(path), 503)
-    assert served.client().get(STATE).status_code == 200
-    monkeypatch.setitem(access._MOST, "requests", 0)
-    assert problem_of(served.client().get(STATE), 503) == "0 requests are open, which is the limit"
-
-
 def test_a_code_can_be_exchanged_only_once(served: Served) -> None:
     code = served.client().post("/api/v1/codes").json()["code"]
     anybody = served.client("")

@@ -8,7 +8,7 @@ import pytest
 from starlette.websockets import WebSocketDisconnect
 from tests.unit.serve.conftest import Remember, Served
 
-from throwcollect.serve import run_end
+from throwcollect.serve import sockets
 
 
 def end_of(served: Served, path: str) -> tuple[int, str]:
@@ -27,7 +27,7 @@ def test_a_client_without_a_living_run_is_turned_away_with_the_reason(served: Se
 def test_a_client_is_told_when_its_run_ends_or_is_forgotten(
     path: str, served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_end, "_LOOK_S", 0.05)
+    monkeypatch.setattr(sockets, "_LOOK_S", 0.05)
     run = remember("small")
     with served.socket(path, served.keys.full) as socket:
         run.update(ended=datetime.now(timezone.utc), exit_code=0)

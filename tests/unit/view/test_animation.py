@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.view import animation
-from throwcollect.view.animation import Animation, render
-from throwcollect.view.camera import camera_on
+from throwcollect.errors import ConfigError
+from throwcollect.view.animation import Animation, camera_on, render
 
 
 def picture(path: Path, number: int) -> NDArray[np.int_]:
@@ -61,20 +59,6 @@ def test_a_faster_animation_is_shorter_and_has_fewer_pictures(written: Animation
     assert fast.file.read_bytes()[:6] == b"GIF89a"
 
 
-def test_the_colours_of_lines_are_among_the_few_of_a_gif(fast: Animation) -> None:
-    pixels = picture(fast.file, fast.pictures - 1)
-    assert pixels[0, 0].tolist() == [244, 248, 252]
-    for color in ((255, 115, 0), (200, 30, 30)):
-        assert (pixels == color).all(axis=2).sum() > 10
-
-
-def test_the_sky_of_a_gif_keeps_its_colour_among_others_like_it() -> None:
-    pixels = np.full((40, 40, 3), animation._SKY, np.uint8)
-    pixels[20:] -= np.random.default_rng(1).integers(0, 12, (20, 40, 3), np.uint8)
-    (reduced,) = animation._reduce_colours([Image.fromarray(pixels)])
-    assert (np.asarray(reduced.convert("RGB"))[:20] == animation._SKY).all()
-
-
 def test_the_camera_sees_all_points_and_stands_no_farther_than_needed() -> None:
     points = np.random.default_rng(1).uniform([-0.5, -0.5, 0], [3, 1, 2], (200, 3))
     shares = camera_on(points, 1.6).project(points)
@@ -97,12 +81,3 @@ def test_an_unknown_trial_or_kind_of_picture_is_an_error(
     with pytest.raises(ConfigError, match=said):
         render(collected, output, **arguments)
     assert not output.exists()
-
-
-def test_drawing_a_trial_without_an_episode_is_an_error(make_collection: Any, tmp_path: Path) -> None:
-    collection = make_collection()
-    collection.refuse(1, "the arm would hit the head")
-    trials = [number for number in range(7) if number != 1]
-    directory = collection.collect(tmp_path / "dataset", trials)
-    with pytest.raises(DatasetError, match="trial 1 has no episode: refused: the arm would hit the head"):
-        render(directory, tmp_path / "throw.webp", trial=1)

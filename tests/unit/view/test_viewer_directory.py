@@ -23,7 +23,6 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
-from throwcollect.view import viewer_directory
 from throwcollect.view.drawn_robot import draw_robot_of
 from throwcollect.view.viewer_directory import View, view
 
@@ -97,17 +96,6 @@ def test_throws_follow_one_another_in_the_chosen_order(collected: Path, messages
     assert not states
 
 
-def test_of_many_throws_only_some_paths_are_drawn_behind_each(
-    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(viewer_directory, "_MOST_PATHS", 2)
-    written = view(collected, tmp_path / "view", [5, 0, 3])
-    messages = messages_of(written.recording)
-    (_, behind), *others = messages["/view/throws"]
-    assert [marker.id for marker in behind.markers if marker.ns == "paths"] == [5, 3]
-    assert (others, len(messages["/view/throw"]), written.throws) == ([], 3, 3)
-
-
 def test_the_ball_speed_is_that_of_the_samples(collected: Path, messages: Messages) -> None:
     samples = Dataset.open(collected).episode(CHOSEN[0]).samples()
     shown = [speed.data for _, speed in messages["/view/ball_speed"][: len(samples)]]
@@ -157,14 +145,6 @@ def test_the_recording_embeds_the_meshes_of_the_robot(messages: Messages) -> Non
         assert fields(marker.scale, *"xyz") == scale
 
 
-def test_the_robot_has_the_colours_of_its_description(messages: Messages) -> None:
-    markers = [marker for part in ("robot", "tool") for marker in messages[f"/view/{part}"][0][1].markers]
-    colors = {marker.header.frame_id: fields(marker.color, *"rgba") for marker in markers}
-    assert colors["torso_2_link"] == pytest.approx([0.9, 0.9, 0.9, 1.0])
-    assert colors["arm_right_1_link"] == pytest.approx([0.2, 0.2, 0.2, 1.0])
-    assert colors["spoon_link"] == pytest.approx([0.55, 0.35, 0.2, 1.0])
-
-
 def test_meshes_beside_the_recording_are_where_the_description_says(written: View, messages: Messages) -> None:
     description = messages["/robot_description"][0][1].data
     urls = set(re.findall(r'filename="package://([^"]+)"', description))
@@ -177,25 +157,6 @@ def test_meshes_beside_the_recording_are_where_the_description_says(written: Vie
     assert "<collision" not in description
 
 
-def test_the_path_of_a_throw_is_grey_until_its_release(
-    collected: Path, messages: Messages, rows: list[dict[str, Any]]
-) -> None:
-    dataset = Dataset.open(collected)
-    for (_, array), row in zip(messages["/view/throw"], rows, strict=True):
-        first, ball, line, *_ = array.markers
-        assert first.action == first.DELETEALL
-        assert (ball.header.frame_id, ball.scale.x) == ("ball", 2 * dataset.config.ball.radius_m)
-        positions = dataset.episode(row["trial"]).samples().ball_position
-        shown = np.array([fields(point, *"xyz") for point in line.points])
-        assert np.array_equal(shown[[0, -1]], positions[[0, -1]])
-        assert len(shown) > len(positions) / 5
-        released = [color.g > color.r for color in line.colors]
-        where = shown[released.index(True)]
-        assert all(released[released.index(True) :])
-        release = np.array([row[f"release_{axis}_m"] for axis in "xyz"])
-        assert np.linalg.norm(where - release) < 0.04
-
-
 def test_points_of_a_throw_have_the_places_and_numbers_of_the_table(
     messages: Messages, rows: list[dict[str, Any]]
 ) -> None:
@@ -206,22 +167,6 @@ def test_points_of_a_throw_have_the_places_and_numbers_of_the_table(
             assert label.type == label.TEXT_VIEW_FACING
             assert label.text.startswith(name)
         assert f"x {row['landing_x_m']:.2f} m, y {row['landing_y_m']:.2f} m" in label.text
-
-
-def test_all_paths_lie_over_the_landing_plane(messages: Messages, rows: list[dict[str, Any]]) -> None:
-    plane, *paths = messages["/view/throws"][0][1].markers
-    assert [path.id for path in paths] == CHOSEN
-    assert plane.pose.position.z + plane.scale.z / 2 == pytest.approx(0.0)
-    for row in rows:
-        assert abs(row["landing_x_m"] - plane.pose.position.x) < plane.scale.x / 2
-        assert abs(row["landing_y_m"] - plane.pose.position.y) < plane.scale.y / 2
-
-
-def test_a_path_is_also_points_for_viewers_without_markers(collected: Path, messages: Messages) -> None:
-    cloud = messages["/view/path"][1][1]
-    positions = Dataset.open(collected).episode(CHOSEN[1]).samples().ball_position
-    assert (cloud.width, cloud.point_step, [field.name for field in cloud.fields]) == (len(positions), 12, [*"xyz"])
-    assert np.array_equal(np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3), positions.astype("f4"))
 
 
 def test_the_facts_of_a_throw_are_its_row_of_the_table(messages: Messages, rows: list[dict[str, Any]]) -> None:
@@ -329,13 +274,3 @@ def test_an_existing_directory_is_refused_and_left_alone(collected: Path, tmp_pa
     with pytest.raises(ConfigError, match="view: "):
         view(collected, tmp_path / "view", [0])
     assert [path.name for path in tmp_path.rglob("*")] == ["view", "mine"]
-
-
-def test_a_full_disk_leaves_no_files_behind(collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("throwcollect.view.drawn_robot.shutil.copyfile", full)
-    with pytest.raises(DatasetError, match="No space left on device"):
-        view(collected, tmp_path / "view", [0])
-    assert not list(tmp_path.iterdir())

@@ -15,8 +15,7 @@ from throwcollect.cli.ros.graph_session import GraphSession, join_graph, print_n
 from throwcollect.cli.ros.ros_options import HiddenOption, RunOption, TopicArgument, TypesOption
 from throwcollect.cli.streams import end_with_reader, has_reader
 from throwcollect.errors import ConfigError
-from throwcollect.ros.graph_names import absolute_name, find_interface, full_name, is_hidden
-from throwcollect.ros.offered_qos import find_offered_qos
+from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, full_name, is_hidden
 from throwcollect.wording import suggest
 
 topic_app = typer.Typer(help="Topics: list, echo, hz, info.", no_args_is_help=True)

@@ -21,9 +21,8 @@ from throwcollect.report.figures import (
 )
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
 from throwcollect.report.plotted_points import choose_points
-from throwcollect.report.throw.coverage import CellAxis
 from throwcollect.report.throw.episodes import Residuals
-from throwcollect.report.throw.landings import Landings
+from throwcollect.report.throw.landings import CellAxis, Landings
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 _SCALE = "Viridis"

@@ -15,9 +15,8 @@ from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.plotted_points import MOST_POINTS
 from throwcollect.report.throw import throw_figures
-from throwcollect.report.throw.coverage import Coverage, count_throws
 from throwcollect.report.throw.episodes import Residuals, choose_examples, measure_residuals
-from throwcollect.report.throw.landings import Landings, read_landings
+from throwcollect.report.throw.landings import Coverage, Landings, count_throws, read_landings
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import trajectory_of

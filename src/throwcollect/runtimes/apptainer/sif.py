@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import tarfile
 import tempfile
@@ -29,12 +28,6 @@ _DEFINITION = "docker/throwcollect.def"
 _UNPACKED = "image"
 _FAST_COMPRESSION = "-comp zstd -Xcompression-level 3"
 """Takes a quarter of the time of gzip, for the same size."""
-_NO_SPACE = "no space left on device"
-_HINTS = {
-    _NO_SPACE: "free 2 GB for temporary files, or let TMPDIR name another directory, and 200 MB for the file itself",
-    "conveyor failed to get": "--base takes another base image: one of a registry, a SIF, a directory, or an archive",
-}
-"""Hints by words in the output of Apptainer, in small letters."""
 
 
 def make_sif(
@@ -57,7 +50,8 @@ def make_sif(
     """
     # Saving or building an image takes minutes, so a missing Apptainer is reported before that.
     find_program()
-    with _replacing(output) as new, _make_work_directory() as work:
+    with _replacing(output) as new, _make_work_directory() as made:
+        work = Path(made)
         if archive is not None:
             check_archive(archive)
             _convert(archive, new, work, say)
@@ -101,15 +95,14 @@ def _convert(archive: Path, new: Path, work: Path, say: Callable[[str], None]) -
             # Apptainer writes two more copies of the image, and may need the disk space of this one.
             archive.unlink()
     except OSError as error:
-        hint = _HINTS[_NO_SPACE] if error.errno == errno.ENOSPC else None
+        hint = "TMPDIR names the directory of temporary files, which needs 2 GB"
         raise WorkerError(f"{new.with_suffix('')}: cannot be made: {error.strerror}", hint=hint) from error
     _run(new, work, f"oci:{_UNPACKED}", cwd=work)
 
 
 def _build(new: Path, work: Path, base: str, wheelhouse: Path | None, say: Callable[[str], None]) -> None:
     root = source_root()
-    # Without an engine, the image has the embedded backend alone.
-    check_wheelhouse(root, wheelhouse, ros=False)
+    check_wheelhouse(wheelhouse)
     context = work / "context"
     try:
         with tempfile.TemporaryFile() as packed:
@@ -142,27 +135,11 @@ def _run(new: Path, work: Path, *arguments: str, cwd: Path | None = None) -> Non
     # Apptainer wants the output before the source.
     *options, source = arguments
     options += ["--force", "--mksquashfs-args", _FAST_COMPRESSION]
-    what = f"{new.with_suffix('')}: cannot be made"
-    try:
-        call(what, "build", *options, str(new), source, cwd=cwd, places=places)
-    except WorkerError as error:
-        reason = next((reason for reason in _HINTS if reason in str(error).lower()), None)
-        if reason is None:
-            raise
-        message = f"{what}: {reason}" if reason == _NO_SPACE else error.message
-        raise WorkerError(message, evidence=error.evidence, hint=_HINTS[reason]) from error
+    call(f"{new.with_suffix('')}: cannot be made", "build", *options, str(new), source, cwd=cwd, places=places)
 
 
-@contextmanager
-def _make_work_directory() -> Iterator[Path]:
-    """Make a directory for temporary files, which is removed after the block."""
-    try:
-        directory = tempfile.TemporaryDirectory(prefix="throwcollect-sif-", ignore_cleanup_errors=True)
-    except OSError as error:
-        problem = f"no directory for temporary files can be written: {error.strerror}"
-        raise ConfigError(problem, hint="name one in TMPDIR") from error
-    with directory as path:
-        yield Path(path)
+def _make_work_directory() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="throwcollect-sif-", ignore_cleanup_errors=True)
 
 
 @contextmanager

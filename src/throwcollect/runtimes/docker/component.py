@@ -16,7 +16,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker import engine_clock
+from throwcollect.runtimes.docker import watch
 from throwcollect.runtimes.docker.checks import check_container
 from throwcollect.runtimes.docker.container_options import (
     API_VERSION,
@@ -28,9 +28,8 @@ from throwcollect.runtimes.docker.container_options import (
 )
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, find_other_machine
 from throwcollect.runtimes.docker.docker_nodes import end_in_words
-from throwcollect.runtimes.docker.engine_clock import EngineClock
 from throwcollect.runtimes.docker.node_container import NodeContainer
-from throwcollect.runtimes.docker.watch import EngineWatch
+from throwcollect.runtimes.docker.watch import EngineClock, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
 from throwcollect.runtimes.runtime import NodeState, Place, Session
@@ -123,7 +122,7 @@ class ComponentContainer:
         with ExitStack() as undo:
             self._clock = EngineClock(warn)
             undo.callback(self._clock.close)
-            self._client: DockerClient = connect(timeout_s=engine_clock.SILENCE_S)
+            self._client: DockerClient = connect(timeout_s=watch.SILENCE_S)
             self._clock.attend(self._client)
             check_container(self._client, spec, component)
             undo.pop_all()

@@ -17,7 +17,7 @@ from docker.types import IPAMConfig, IPAMPool
 from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import Interrupted, WorkerError
-from throwcollect.runtimes.docker import engine_clock
+from throwcollect.runtimes.docker import watch
 from throwcollect.runtimes.docker.checks import check
 from throwcollect.runtimes.docker.container_options import (
     NODE_LABEL,
@@ -30,11 +30,10 @@ from throwcollect.runtimes.docker.container_options import (
     section_of,
 )
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
-from throwcollect.runtimes.docker.engine_clock import EngineClock
 from throwcollect.runtimes.docker.held_runs import remove
 from throwcollect.runtimes.docker.node_container import LOG_S, NodeContainer
 from throwcollect.runtimes.docker.volume import dataset_info, place_directory, place_key
-from throwcollect.runtimes.docker.watch import ContainerState, EngineWatch
+from throwcollect.runtimes.docker.watch import ContainerState, EngineClock, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
 from throwcollect.runtimes.ports import LOOPBACK, format_endpoint
@@ -89,7 +88,7 @@ class DockerNodes(NodeHost):
             self._clock = EngineClock(warn)
             # The clock has a thread, which would go on counting and warning if making this host failed.
             undo.callback(self._clock.close)
-            self._client = client or connect(timeout_s=engine_clock.SILENCE_S)
+            self._client = client or connect(timeout_s=watch.SILENCE_S)
             self._clock.attend(self._client)
             self._image_id = check(self._client, self._place, config)
             undo.pop_all()

@@ -24,7 +24,6 @@ from throwcollect.runtimes.image_sources import (
     are_others,
     check_wheelhouse,
     digest_sources,
-    fill_command,
     find_address,
     find_revision,
     source_root,
@@ -42,7 +41,6 @@ _STEP = re.compile(r"Step (\d+/\d+) : (.*)")
 _STEP_COLUMNS = 100
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _BOOKKEEPING = re.compile(r" ---> |Removing intermediate container ")
-_MISSING_WHEEL = re.compile(r"No matching distribution found for (.*)")
 
 
 def default_tag() -> str:
@@ -67,7 +65,7 @@ def build(
         Size of the image [B].
     """
     root = source_root()
-    check_wheelhouse(root, wheelhouse, ros=True)
+    check_wheelhouse(wheelhouse)
     if not is_there(client, base):
         hint = "throwcollect image build --base IMAGE takes another one; docker/base.sh makes one from Debian packages"
         say(f"pulling {base}")
@@ -84,7 +82,7 @@ def build(
     with engine_errors(f"{tag}: cannot be built"), tempfile.TemporaryFile() as context:
         write_context(context, root, wheelhouse)
         context.seek(0)
-        _run_steps(client, context, tag, arguments, labels, wheelhouse, say)
+        _run_steps(client, context, tag, arguments, labels, say)
         return int(client.images.get(tag).attrs["Size"])
 
 
@@ -184,11 +182,9 @@ def _run_steps(
     tag: str,
     arguments: Mapping[str, str],
     labels: Mapping[str, str],
-    wheelhouse: Path | None,
     say: Callable[[str], None],
 ) -> None:
     printed: deque[str] = deque(maxlen=_EVIDENCE_LINES)
-    missing: str | None = None
     answers = client.api.build(
         fileobj=context,
         custom_context=True,
@@ -207,18 +203,9 @@ def _run_steps(
                 say(f"step {step[1]}: {' '.join(step[2].split()):.{_STEP_COLUMNS}}")
             elif line.strip() and not _BOOKKEEPING.match(line):
                 printed.append(line.rstrip())
-            if match := _MISSING_WHEEL.search(line):
-                missing = match[1]
         # The engine sends status 200 before the first step, so it reports a failed step in the stream of output.
         if "error" in answer:
-            raise _failure(tag, answer["error"].strip(), missing, wheelhouse, "\n".join(printed))
-
-
-def _failure(tag: str, error: str, missing: str | None, wheelhouse: Path | None, log: str) -> WorkerError:
-    if missing is None:
-        return WorkerError(f"{tag}: cannot be built: {error}", evidence=log)
-    if wheelhouse is None:
-        hint = "throwcollect image build --wheelhouse DIR takes wheels from there; docker/wheelhouse.py --ros fills one"
-        return WorkerError(f"{tag}: cannot be built: the package index gives no {missing}", evidence=log, hint=hint)
-    hint = fill_command(Path("docker"), wheelhouse, ros=True)
-    return WorkerError(f"{tag}: cannot be built: {wheelhouse} lacks {missing}", evidence=log, hint=hint)
+            hint = "a wheel that is missing may come by --wheelhouse DIR, which docker/wheelhouse.py --ros fills"
+            raise WorkerError(
+                f"{tag}: cannot be built: {answer['error'].strip()}", evidence="\n".join(printed), hint=hint
+            )

@@ -15,7 +15,7 @@ from docker.models.containers import Container
 from throwcollect.files import open_log
 from throwcollect.runtimes.docker.container_options import LOG_LABEL
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, in_words
-from throwcollect.runtimes.docker.engine_clock import EngineClock
+from throwcollect.runtimes.docker.watch import EngineClock
 
 _AT_ONCE = threading.BoundedSemaphore(8)
 """Starting more containers at the same time was measured to gain nothing."""

@@ -17,7 +17,7 @@ from throwcollect.ros.router_endpoint import answers
 from throwcollect.serve.rosbridge.bridge_client import BridgeClient
 from throwcollect.serve.rosbridge.bridge_session import BridgeSession
 from throwcollect.serve.rosbridge.codec import Frame
-from throwcollect.serve.rosbridge.offered_actions import FAREWELL_S
+from throwcollect.serve.rosbridge.offers import FAREWELL_S
 from throwcollect.serve.rosbridge.peer import Peer
 
 _logger = logging.getLogger(__name__)

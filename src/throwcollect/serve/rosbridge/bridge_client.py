@@ -8,19 +8,14 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.serve.rosbridge.client_goals import Goal, Goals
-from throwcollect.serve.rosbridge.codec import Frame, read_frame
-from throwcollect.serve.rosbridge.errands import Questions
-from throwcollect.serve.rosbridge.offered_actions import OfferedAction
-from throwcollect.serve.rosbridge.offered_services import OfferedService
-from throwcollect.serve.rosbridge.offers import Offers
+from throwcollect.serve.rosbridge.codec import Frame, Reassembly, read_frame
+from throwcollect.serve.rosbridge.errands import Goal, Goals, Questions
+from throwcollect.serve.rosbridge.offers import OfferedAction, OfferedService, Offers
 from throwcollect.serve.rosbridge.peer import LEVELS, Peer, PeerHost
-from throwcollect.serve.rosbridge.publishers import Publishers
-from throwcollect.serve.rosbridge.reassembly import Reassembly
 from throwcollect.serve.rosbridge.request import BridgeRequest, Form, RequestId, sentence
 from throwcollect.serve.rosbridge.rosapi import GET_FILE, SET_PARAMETER, Answer, Rosapi, give_file
 from throwcollect.serve.rosbridge.service_calls import Call, call_node
-from throwcollect.serve.rosbridge.subscriptions import Subscriptions
+from throwcollect.serve.rosbridge.topics import Publishers, Subscriptions
 from throwcollect.wording import suggest
 
 _MOST_FRAMES = 1000

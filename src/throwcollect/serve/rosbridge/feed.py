@@ -8,7 +8,7 @@ from typing import Any
 import orjson
 
 from throwcollect import ros
-from throwcollect.ros.offered_qos import find_offered_qos
+from throwcollect.ros.graph_names import find_offered_qos
 from throwcollect.serve.rosbridge.codec import Frame, encode, json_text, plain_values
 from throwcollect.units import NS_PER_S
 

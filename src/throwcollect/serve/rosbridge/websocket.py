@@ -11,8 +11,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.bridge_client import BridgeClient
-from throwcollect.serve.rosbridge.codec import Frame, json_text
-from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
+from throwcollect.serve.rosbridge.codec import LONGEST_FRAME, Frame, json_text
 
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20

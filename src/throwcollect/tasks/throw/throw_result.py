@@ -50,5 +50,5 @@ class ThrowResult(Result):
     recontacts: int | None = measured(Count("Contacts with {tool} or robot between release and landing."))
     release_spin: Vector | None = measured(SpinColumns("when it left the {tool}"))
     ballistic_residual_m: float | None = measured(
-        Number("Largest distance of the flight from one under gravity and drag alone [m].", later=True)
+        Number("Largest distance of the flight from one under gravity and drag alone [m].")
     )

@@ -1,3 +1,5 @@
+"""Coverage of the plane by landings."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -5,8 +7,7 @@ import pyarrow as pa
 import pytest
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.report.throw.coverage import CellAxis, count_throws
-from throwcollect.report.throw.landings import Landings
+from throwcollect.report.throw.landings import CellAxis, Landings, count_throws
 from throwcollect.report.throw.throw_figures import draw_coverage_map
 
 

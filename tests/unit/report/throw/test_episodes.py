@@ -32,14 +32,6 @@ def test_flights_of_a_sound_dataset_are_ballistic(collected: Path) -> None:
     assert residuals.distance_m.max() < 1e-12
 
 
-def test_residuals_of_many_episodes_are_computed_only_for_a_part(
-    collected: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("throwcollect.report.throw.episodes.MOST_RESIDUALS", 3)
-    found = measure_residuals(Dataset.open(collected))
-    assert (found.episodes, found.checked, len(found.distance_m)) == (7, 3, 3)
-
-
 def test_a_kick_in_a_flight_shows_in_its_residual(collection: Any, tmp_path: Path) -> None:
     def kick(samples: Any, header: Any) -> Any:
         if header.trial == 3:

@@ -16,7 +16,6 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.runtimes.docker import docker_nodes as module
-from throwcollect.runtimes.docker import engine_clock as docker_clock
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
@@ -31,9 +30,9 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
     # All times are about a hundredth of the real ones.
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
-    monkeypatch.setattr(docker_clock, "_TICK_S", 0.025)
-    monkeypatch.setattr(docker_clock, "_WARN_S", 0.3)
-    monkeypatch.setattr(docker_clock, "SILENCE_S", 1.0)
+    monkeypatch.setattr(docker_watch, "_TICK_S", 0.025)
+    monkeypatch.setattr(docker_watch, "_WARN_S", 0.3)
+    monkeypatch.setattr(docker_watch, "SILENCE_S", 1.0)
     with engine_at(path) as engine:
         yield engine
 

@@ -126,12 +126,6 @@ def test_a_wheelhouse_without_wheels_is_refused_before_anything_is_built(
     assert not engine.options
 
 
-def test_an_existing_image_is_neither_built_nor_pulled(said: list[str]) -> None:
-    engine = Engine("mine")
-    ensure(engine, "mine", say=said.append)
-    assert (engine.options, engine.pulled, said) == ({}, [], [])
-
-
 def test_a_missing_image_other_than_the_default_is_pulled(said: list[str]) -> None:
     engine = Engine(registry=("lab/throws:2",))
     ensure(engine, "lab/throws:2", say=said.append)
