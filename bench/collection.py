@@ -24,7 +24,8 @@ from throwcollect.runtimes.nodes import NodeHost
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.runtimes.runtime import Place
 from throwcollect.runtimes.supervisor import Supervisor
-from throwcollect.sweep.plan import Plan, draw_first_points, make_trials
+from throwcollect.sweep.plan import Plan, make_trials
+from throwcollect.sweep.samplers import draw_points
 
 ROLES = ("sim", "router", "coordinator")
 _POLL_S = 0.1
@@ -66,7 +67,7 @@ def draw_unchecked_plan(config: Config) -> Plan:
     None is simulated again at the end, either: that takes a second of processor time a run, and nothing a throw.
     """
     config = with_values(config, {"run.replay": 0})
-    return Plan(config, make_trials(config, draw_first_points(config, directory=Path())))
+    return Plan(config, make_trials(config, draw_points(config, directory=Path())))
 
 
 def _until(supervisor: Supervisor, listener: RunListener, reports: list[Progress], ended: int) -> float:

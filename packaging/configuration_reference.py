@@ -51,7 +51,7 @@ _SAMPLERS = """\
 The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
 Each of a set of `values` is drawn equally often. All draws follow from `seed`.
 
-With `sweep.target` or `until`, trials are added to the plan while it is collected: [targets.md](targets.md).
+With `until`, a dataset ends with the trial at which enough have succeeded: [targets.md](targets.md).
 """
 
 _TARGETS = """\

@@ -197,24 +197,6 @@ FLOWS = {
         connection > zenoh: either
         connection > dds: or""",
     ),
-    "rounds": Flow(
-        {
-            "results": Box(0, 0, "results", "in order of trials"),
-            "rounds": Box(1.1, 0, "rounds", "another one? which points?"),
-            "checked": Box(2.2, 0, "feasibility", "refuses what cannot be"),
-            "file": Box(3.3, 0, "plan.rounds.part", "beside the plan", file=True),
-            "leases": Box(3.3, 1, "leases"),
-            "sims": Box(1.65, 1, "simulations"),
-            "episodes": Box(0, 1, "episodes", "judged"),
-        },
-        """results > rounds
-        rounds > checked
-        checked > file
-        file > leases
-        leases > sims
-        sims > episodes
-        episodes > results""",
-    ),
     "recovery": Flow(
         {
             "episode": Box(0, 0, "episode", "arrives whole, or not"),

@@ -297,7 +297,7 @@ def test_a_slice_is_collected_on_a_disk_of_the_node_and_handed_over(
         collect_slice(frozen, Slice(0, 3), overrides=[*INPROCESS, "cluster.scratch=$MISSING"])
 
 
-def test_a_plan_that_grows_is_refused(config: Path, tmp_path: Path) -> None:
+def test_a_dataset_whose_end_depends_on_results_is_refused(config: Path, tmp_path: Path) -> None:
     prepare(load(config, ["until.landed=3", "trials=200"]), tmp_path / "data", sweep_directory=tmp_path)
-    with pytest.raises(ConfigError, match=r"until: a plan that grows"):
+    with pytest.raises(ConfigError, match=r"until: a dataset whose end"):
         collect_slice(tmp_path / "data", Slice(0, 2))

@@ -13,7 +13,6 @@ from throwcollect.cli.streams import keep_output, only_log, write_utf_8
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import LossError, NotFoundError
 from throwcollect.files import write_all
-from throwcollect.wording import format_count
 
 
 def router(
@@ -72,12 +71,12 @@ def coordinator(
         run(directory)
         return
     from throwcollect.cli.dataset.info import describe
-    from throwcollect.coordinator.prepare import more_trials
+    from throwcollect.coordinator.prepare import count_trials
     from throwcollect.coordinator.resume import prepare_or_resume
     from throwcollect.dataset.inspect import info
 
     plan = prepare_or_resume(config, directory)
-    print(f"plan: {format_count(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
+    print(f"plan: {count_trials(plan)}; dataset: {directory}", flush=True)
     try:
         # Compose alone looks after the simulations, and does not tell when none can be started.
         run(directory, patience_s=plan.config.run.start_timeout_s)

@@ -14,7 +14,7 @@ from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.side_by_side import count_cores
-from throwcollect.wording import command, format_count
+from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.sweep.plan import Plan
@@ -71,7 +71,7 @@ def plan(
 ) -> None:
     """Print the trials without running them."""
     from throwcollect.config.loader import load_locating_errors
-    from throwcollect.coordinator.prepare import draw_plan, more_trials, prepare
+    from throwcollect.coordinator.prepare import count_trials, draw_plan, prepare
 
     end_with_reader()
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
@@ -103,8 +103,7 @@ def plan(
         numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
-    planned, refused = format_count(len(found.trials), "trial"), len(found.trials.refused)
-    tell(f"{planned}, {refused} refused{more_trials(found)}")
+    tell(f"{count_trials(found)}; {len(found.trials.refused)} refused")
 
 
 def _load_world(plan: Plan) -> None:

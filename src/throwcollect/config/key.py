@@ -45,17 +45,12 @@ class Key:
     Attributes:
         effect: What the value has an effect on.
         swept: Whether a sweep may vary the value from trial to trial, if it is a number that may have decimals.
-        later: Whether the key was added after datasets had been published. Digests leave it out where it has its
-            default, so that older digests hold.
         operator: Whether only the operator of a server sets the value, as it names files or resources of its machine.
-        grows: Whether the value may change when the collection of a dataset goes on, to add more trials.
     """
 
     effect: Effect | None = None
     swept: bool | None = None
-    later: bool | None = None
     operator: bool | None = None
-    grows: bool | None = None
 
     @property
     def determines_samples(self) -> bool:

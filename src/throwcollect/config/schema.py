@@ -110,11 +110,11 @@ class RobotConfig(Section):
     """Share of the velocity error that a motor removes in one step [-]."""
     effort_scale: Annotated[float, Field(gt=0, le=10), Key(swept=True)] = 1.0
     """Factor on the effort limits of all joints [-]."""
-    joint_offsets: Annotated[dict[Joint, Angle], Key(swept=True, later=True)] = {}
+    joint_offsets: Annotated[dict[Joint, Angle], Key(swept=True)] = {}
     """Errors of the joints' zeros: the true angle of such a joint minus the angle that is commanded and measured."""
-    speed_scale: Annotated[float, Field(gt=0.5, lt=2), Key(swept=True, later=True)] = 1.0
+    speed_scale: Annotated[float, Field(gt=0.5, lt=2), Key(swept=True)] = 1.0
     """Speed of the clock by which controllers follow trajectories [-]: below 1, motions take longer than planned."""
-    motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True, later=True)] = 0.0
+    motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0
     """Time constant with which motors follow their commands; 0: at once."""
 
 
@@ -150,7 +150,7 @@ class SceneConfig(Section):
 class SimConfig(Section):
     """How the simulation computes."""
 
-    engine: Annotated[EngineName, Key(later=True)] = "bullet"
+    engine: EngineName = "bullet"
     """Physics engine: `bullet` simulates contacts; so does `mujoco`, which is faster and computes throws that differ by
     some millimetres (docs/engines.md); `ballistic` is for trying things out: an arm that is always where its commands
     are, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
@@ -201,11 +201,11 @@ class Config(Section):
     """Name of the collection and of its files."""
     seed: Annotated[int, Field(ge=0, lt=2**32), Key(Effect.PLAN)] = 0
     """Root of all randomness."""
-    trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN, grows=True)] = None
+    trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN)] = None
     """Number of trials; with `until`, their largest number. Null takes all points of `grid` and `list`, and with
     `until` ten trials for each throw that should land."""
-    until: Annotated[AnyUntil | None, Key(Effect.PLAN, later=True, grows=True)] = None
-    """Collects until enough throws have landed, or `trials` are used up."""
+    until: Annotated[AnyUntil | None, Key(Effect.PLAN)] = None
+    """Ends the dataset with the trial at which enough throws have landed, or when `trials` are used up."""
     robot: Annotated[RobotConfig, Key(Effect.PHYSICS)] = RobotConfig()
     """The robot."""
     tool: Annotated[AnyTool, Key(Effect.PHYSICS)] = load_member("tools", "spoon")()
@@ -216,7 +216,7 @@ class Config(Section):
     """The rest of the world."""
     sim: Annotated[SimConfig, Key(Effect.PHYSICS)] = SimConfig()
     """How the simulation computes."""
-    controllers: Annotated[ControllersConfig, Key(Effect.PHYSICS, later=True)] = ControllersConfig()
+    controllers: Annotated[ControllersConfig, Key(Effect.PHYSICS)] = ControllersConfig()
     """How the robot's controllers answer their clients."""
     task: Annotated[AnyTask, Key(Effect.TASK)] = load_member("tasks", "throw")()
     """What the robot does."""
@@ -271,11 +271,6 @@ class Config(Section):
                 continue
             for joint in unknown:
                 yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
-
-    @property
-    def grows(self) -> bool:
-        """Whether trials are added to the plan while it is collected."""
-        return self.until is not None or self.sweep.target is not None
 
     def without_run(self) -> Config:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""

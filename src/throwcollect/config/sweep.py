@@ -77,7 +77,7 @@ class Bins(Section):
 
 
 class TargetConfig(Section):
-    """Landing targets over which throws are spread evenly: if possible, equally many land in each cell of the bins."""
+    """Cells of landings, in which reports count throws."""
 
     distance_m: Bins | None = None
     """Horizontal distance of the landing ball from the origin of the robot's base."""
@@ -118,12 +118,12 @@ class SweepConfig(Section):
     possibly targets.
 
     A relative path starts at the directory of the configuration file."""
-    feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
+    feasibility: Literal["actual", "nominal"] = "actual"
     """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which all keys of
     `tool`, `ball` and `robot` have their defaults, except `posture`, `locked` and `base_height_m`. Somebody who plans
     motions for a real robot knows only the nominal one."""
-    target: Annotated[TargetConfig | None, Key(later=True)] = None
-    """Spreads throws over landing targets: trials are added to the plan where throws are few."""
+    target: TargetConfig | None = None
+    """Cells of landings, in which reports count throws."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.sampler == "list":
@@ -133,13 +133,8 @@ class SweepConfig(Section):
                 yield "parameters", "should be left out, as the sampler list takes keys and values from its file"
         elif self.file is not None:
             yield "file", f"should be left out, as the sampler {self.sampler} reads no file"
-        if self.target is not None:
-            if self.sampler != "sobol":
-                yield "sampler", f"should be sobol, with which the search for target begins, got {self.sampler}"
-            if not self.parameters:
-                yield "parameters", "missing; target should have parameters to reach it with"
-            if self.target.height_m and LANDING_HEIGHT not in self.parameters:
-                yield "target.height_m", f"should be left out, as {LANDING_HEIGHT} is not swept"
+        if self.target and self.target.height_m and self.sampler != "list" and LANDING_HEIGHT not in self.parameters:
+            yield "target.height_m", f"should be left out, as {LANDING_HEIGHT} is not swept"
         for key, parameter in self.parameters.items():
             if not isinstance(parameter, Range):
                 continue

@@ -30,7 +30,7 @@ class TaskConfig(Section):
         implementation: The task itself, ``module:class``: a `Task` that is made of a whole configuration. It is
             imported where it is needed, so that reading a configuration stays cheap.
         until: The section `until` of a configuration of this task; its key is the outcome of a trial that succeeded.
-        throws: Whether the ball is thrown: then the tool has to move, and `sweep.target` can ask for landings, as
+        throws: Whether the ball is thrown: then the tool has to move, and `sweep.target` can name landings, as
             results are `ThrowResult`.
         targets: Columns of its results that say where a trial ended, and that can be aimed at; none if there is
             nothing to aim at.

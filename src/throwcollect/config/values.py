@@ -60,18 +60,16 @@ class Leaf:
         name: Dotted key.
         value: The value.
         key: Annotation that holds for the key.
-        is_default: Whether the value is the default of the key.
     """
 
     name: str
     value: Any
     key: Key
-    is_default: bool
 
 
 def leaves(config: Config) -> Iterator[Leaf]:
     """List the leaves of a configuration, in the order in which their keys are declared."""
-    return _list_leaves(config, (), Key(), Config())
+    return _list_leaves(config, (), Key())
 
 
 def values_by_key(config: Config) -> dict[str, Any]:
@@ -144,22 +142,15 @@ def _find_operator_keys(section: type[Section]) -> Iterator[str]:
         yield from (f"{name}.{key}" for key in inner)
 
 
-def _list_leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:
+def _list_leaves(value: Any, location: Location, key: Key) -> Iterator[Leaf]:
     if isinstance(value, Section):
         for name, inner in value.__dict__.items():
-            own = overlay(key, type(value), name)
-            # The default may be another task or another family, which need not have this key.
-            yield from _list_leaves(inner, (*location, name), own, getattr(default, name, None))
-    elif isinstance(value, dict) and value:
-        for name, inner in value.items():
-            yield from _list_leaves(
-                inner, (*location, name), key, default.get(name) if isinstance(default, dict) else None
-            )
-    elif isinstance(value, list) and value:
-        for index, inner in enumerate(value):
-            yield from _list_leaves(inner, (*location, index), key, None)
+            yield from _list_leaves(inner, (*location, name), overlay(key, type(value), name))
+    elif isinstance(value, dict | list) and value:
+        for part, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _list_leaves(inner, (*location, part), key)
     else:
-        yield Leaf(join_key(location), value, key, is_default=value == default)
+        yield Leaf(join_key(location), value, key)
 
 
 def _change(section: AnySection, changes: Mapping[str, Any], location: Location) -> AnySection:

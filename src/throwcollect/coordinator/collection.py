@@ -14,18 +14,19 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from throwcollect.coordinator.acceptance import Acceptance
-from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.lookahead import Lookahead
+from throwcollect.coordinator.prefix import Prefix
+from throwcollect.coordinator.prepare import count_first, feasibility_check
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.coordinator.trial_rate import TrialRate
 from throwcollect.dataset.directory import find_known_directory
-from throwcollect.dataset.journal import find_lost
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Delivery, Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
+from throwcollect.sweep.plan import Check, refusal
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 from throwcollect.wording import command, format_count
@@ -46,7 +47,7 @@ class TrialCollection:
     Attributes:
         writer: The dataset that is filled.
         warn: Called with a warning when a trial goes to another simulation; the coordinator's node sets it to its log.
-        on_change: Called when the trials of simulations may have changed: the plan has grown, or no further trial may
+        on_change: Called when the trials of simulations may have changed: there are new ones, or no further trial may
             begin.
     """
 
@@ -55,9 +56,14 @@ class TrialCollection:
         self.warn: Callable[[str], object] = lambda _: None
         self.on_change: Callable[[], None] = lambda: None
         self._config = writer.plan.config
-        self._growth = Growth(writer.plan, lost=find_lost(directory)) if self._config.grows else None
-        sure = writer.plan.trials[: self._growth.planned if self._growth else None]
-        self._leases = Leases(sure.numbers_to_run, retries=self._config.run.retries)
+        trials = writer.plan.trials
+        wanted = self._config.until.wanted if self._config.until else None
+        self._prefix = Prefix(trials.numbers, wanted=wanted, refused=trials.refused)
+        self._next_to_check = trials.first + count_first(self._config, len(trials))
+        """No trial from this one on has been checked, or leased."""
+        self._check: Check | None = None
+        checked = (number for number in trials.numbers_to_run if number < self._next_to_check)
+        self._leases = Leases(checked, retries=self._config.run.retries)
         self._names: dict[str, str] = {}
         self._took_part: set[str] = set()
         self._acceptance = Acceptance(self._config)
@@ -85,19 +91,18 @@ class TrialCollection:
         count = 0
         told = time.monotonic()
 
-        def count_episode(trial: int, result: Result) -> None:
+        def count_episode(trial: int, result: Result) -> bool:
             nonlocal count, told
             # Episodes come file by file, so this is the number in all files that were read so far.
             if count and time.monotonic() >= told + _TELL_EVERY_S:
                 told = time.monotonic()
                 say(f"has found {format_count(count, 'episode')} of an earlier collection so far")
             count += 1
-            collection.recall(trial, result)
+            return collection.recall(trial, result)
 
         try:
             if collection.writer.recover(count_episode, processes=processes):
                 say(f"keeps {format_count(count, 'episode')} of an earlier collection")
-            collection._cut_plan(say)
         except BaseException:
             collection.writer.close()
             raise
@@ -120,18 +125,14 @@ class TrialCollection:
         """Whether all trials have ended and are written; while draining, whether running ones did, or time is up."""
         if self._backlog:
             return False
-        if self.complete:
-            return True
-        # `grow_plan` still has to close the plan. Otherwise, a drain at this moment would make a complete collection
-        # count as interrupted.
-        if self._growth is not None and self._growth.over:
-            return False
-        return self._draining and (self._leases.leased == 0 or time.monotonic() > self._drain_deadline)
+        return self.complete or (
+            self._draining and (self._leases.leased == 0 or time.monotonic() > self._drain_deadline)
+        )
 
     @property
     def complete(self) -> bool:
-        """Whether every trial of the plan has ended, and none will be added to it."""
-        return self._leases.finished and self._growth is None
+        """Whether every trial that belongs to the dataset has ended."""
+        return self._prefix.complete
 
     def drain(self) -> None:
         """Let no more trials begin; those that run have `run.grace_s` to end."""
@@ -143,12 +144,24 @@ class TrialCollection:
                 self._leases.release(simulation)
             self.on_change()
 
-    def recall(self, trial: int, result: Result) -> None:
-        """Count a trial as ended, as the dataset has its episode; call this only before anything is leased."""
-        if self._growth is None or not self._growth.keep(trial, result):
-            self._recall(trial, result)
-        while self._confirm_round():
-            pass
+    def recall(self, trial: int, result: Result) -> bool:
+        """Count a trial as ended, as the dataset has its episode; call this in order of trials, before `lease`.
+
+        Returns:
+            Whether the trial certainly belongs to the dataset. It may not if an earlier trial was lost, which would
+            succeed now; then it does not count, and is run again if it belongs to the dataset after all.
+        """
+        while self._next_to_check < min(trial, self._prefix.stop):
+            self.check_next()
+        if trial >= self._prefix.stop:
+            return False
+        if trial == self._next_to_check:
+            self._next_to_check += 1
+            self._leases.add([trial])
+        self._leases.recall(trial)
+        self._note(trial, result)
+        self._rate = TrialRate(self._leases.ended)
+        return True
 
     def join(self, simulation: str, name: str) -> None:
         """Note the address of a simulation that can be given trials, and the name of its node."""
@@ -235,27 +248,26 @@ class TrialCollection:
         self.writer.append(episode, result)
         self._note(episode.header.trial, result)
 
-    def grow_plan(self) -> bool:
-        """Work on the next round of the plan for some milliseconds, and return whether there was something to do."""
-        if self._growth is None:
+    def check_next(self) -> bool:
+        """Check whether the robot can do the next trial of the plan, which takes some milliseconds.
+
+        Returns:
+            False if no trial is left to check, as it is not certain that any further one belongs to the dataset.
+        """
+        number = self._next_to_check
+        if self._draining or number >= self._prefix.stop:
             return False
-        if self._cut_plan(self.warn):
-            return True
-        if self._growth.over:
-            self._growth = None
-            self.writer.close_plan()
-            return True
-        if self._draining:
-            return False
-        if self._confirm_round():
-            return True
-        trials = self._growth.step()
-        if trials:
-            # This comes before trials are leased, so that no crash can leave an episode of a trial that no plan has.
-            self.writer.extend(trials)
-            self._leases.add(trials.numbers_to_run)
-            self.on_change()
-        return trials is not None
+        self._next_to_check += 1
+        trials = self.writer.plan.trials
+        if number not in trials.refused:
+            self._check = self._check or feasibility_check(self._config)
+            if (reason := refusal(self.writer.plan.config_of(trials[number]), self._check)) is None:
+                self._leases.add([number])
+                self.on_change()
+                return True
+            self.writer.refuse(number, reason)
+        self._prefix.end(number, succeeded=False)
+        return True
 
     def look_after(self) -> None:
         """Make what is written survive a power cut, once a second, and end a collection that cannot go on."""
@@ -265,8 +277,8 @@ class TrialCollection:
             self._synced_at = time.monotonic()
             self.writer.sync()
         remaining = self._leases.total - self._leases.ended
-        # `begin` guesses from all trials of the plan, so wait until no trials can be added or left out any more.
-        settled = self._growth is None and not self._draining
+        # `begin` guesses from all trials of the plan. With `until`, it is not known which of them the dataset gets.
+        settled = self._config.until is None and not self._draining
         if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate.per_s:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
@@ -274,10 +286,8 @@ class TrialCollection:
         """Report how far the collection has come; `hung` names the simulations that took too long for a trial."""
         ended = self._leases.ended
         self._rate.note(ended)
-        # The number of trials of a plan that ends when enough have succeeded is not known.
-        expected = self._growth.most if self._growth is not None and self._config.until is None else 0
         return Progress(
-            total=self._leases.total + expected,
+            total=self._leases.total,
             ended=ended,
             outcomes=dict(self._outcomes),
             simulations=len(self._names),
@@ -300,6 +310,8 @@ class TrialCollection:
                 f"interrupted; what is finished is in {known or 'the volume'}",
                 hint=command("resume", known) if known else None,
             )
+        if self._config.until is not None:
+            self.writer.end_with(self._prefix.stop - 1)
         # The comparison comes first, because what is written next makes the dataset count as finished.
         if (sentence := self._replay.compare(self.writer.episode_rows(), meanwhile=meanwhile)) is not None:
             say(sentence)
@@ -313,38 +325,9 @@ class TrialCollection:
         # Unless it was told otherwise, a simulation lives in a namespace that has the name of its node.
         return self._names.get(simulation, simulation.strip("/"))
 
-    def _recall(self, trial: int, result: Result) -> None:
-        self._leases.recall(trial)
-        self._outcomes[result.outcome.value] += 1
-        if self._growth is not None:
-            self._growth.recall(trial, result)
-        self._rate = TrialRate(self._leases.ended)
-
-    def _confirm_round(self) -> bool:
-        """Take over the next round that an earlier collection has planned; False if none is confirmed by results."""
-        earlier = self._growth.confirm() if self._growth is not None else None
-        if earlier is None:
-            return False
-        self._leases.add(earlier.trials.numbers_to_run)
-        for trial, result in earlier.results.items():
-            self._recall(trial, result)
-        self.on_change()
-        return True
-
-    def _cut_plan(self, say: Callable[[str], object]) -> bool:
-        """Remove planned trials that the results do not lead to; return whether there were any."""
-        wrong = self._growth.take_wrong() if self._growth is not None else None
-        if wrong is None:
-            return False
-        count = format_count(wrong.episodes, "episode")
-        say(f"plans trials from {wrong.first} on again, as trials that were lost have results now; {count} removed")
-        self.writer.cut(wrong.first)
-        return True
-
     def _note(self, trial: int, result: Result) -> None:
         self._outcomes[result.outcome.value] += 1
-        if self._growth is not None:
-            self._growth.take_result(trial, result)
+        self._prefix.end(trial, succeeded=result.outcome.value == self._config.task.success)
 
     def _warn_of_set_aside(self) -> None:
         aside = {name: reason for name in self._names if (reason := self._leases.why_set_aside(name)) is not None}

@@ -68,7 +68,7 @@ def _collect(
         if stopped():
             collection.drain()
         # Messages of simulations come first; other work is done when there is none.
-        waiting = collection.backlog or collection.grow_plan()
+        waiting = collection.backlog or collection.check_next()
         ros.spin_some(executor, timeout_sec=0.0 if waiting else _IDLE_S)
         if collection.backlog:
             collection.write_one()

@@ -18,11 +18,10 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.side_by_side import working_side_by_side
-from throwcollect.sweep.plan import Check, Plan, check_some_left, draw_first_points, make_trials, refusal
+from throwcollect.sweep.plan import Check, Plan, check_some_left, make_trials, refusal
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
-from throwcollect.sweep.rounds import Rounds
-from throwcollect.sweep.trials import Trials
+from throwcollect.sweep.samplers import draw_points
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.wording import format_count
 
@@ -43,7 +42,10 @@ _LEAST_BYTES = 40
 
 
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: Onlooker = SILENT) -> Plan:
-    """Draw all trials that are known before anything runs, and refuse those that the robot cannot do.
+    """Draw all trials, and refuse those that the robot cannot do.
+
+    With `until`, only as many trials as have to succeed are checked, because the dataset has at least these; the
+    collection checks the others when their turn comes.
 
     Args:
         config: The configuration.
@@ -59,12 +61,17 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
 def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
     if (count := count_before(config)) >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: draws {count} trials")
-    return draw_first_points(config, directory=directory)
+    return draw_points(config, directory=directory)
 
 
 def count_before(config: Config) -> int:
     """Count the trials before they are drawn; 0 if their number is not known yet."""
-    return 0 if config.grows else config.trials or 0
+    return config.trials or 0
+
+
+def count_first(config: Config, trials: int) -> int:
+    """Count the trials, of all trials of a plan, that the dataset has in any case, and that are checked beforehand."""
+    return trials if config.until is None else min(trials, config.until.wanted)
 
 
 def _check_trials(config: Config, points: Points, *, processes: int, onlooker: Onlooker) -> Plan:
@@ -73,30 +80,30 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
         onlooker.warn(sentence)
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
     ThrowsTable((), config)
-    count = len(points.values)
-    refuse_many_files(config, Rounds(config).limit if config.grows else count)
+    refuse_many_files(config, len(points.values))
+    count = count_first(config, len(points.values))
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
     if count >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: checks {count} trials")
     # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
-    pieces = [(first, points[first:stop]) for first, stop in pairwise([*firsts, count])]
+    pieces = [points[first:stop] for first, stop in pairwise([*firsts, count])]
     processes = processes if count >= _MANY_TRIALS else 1
     say_at = time.monotonic() + _TELL_FIRST_S
     onlooker.update_plan(0, count)
-    with working_side_by_side(
-        pieces, _make_checked_trials, (config,), processes=processes, doing="checks trials"
-    ) as checked:
-        trials = next(checked)
-        onlooker.update_plan(len(trials), count)
+    reasons: list[str | None] = []
+    with working_side_by_side(pieces, _make_checks, (config,), processes=processes, doing="checks trials") as checked:
         for piece in checked:
-            trials.extend(piece)
-            onlooker.update_plan(len(trials), count)
+            reasons += piece
+            onlooker.update_plan(len(reasons), count)
             if time.monotonic() >= say_at:
                 say_at = time.monotonic() + _TELL_EVERY_S
-                onlooker.say(f"plan: {len(trials)} of {count} trials checked")
-    check_some_left(trials)
-    return Plan(config, trials)
+                onlooker.say(f"plan: {len(reasons)} of {count} trials checked")
+    # If some trials have not been checked, and few have, others may be left that can be run.
+    if count == len(points.values) or count >= _TRIALS_A_PIECE:
+        check_some_left(reasons)
+    unchecked = [None] * (len(points.values) - count)
+    return Plan(config, make_trials(config, points).refuse([*reasons, *unchecked]))
 
 
 def find_sunken_robot(config: Config) -> str | None:
@@ -116,16 +123,15 @@ def find_sunken_robot(config: Config) -> str | None:
     )
 
 
-def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trials]:
-    """Make a function that makes the trials of points from a first number on, and refuses those that cannot be done."""
+def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:
+    """Make a function that says for each of some points why the robot cannot do its trial; None if it can."""
     check = feasibility_check(config)
 
-    def make(piece: tuple[int, Points]) -> Trials:
-        first, some = piece
-        trials = make_trials(config, some, first=first)
-        return trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
+    def find_reasons(points: Points) -> list[str | None]:
+        rows = (dict(zip(points.keys, row, strict=True)) for row in points.values.tolist())
+        return [refusal(with_values(config, values), check) for values in rows]
 
-    return make
+    return find_reasons
 
 
 def feasibility_check(config: Config) -> Check:
@@ -150,19 +156,18 @@ def _replace_by_nominal_robot(config: Config) -> Config:
 
 
 def describe_plan(plan: Plan) -> str:
-    """Write the number of a plan's trials, how many of them the robot cannot do, and whether more will follow."""
+    """Write the number of a plan's trials, how many of them the robot cannot do, and when the dataset ends before."""
     refused = len(plan.trials.refused)
     note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
-    return f"{format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}"
+    return f"{count_trials(plan)}{note}"
 
 
-def more_trials(plan: Plan) -> str:
-    """Write the words that follow the number of a plan's trials: whether more will follow, and how many."""
-    if not plan.config.grows or len(plan.trials) >= (limit := Rounds(plan.config).limit):
-        return ""
+def count_trials(plan: Plan) -> str:
+    """Write the number of a plan's trials, and when the dataset ends before the last one."""
     goal = plan.config.until
-    until = f", until {goal.wanted} have {goal.outcome()}" if goal else ""
-    return f"; more follow from their results{until}, at most {limit} in all"
+    if goal is None:
+        return format_count(len(plan.trials), "trial")
+    return f"at most {format_count(len(plan.trials), 'trial')}, until {goal.wanted} have {goal.outcome()}"
 
 
 def make_self_contained(config: Config) -> Config:

@@ -17,7 +17,6 @@ from throwcollect.dataset.provenance import Provenance
 from throwcollect.files import read_text
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.arrow_column import count_values, find_range
-from throwcollect.sweep.plan import FIRST_TRIALS
 from throwcollect.units import unit_of_name
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
@@ -152,13 +151,7 @@ def _list_targets(config: Config, throws: pa.Table) -> list[str]:
 def _describe_drawing(config: Config) -> list[str]:
     """Tell how the values were drawn, one sentence a line."""
     lines = [f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}."]
-    if config.sweep.target is not None:
-        bins = [
-            f"`{name}` from {each.min:g} to {each.max:g} in {each.bins} bins"
-            for name, each in config.sweep.target.dimensions.items()
-        ]
-        lines.append(f"After {FIRST_TRIALS} trials, values were chosen that spread landings over {', '.join(bins)}.")
     if config.until is not None:
         wanted = f"{config.until.wanted} {config.task.noun}s had {config.until.outcome()}"
-        lines.append(f"Collected until {wanted}, or all trials had been used up.")
+        lines.append(f"Collected in order of trials until {wanted}, or all trials had been used up.")
     return lines

@@ -1,9 +1,7 @@
 """The journal of a dataset, ``logs/journal.jsonl``: what happened while it was collected, in that order.
 
 Each line is a JSON object with `event`, `time` (Unix [s]) and the facts of that event. Lines are only ever appended,
-also after an interruption. The journal is for people and for the data card. A dataset depends on it in one case only:
-rounds of a plan that do not follow from the results are removed only if trials before them were lost (see
-`coordinator.growth`).
+also after an interruption. The journal is for people and for the data card.
 """
 
 from __future__ import annotations
@@ -22,12 +20,11 @@ from throwcollect.dataset.directory import JOURNAL
 from throwcollect.dataset.lock import lock
 from throwcollect.files import open_log, unreadable, unwritable, write_all
 
-Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
+Event = Literal["opened", "exposed", "recovered", "lease", "commit", "fail", "lost", "shard", "finished"]
 """
 - ``opened``: a process began to collect into the directory: `pid`.
 - ``exposed``: any process that reaches the router may join, because of `run.open` or because nothing protects it.
 - ``recovered``: the episodes that earlier processes had left were taken in: `episodes`.
-- ``planned``: trials were added to the plan: `trials` in all.
 - ``lease``: a trial was given to a simulation: `trial`, `simulation`.
 - ``commit``: the episode of a trial was written: `trial`, `outcome`, `digest`, and the columns that the task aims at.
 - ``fail``: a simulation did not hand over the episode of a trial: `trial`, `simulation`, `reason`.
@@ -164,13 +161,6 @@ def _parse(line: bytes) -> dict[str, Any]:
         if isinstance(entry, dict):
             return entry
     return {}
-
-
-def find_lost(directory: Path) -> frozenset[int]:
-    """Find the trials that were given up as lost in one of the collections into a dataset."""
-    entries = _read_lines(directory / JOURNAL, b'"lost"')
-    numbers = [entry.get("trial") for entry in entries if entry.get("event") == "lost"]
-    return frozenset(number for number in numbers if isinstance(number, int))
 
 
 def was_open(directory: Path) -> bool:

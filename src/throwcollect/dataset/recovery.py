@@ -8,7 +8,7 @@ if it had never stopped.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -74,17 +74,23 @@ class LeftOfShard:
     begun: Mapping[int, RecoveredEpisode]
     finished: FinishedShard | None
 
+    def without(self, dropped: Collection[int]) -> LeftOfShard:
+        """Leave out the episodes of some trials, which are of no use any more."""
+        if not dropped:
+            return self
+        final, begun = (
+            {trial: found for trial, found in episodes.items() if trial not in dropped}
+            for episodes in (self.final, self.begun)
+        )
+        return LeftOfShard(final, begun, None)
+
 
 @dataclass(frozen=True)
 class LeftShard:
-    """A shard of which something may be left: its final path, its trials, and whether no trial will be added to it.
-
-    If it is settled, its final file may stay if it has an episode of each trial.
-    """
+    """A shard of which something may be left: its final path and its trials."""
 
     path: Path
     plan: Plan
-    settled: bool
 
 
 def remove_unfinished(directory: Path) -> None:
@@ -114,7 +120,7 @@ def _look_with(channels: Channels, judge: Judge) -> Callable[[LeftShard], LeftOf
     def look(part: LeftShard) -> LeftOfShard:
         final = find_episodes(part.path, part.plan, channels, judge=judge)
         # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
-        if part.settled and final and final.keys() == set(part.plan.trials.numbers_to_run):
+        if final and final.keys() == set(part.plan.trials.numbers_to_run):
             finished = _check_finished(part.path, channels, final)
             if finished is not None:
                 return LeftOfShard(final, {}, finished)

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -91,12 +91,6 @@ class RowStore:
         with pa.ipc.new_stream(sink, self._schema) as stream:
             stream.write_table(rows)
         self._places[number] = self._by_shards.append([sink.getvalue()])
-
-    def take(self, number: int) -> list[dict[str, Any]]:
-        """Return the rows of a shard, and remove them from the store."""
-        self._by_shards.map()
-        rows: list[dict[str, Any]] = self._read(self._places.pop(number)).to_pylist()
-        return rows
 
     @cached_property
     def table(self) -> pa.Table:

@@ -8,17 +8,16 @@ from pathlib import Path
 
 from throwcollect.dataset.directory import path_of_part, shard_name
 from throwcollect.dataset.recovery import LeftShard
-from throwcollect.files import is_there, remove
+from throwcollect.files import is_there
 from throwcollect.sweep.plan import Plan
 
 
 @dataclass
 class ShardLayout:
-    """The shards of a dataset by their numbers, before and after they are begun; a growing plan gets more trials."""
+    """The shards of a dataset by their numbers, before and after they are begun."""
 
     directory: Path
     plan: Plan
-    growing: bool
 
     def number_of(self, trial: int) -> int:
         """Find the number of the shard of a trial."""
@@ -37,10 +36,6 @@ class ShardLayout:
         """Find the numbers of the trials of a shard that are not refused."""
         return (each for each in self.members(number) if each not in self.plan.trials.refused)
 
-    def is_settled(self, number: int) -> bool:
-        """Whether no trial will be added to a shard any more."""
-        return not self.growing or len(self.plan.trials) >= (number + 1) * self._trials_per_shard
-
     def path(self, number: int) -> Path:
         """Make the path of a shard once it is finished."""
         return self.directory / shard_name(self.plan.config.name, number)
@@ -50,17 +45,11 @@ class ShardLayout:
         path = self.path(number)
         return is_there(path) or is_there(path_of_part(path))
 
-    def remove_files(self, number: int) -> None:
-        """Remove the files of a shard, finished or not."""
-        path = self.path(number)
-        remove(path)
-        remove(path_of_part(path))
-
     def part(self, number: int) -> LeftShard:
         """Describe a shard for `find_left`, without a look into its files."""
         members, first = self.members(number), self.plan.trials.first
         trials = self.plan.trials[members.start - first : members.stop - first]
-        return LeftShard(self.path(number), Plan(self.plan.config, trials), self.is_settled(number))
+        return LeftShard(self.path(number), Plan(self.plan.config, trials))
 
     @property
     def _trials_per_shard(self) -> int:

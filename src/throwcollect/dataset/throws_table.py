@@ -166,7 +166,8 @@ class ThrowsTable:
 
 def read_throws_table(path: Path, plan: Plan) -> pa.Table:
     """Read a table of throws with the columns of a plan, whatever trials its rows are of."""
-    table, schema = read_parquet(path), ThrowsTable.of(plan).schema
+    table = read_parquet(path)
+    schema = ThrowsTable.of(plan).schema
     # Metadata are not compared: descriptions of columns may have been worded otherwise when the table was written.
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"

@@ -39,7 +39,7 @@ from throwcollect.dataset.provenance import load_provenance
 from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.dataset.throws_table import Row
 from throwcollect.dataset.verify_episode import EpisodeCheck
-from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
+from throwcollect.dataset.verify_plan import CheckOf, find_drawing_problems, find_refusal_problems
 from throwcollect.dataset.verify_shard import ShardReport, check_shard
 from throwcollect.dataset.verify_tables import Tables, check_tables, find_wrong_trials
 from throwcollect.errors import DatasetError
@@ -112,10 +112,9 @@ def verify(
 
 def find_unchecked(config: Config) -> tuple[str, ...]:
     """List what `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if nothing."""
-    left_out: tuple[str, ...] = () if can_draw(config) else ("whether the configuration draws these trials",)
-    if not robot_is_available(config):
-        left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")
-    return left_out
+    if robot_is_available(config):
+        return ()
+    return "whether the robot can do the trials", "how its joints moved", "what came of the throws"
 
 
 def _find_plan_problems(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:

@@ -43,14 +43,12 @@ from throwcollect.errors import DatasetError
 from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.round_file import append_round
-from throwcollect.sweep.trials import Trials
-from throwcollect.tasks.result import LOST, Result
+from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 from throwcollect.wording import format_count
 
-Tell = Callable[[int, Result], None]
-"""Receives the number of a trial and its result."""
+Keep = Callable[[int, Result], bool]
+"""Receives the number of a trial and the result of its episode, and says whether the episode belongs to the dataset."""
 
 
 class DatasetWriter:
@@ -60,7 +58,6 @@ class DatasetWriter:
         directory: A directory as `create` leaves it.
         plan: The plan in that directory.
         journal: Receives events; None for datasets that are written in one go.
-        growing: Whether trials may still be added to the plan, until `close_plan`.
         channels: What is recorded; None for the channels of the robot that is installed here.
     """
 
@@ -70,25 +67,25 @@ class DatasetWriter:
         plan: Plan,
         *,
         journal: Journal | None = None,
-        growing: bool = False,
         channels: Channels | None = None,
     ) -> None:
         self._directory = directory
         self._config: Config = plan.config
         self._journal = journal
-        # The caller's plan must not grow with this one.
-        plan = replace(plan, trials=plan.trials[:]) if growing else plan
-        self._layout = ShardLayout(directory, plan, growing)
+        self._layout = ShardLayout(directory, plan)
         self._channels = channels or Channels(self._config, full_description(self._config))
         self._table = ThrowsTable.of(plan)
-        self._unfinished: set[int] = set()
+        self._unfinished = set(self._layout.numbers_of(plan.trials.numbers))
         self._shards: dict[int, OpenShard] = {}
         """Unfinished shards with at least one trial that has ended."""
         self._recordings: dict[int, Recording] = {}
         """The file of each finished shard that has one."""
         self._finished_rows = RowStore(directory, self._table.schema)
         self._held = ExitStack()
-        self._expect(plan.trials)
+        for number in self._layout.numbers_of(plan.trials.numbers):
+            # A shard of refused trials alone waits for no episode, and nothing would finish it later.
+            if next(self._layout.to_run(number), None) is None:
+                self._finish_shard_if_complete(number)
 
     @property
     def plan(self) -> Plan:
@@ -106,18 +103,17 @@ class DatasetWriter:
             held.enter_context(hold_lock(directory, alone=False))
             journal = held.enter_context(closing(Journal(directory)))
             plan = Plan.read(directory / PLAN, read_config(directory))
-            plan.take_in_rounds(directory / PLAN)
-            writer = cls(directory, plan, journal=journal, growing=plan.config.grows, channels=channels)
+            writer = cls(directory, plan, journal=journal, channels=channels)
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, tell: Tell = lambda *_: None, *, judge: Judge = judge_episode, processes: int = 1) -> int:
+    def recover(self, keep: Keep = lambda *_: True, *, judge: Judge = judge_episode, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
         A finished dataset then counts as unfinished, even if all its trials have ended; `finish` writes the same files.
 
         Args:
-            tell: Called for each trial that has an episode, in order of shards.
+            keep: Called for each trial that has an episode, in order of trials; what it does not keep is removed.
             judge: Finds the result of an episode.
             processes: How many processes may look through the recordings of a large dataset, as for `find_left`.
 
@@ -132,10 +128,10 @@ class DatasetWriter:
         # Every process gets the trials of the shards that it looks through, and not a whole plan.
         parts = {each: self._layout.part(each) for each in sorted(self._unfinished) if self._layout.has_file(each)}
         all_left = find_left([*parts.values()], self._channels, judge=judge, processes=processes)
-        for number, left in zip(parts, all_left, strict=True):
+        for number, found in zip(parts, all_left, strict=True):
+            there = {**found.final, **found.begun}
+            left = found.without({trial for trial in sorted(there) if not keep(trial, there[trial].result)})
             episodes = self._take_left(number, left)
-            for each in episodes:
-                tell(each.trial, each.result)
             count += len(episodes)
             if left.finished is not None:
                 self._close_shard(number, left.finished)
@@ -147,40 +143,23 @@ class DatasetWriter:
             self.note("recovered", episodes=count)
         return count
 
-    def extend(self, trials: Trials) -> None:
-        """Add trials to the plan, whose numbers continue it, and write them to disk before this returns."""
-        # If a lost plan was made again, files of its later shards are still there.
-        for number in self._layout.numbers_of(trials.numbers):
-            if number not in self._unfinished:
-                self._layout.remove_files(number)
-        append_round(self._directory / PLAN, trials)
-        self.plan.trials.extend(trials)
-        self.note("planned", trials=len(self.plan.trials))
-        self._expect(trials)
+    def refuse(self, trial: int, reason: str) -> None:
+        """Note that a trial, which has no episode, is not run after all."""
+        self.plan.trials.add_refusal(trial, reason)
+        number = self._layout.number_of(trial)
+        self._get_shard(number).missing.discard(trial)
+        self._finish_shard_if_complete(number)
 
-    def cut(self, first: int) -> None:
-        """Remove the trials from a number on from the plan, with their episodes, as if they had never been planned.
+    def end_with(self, last: int) -> None:
+        """End the dataset with a trial of the plan, and write the plan without the trials that follow.
 
-        If this is interrupted, the plan still has them, or `recover` leaves out what remains of them.
+        All trials up to the last one have to be in, and no later one may be.
         """
-        shards = self._layout.numbers_of(range(first, self.plan.trials.numbers.stop))
-        rows = [self._forget_shard(number) for number in shards]
-        # The first of these shards has trials that stay, unless it begins with the first trial that goes.
-        is_shared = self._layout.members(shards[0]).start < first
-        for number in shards[is_shared:]:
-            self._layout.remove_files(number)
-        self._layout.plan = replace(self.plan, trials=self.plan.trials[:first])
+        self._layout.plan = replace(self.plan, trials=self.plan.trials[: last + 1 - self.plan.trials.first])
         self.plan.write(self._directory / PLAN)
-        self.note("planned", trials=first)
-        if is_shared:
-            self._reopen(shards[0], rows[0])
-
-    def close_plan(self) -> None:
-        """Declare that the plan has all its trials."""
-        self._layout.growing = False
-        self.plan.take_in_rounds(self._directory / PLAN)
-        # A copy, as shards that are finished leave the dictionary.
-        for number in list(self._shards):
+        self._unfinished = {number for number in self._unfinished if number <= self._layout.number_of(last)}
+        for number in list(self._unfinished):
+            self._get_shard(number).missing.intersection_update(self._layout.members(number))
             self._finish_shard_if_complete(number)
 
     def take_shard(self, number: int, recording: Recording | None, rows: pa.Table) -> None:
@@ -272,40 +251,6 @@ class DatasetWriter:
         self._held.close()
         self._journal = None
 
-    def _expect(self, trials: Trials) -> None:
-        for number in self._layout.numbers_of(trials.numbers):
-            self._unfinished.add(number)
-            if number in self._shards:
-                added = (each for each in self._layout.to_run(number) if each in trials.numbers)
-                self._shards[number].missing.update(added)
-            # A shard of refused trials alone waits for no episode, and nothing would finish it later.
-            if number in self._shards or next(self._layout.to_run(number), None) is None:
-                self._finish_shard_if_complete(number)
-
-    def _forget_shard(self, number: int) -> list[Row]:
-        """Forget a shard, but keep its files; return the rows of the trials that have ended."""
-        self._recordings.pop(number, None)
-        if number not in self._unfinished:
-            return self._finished_rows.take(number)
-        self._unfinished.discard(number)
-        if number not in self._shards:
-            return []
-        shard = self._shards.pop(number)
-        shard.close()
-        return [*shard.rows.values()]
-
-    def _reopen(self, number: int, rows: list[Row]) -> None:
-        """Go on filling a shard after some of its trials have left the plan; `rows` are the rows that it had."""
-        self._unfinished.add(number)
-        [left] = find_left([self._layout.part(number)], self._channels)
-        self._take_left(number, left)
-        shard = self._get_shard(number)
-        # Lost trials have no episode by which `find_left` would find them, so their rows are kept.
-        for row in rows:
-            if row["outcome"] == LOST and row["trial"] in self._layout.members(number):
-                shard.rows[row["trial"]] = row
-                shard.missing.discard(row["trial"])
-
     def _take_left(self, number: int, left: LeftOfShard) -> list[RecoveredEpisode]:
         """Take in what is left of an unfinished shard; returns its episodes in order of trials."""
         shard = self._get_shard(number)
@@ -333,7 +278,7 @@ class DatasetWriter:
 
     def _finish_shard_if_complete(self, number: int) -> None:
         shard = self._get_shard(number)
-        if not shard.missing and self._layout.is_settled(number):
+        if not shard.missing:
             self._close_shard(number, shard.finish())
 
     def _close_shard(self, number: int, finished: FinishedShard) -> None:

@@ -135,7 +135,7 @@ def resume(
     with reading_config(directory, file, overrides) as read:
         sweep_directory = directory if file is None else file.parent
         if not simulate:
-            from throwcollect.coordinator.resume import finish_without_simulating
+            from throwcollect.coordinator.salvage import finish_without_simulating
 
             finish_without_simulating(read, directory, sweep_directory=sweep_directory, onlooker=onlooker)
             return None
@@ -281,7 +281,7 @@ def _make_plan(request: RunRequest, directory: Path, onlooker: Onlooker) -> Plan
     from throwcollect.coordinator.prepare import prepare as prepare_plan
 
     config = request.config
-    if (config.trials or 0) >= MANY_TRIALS and not config.grows:
+    if (config.trials or 0) >= MANY_TRIALS and config.until is None:
         onlooker.say(
             f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms for each on one core"
         )

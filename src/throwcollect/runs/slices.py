@@ -148,10 +148,9 @@ def _find_scratch(config: Config) -> Path | None:
 
 def check_sliceable(config: Config) -> None:
     """Check that a configuration can be collected in slices."""
-    if config.grows:
-        key = "until" if config.until is not None else "sweep.target"
+    if config.until is not None:
         raise ConfigError(
-            [Problem("a plan that grows with its results cannot be collected in slices", key=key)],
+            [Problem("a dataset whose end depends on its results cannot be collected in slices", key="until")],
             expected="a fixed number of trials",
             hint="throwcollect submit --mode live collects it in one run on several nodes",
         )

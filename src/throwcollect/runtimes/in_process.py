@@ -105,7 +105,7 @@ class InProcess:
                 else:
                     collection.take_in(_SIMULATION, delivery)
             else:
-                collection.grow_plan()
+                collection.check_next()
             if collection.backlog:
                 collection.write_one()
             collection.look_after()

@@ -5,9 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping
-from functools import cache
-from types import MappingProxyType
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -29,10 +27,7 @@ def is_digest(value: object) -> bool:
 
 
 def config_digest(config: Config) -> str:
-    """Hash a configuration, SHA-256 in hex; keys that say how and where it is run do not count.
-
-    Keys that later versions have added count only if they differ from their defaults, so that older digests stay valid.
-    """
+    """Hash a configuration, SHA-256 in hex; keys that say how and where it is run do not count."""
     sections = config.model_dump(mode="json", exclude=_name_uncounted(config))
     return hashlib.sha256(json.dumps(sections).encode()).hexdigest()
 
@@ -42,7 +37,7 @@ def _name_uncounted(section: Section) -> dict[str, Any]:
     uncounted: dict[str, Any] = {}
     for name, value in section.__dict__.items():
         key = key_of_field(type(section), name)
-        if key.effect is Effect.RUN or (key.later and value == type(section).model_fields[name].get_default()):
+        if key.effect is Effect.RUN:
             uncounted[name] = True
         elif isinstance(value, Section) and (inside := _name_uncounted(value)):
             uncounted[name] = inside
@@ -53,33 +48,21 @@ def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArr
     """Hash everything that determines the samples of each trial, SHA-256, shape ``(n_trials, 32)``.
 
     The hashed text has one line ``key=value`` for each effective key of the trial's configuration, sorted by key, so
-    it does not matter whether a value was swept or fixed. Keys that later versions have added have no line if they have
-    their defaults, so that digests of earlier versions stay valid.
+    it does not matter whether a value was swept or fixed.
     """
-    lines = {
-        leaf.name: _format_line(leaf.name, leaf.value)
-        for leaf in leaves(config)
-        if leaf.key.determines_samples and not (leaf.key.later and leaf.is_default)
-    }
+    lines = {leaf.name: _format_line(leaf.name, leaf.value) for leaf in leaves(config) if leaf.key.determines_samples}
     # Whatever differs from trial to trial has an empty line here, so that lines are sorted once for all trials.
     lines["seed"] = ""
     lines |= dict.fromkeys(points.keys, "")
     lines = dict(sorted(lines.items()))
-    later = _find_later_defaults()
     digests = np.empty((len(points.values), hashlib.sha256().digest_size), np.uint8)
     for digest, seed, row in zip(digests, seeds, points.values, strict=True):
         lines["seed"] = _format_line("seed", int(seed))
         for key, value in zip(points.keys, row.tolist(), strict=True):
-            lines[key] = "" if key in later and value == later[key] else _format_line(key, value)
-        text = "\n".join([_FORMAT, *filter(None, lines.values())])
+            lines[key] = _format_line(key, value)
+        text = "\n".join([_FORMAT, *lines.values()])
         digest[:] = np.frombuffer(hashlib.sha256(text.encode()).digest(), np.uint8)
     return digests
-
-
-@cache
-def _find_later_defaults() -> Mapping[str, Any]:
-    """Map each key that a later version has added to its default."""
-    return MappingProxyType({leaf.name: leaf.value for leaf in leaves(Config()) if leaf.key.later})
 
 
 def _format_line(key: str, value: object) -> str:

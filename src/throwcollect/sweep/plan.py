@@ -15,12 +15,10 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
-from throwcollect.files import is_there, remove, write_file
+from throwcollect.files import write_file
 from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, open_parquet
 from throwcollect.sweep.points import Points, Targets
-from throwcollect.sweep.round_file import read_rounds, rounds_path
-from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.slice import Slice
 from throwcollect.sweep.trials import DIGEST_BYTES, Trial, Trials
 from throwcollect.wording import blank_numbers, format_count
@@ -31,13 +29,7 @@ _CONFIG_KEY = b"throwcollect.config_digest"
 _SLICE_KEY = b"throwcollect.slice"
 _JOINED_KEY = b"throwcollect.joined"
 _MOST_REASONS = 5
-_ROWS_AT_ONCE = 1 << 16
 _MISNUMBERED = "the trials are not numbered from 0 without gaps"
-
-ROUND_TRIALS = 64
-"""Number of trials in a round, by which a plan grows."""
-FIRST_TRIALS = 2 * ROUND_TRIALS
-"""Number of trials in the first rounds, which depend on no result."""
 
 Check = Callable[[Config], str | None]
 """Explains why a trial with this configuration cannot be run; None if it can."""
@@ -98,14 +90,8 @@ class Plan:
         return with_values(self.config, trial.values)
 
     def write(self, path: Path) -> None:
-        """Write the plan as a Parquet file, whole or not at all, and remove the rounds beside it, which it contains."""
+        """Write the plan as a Parquet file, whole or not at all."""
         write_file(path, self.encode())
-        remove(rounds_path(path))
-
-    def take_in_rounds(self, path: Path) -> None:
-        """Write the plan as a whole if rounds lie beside its file; this plan contains them."""
-        if is_there(rounds_path(path)):
-            self.write(path)
 
     def encode(self) -> bytes:
         """Encode the plan as Parquet; equal plans give equal bytes.
@@ -138,7 +124,7 @@ class Plan:
         """Read a plan that was written for a configuration.
 
         Args:
-            path: File that `write` wrote; rounds that were added later lie beside it.
+            path: File that `write` wrote.
             config: The configuration; its section `run` may differ.
         """
         with open_parquet(path) as file:
@@ -167,7 +153,10 @@ class Plan:
                     raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
             for name, reason in config.task.find_wrong_targets(targets).items():
                 raise DatasetError(f"is damaged: column {name!r}: {reason}", path=path)
-            trials = _read_trials(file, keys, targets, path)
+            table = file.read().combine_chunks()
+            table.validate(full=True)
+            (rows,) = table.to_batches()
+            trials = _read_trials(rows, keys, targets, path)
         stored = metadata.get(_SLICE_KEY)
         if stored is not None:
             try:
@@ -177,32 +166,21 @@ class Plan:
         # Only a slice may begin with a trial other than 0.
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
-        read_rounds(path, trials)
         joined = metadata.get(_JOINED_KEY, b"").split()
         if not all(map(bytes.isdigit, joined)) or (joined and sum(map(int, joined)) != len(trials)):
             raise DatasetError("is damaged: it does not have the trials of the plans that it joins", path=path)
         return cls(config, trials, joined=tuple(map(int, joined)))
 
 
-def draw_first_points(config: Config, *, directory: Path) -> Points:
-    """Draw the points of all trials that are known before anything runs; for a plan that grows, its first two rounds.
-
-    A relative `sweep.file` starts at `directory`.
-    """
-    points = draw_points(config, directory=directory)
-    return points[:FIRST_TRIALS] if config.grows else points
-
-
 def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
     """Make trials of points, with numbers from `first` on; none of them is refused."""
     count = len(points.values)
     seeds = np.fromiter((_make_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
-    digests = trial_digests(config, points, seeds)
-    return Trials(points, seeds, digests, first=first)
+    return Trials(points, seeds, trial_digests(config, points, seeds), first=first)
 
 
 def _make_seed(root: int, number: int) -> int:
-    # The seed of a trial does not depend on other trials, so a plan can grow, or be made in parts.
+    # The seed of a trial does not depend on other trials, so a plan can be continued.
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
@@ -214,10 +192,10 @@ def refusal(config: Config, check: Check) -> str | None:
         return str(error)
 
 
-def check_some_left(trials: Trials) -> None:
-    """Make sure that a plan has something to run."""
-    reasons = list(trials.refused.values())
-    if len(reasons) < len(trials):
+def check_some_left(found: Sequence[str | None]) -> None:
+    """Make sure that a plan has something to run, given for each trial why it is refused; None if it is not."""
+    reasons = [reason for reason in found if reason is not None]
+    if len(reasons) < len(found):
         return
     # Reasons that differ only in their numbers are of one kind, of which the first reason is shown.
     kinds = [blank_numbers(reason) for reason in reasons]
@@ -227,34 +205,17 @@ def check_some_left(trials: Trials) -> None:
     # Other reasons begin with the key that is wrong, and say what is right.
     of_motions = any("." not in reason.split(" ", 1)[0] for reason in examples.values())
     raise PlanError(
-        [Problem(f"{format_count(len(trials), 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
+        [Problem(f"{format_count(len(reasons), 'trial')}, all refused: {'; '.join(listed)}", key="sweep")],
         hint="sweep over smaller ranges or slower motions, or change task.start and task.end" if of_motions else None,
     )
 
 
-def _read_trials(file: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
-    """Read the trials of an open plan in batches, because all rows at once take Arrow several times as much memory."""
-    trials: Trials | None = None
-    for rows in file.iter_batches(_ROWS_AT_ONCE):
-        rows.validate(full=True)
-        first = rows["trial"][0].as_py()
-        more = _make_trials_of(rows, keys, targets, first, path)
-        if trials is None:
-            trials = more
-        elif first != trials.numbers.stop:
-            raise DatasetError(_MISNUMBERED, path=path)
-        else:
-            trials.extend(more)
-    if trials is None:
-        raise DatasetError("is damaged: has no rows", path=path)
-    return trials
-
-
-def _make_trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first: int, path: Path) -> Trials:
+def _read_trials(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
+    """Read the trials of the table of a plan."""
     from throwcollect.sweep.arrow_column import nan_where_null, read_numbers
 
-    numbers = np.arange(first, first + len(rows))
-    if not np.array_equal(read_numbers(rows["trial"]), numbers):
+    first = rows["trial"][0].as_py()
+    if not np.array_equal(read_numbers(rows["trial"]), np.arange(first, first + len(rows))):
         raise DatasetError(_MISNUMBERED, path=path)
     digests = rows["digest"].to_pylist()
     if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:

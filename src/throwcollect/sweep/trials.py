@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.sweep.points import Points, Targets
-from throwcollect.sweep.rows import Rows
 
 DIGEST_BYTES = 32
 """Size of a SHA-256 [bytes]."""
@@ -39,19 +38,13 @@ class Trial:
 
 
 class Trials(Sequence[Trial]):
-    """Trials in order and without gaps; appending trials does not change slices that were cut before.
+    """Trials in order and without gaps.
 
     Attributes:
-        keys: Swept dotted keys.
-        first: Number of the first trial.
-        target_names: Columns of targets; empty if no trial has one.
-
-    Args:
         points: Values and targets of the trials.
         seeds: Seed of each trial, shape ``(n_trials,)``.
         digests: Digest of each trial, shape ``(n_trials, DIGEST_BYTES)``.
         first: Number of the first trial.
-        refused: Reasons of the trials that are not run, by their numbers.
     """
 
     def __init__(
@@ -63,37 +56,31 @@ class Trials(Sequence[Trial]):
         first: int = 0,
         refused: Mapping[int, str] = MappingProxyType({}),
     ) -> None:
-        self.keys, targets = points.keys, points.targets
+        self.points = points
+        self.seeds = seeds
+        self.digests = digests
         self.first = first
-        self._values, self._seeds, self._digests = Rows(points.values), Rows(seeds), Rows(digests)
         self._refused = dict(refused)
-        self.target_names = () if targets is None else targets.names
-        self._targets = Rows(np.empty((len(points.values), 0)) if targets is None else targets.values)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Swept dotted keys."""
+        return self.points.keys
 
     @property
     def values(self) -> NDArray[np.float64]:
         """Values of the keys, shape ``(n_trials, n_keys)``."""
-        return self._values.all
-
-    @property
-    def seeds(self) -> NDArray[np.uint64]:
-        """Seeds, shape ``(n_trials,)``."""
-        return self._seeds.all
-
-    @property
-    def digests(self) -> NDArray[np.uint8]:
-        """Digests, shape ``(n_trials, DIGEST_BYTES)``."""
-        return self._digests.all
-
-    @property
-    def points(self) -> Points:
-        """Values and targets, as they were drawn."""
-        return Points(self.keys, self.values, self.targets)
+        return self.points.values
 
     @property
     def targets(self) -> Targets | None:
         """Places where the trials should end; None if no trial has one."""
-        return Targets(self.target_names, self._targets.all) if self.target_names else None
+        return self.points.targets
+
+    @property
+    def target_names(self) -> tuple[str, ...]:
+        """Columns of targets; empty if no trial has one."""
+        return () if self.targets is None else self.targets.names
 
     @property
     def refused(self) -> Mapping[int, str]:
@@ -148,16 +135,9 @@ class Trials(Sequence[Trial]):
     def __repr__(self) -> str:
         return f"Trials({len(self)} from {self.first}, {len(self._refused)} refused; swept: {', '.join(self.keys)})"
 
-    def extend(self, others: Trials) -> None:
-        """Append trials."""
-        names = (others.keys, others.target_names)
-        if others.first != self.numbers.stop or names != (self.keys, self.target_names):
-            raise ValueError(f"{others} cannot follow {self}")
-        self._values.append(others.values)
-        self._seeds.append(others.seeds)
-        self._digests.append(others.digests)
-        self._targets.append(others._targets.all)
-        self._refused |= others.refused
+    def add_refusal(self, number: int, reason: str) -> None:
+        """Note that a trial is not run after all."""
+        self._refused[number] = reason
 
     def refuse(self, reasons: Sequence[str | None]) -> Trials:
         """Make the same trials with other reasons for refusal, one for each trial in order; None if it is run."""

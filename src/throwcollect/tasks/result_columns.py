@@ -114,7 +114,7 @@ def join_ball(values: Sequence[float]) -> BallState:
 
 @dataclass(frozen=True)
 class SpinColumns(Columns):
-    """An angular velocity of the ball: ``<field>_x_radps`` and so on.
+    """An angular velocity of the ball: ``<field>_x_radps`` and so on. Datasets of earlier versions lack these columns.
 
     Attributes:
         when: The instant, as the end of a sentence.
@@ -126,9 +126,7 @@ class SpinColumns(Columns):
         """List the columns; see `Columns`."""
         return [
             Column(
-                f"{name}_{axis}_radps",
-                "number",
-                f"Angular velocity of the ball in world {self.when}, {axis} [rad/s].",
+                f"{name}_{axis}_radps", "number", f"Angular velocity of the ball in world {self.when}, {axis} [rad/s]."
             )
             for axis in "xyz"
         ]

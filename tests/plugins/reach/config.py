@@ -14,7 +14,7 @@ class UntilReached(UntilConfig):
     """When enough has been collected."""
 
     reached: Wanted
-    """Motions that should reach their end, at least; trials are added to the plan until so many have."""
+    """Number of motions that should reach their end: the last of them is the last trial of the dataset."""
 
 
 class ReachConfig(TaskConfig):

@@ -56,13 +56,6 @@ def test_sweepable_keys_are_those_with_an_effect_on_physics_or_task():
     assert "task.duration_s" in task
 
 
-def test_leaves_of_a_configuration_know_whether_they_have_their_default():
-    changed = Config(task=LEARNED)
-    defaults = {leaf.name: leaf.is_default for leaf in leaves(changed)}
-    assert defaults["controllers.hold"]
-    assert not defaults["task.trajectory.weights.torso_1_joint.1"]
-
-
 def test_keys_that_name_files_or_resources_of_a_machine_are_operator_keys():
     assert list_operator_keys() == ("sweep.file", "run", "containers", "cluster")
 
@@ -79,8 +72,3 @@ def test_operator_keys_are_found_in_sections_of_unions_and_optional_sections():
         maybe: Own | None = None
 
     assert list(values._find_operator_keys(Whole)) == ["part.table", "maybe.table"]
-
-
-def test_only_trials_and_until_can_make_a_plan_grow():
-    grows = Config.model_validate({"until": {"landed": 5}})
-    assert [leaf.name for leaf in leaves(grows) if leaf.key.grows] == ["trials", "until.landed"]

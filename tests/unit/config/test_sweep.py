@@ -90,20 +90,6 @@ def test_a_wrong_target_of_a_sweep_is_reported_with_its_key(problems_of, target,
     ]
 
 
-def test_a_target_needs_the_sampler_sobol_parameters_and_a_number_of_trials(problems_of):
-    target = "target: {distance_m: {min: 1, max: 2, bins: 4}}"
-    assert problems_of(f"trials: 9\nsweep: {{sampler: uniform, {PARAMETERS}, {target}}}") == [
-        "run.yaml:2: sweep.sampler: should be sobol, with which the search for target begins, got uniform"
-    ]
-    assert problems_of(f"trials: 9\nsweep: {{{target}}}") == [
-        "run.yaml:2: sweep.parameters: missing; target should have parameters to reach it with"
-    ]
-    assert problems_of(f"sweep: {{{PARAMETERS}, {target}}}") == [
-        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or (until) how many "
-        "should have landed"
-    ]
-
-
 def test_until_needs_a_positive_number_and_a_sampler_that_can_draw_more(problems_of):
     assert problems_of("until: 5") == ["run.yaml:1: until: should be keys and values, got 5"]
     assert problems_of("until: {landed: 0}") == [
@@ -120,6 +106,5 @@ def test_a_sampler_that_draws_needs_no_number_of_trials_beside_until(tmp_path):
     config = load(path)
     assert config.until is not None
     assert config.until.landed == 5
-    assert config.grows
     path.write_text(dump_yaml(config))
     assert load(path) == config

@@ -42,7 +42,7 @@ def refuse_nothing(_: Config) -> None:
 def test_a_plan_too_large_for_the_disk_is_refused_before_a_trial_is_drawn(
     disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr("throwcollect.coordinator.prepare.draw_first_points")
+    monkeypatch.delattr("throwcollect.coordinator.prepare.draw_points")
     with pytest.raises(
         ConfigError, match=r"a plan of 10000 trials takes 400 kB or more, and 262 kB are free\n  try: free"
     ):
@@ -66,7 +66,7 @@ def test_resuming_with_more_trials_than_the_disk_holds_changes_nothing(
     monkeypatch.setattr("throwcollect.coordinator.prepare.feasibility_check", lambda _: refuse_nothing)
     prepare(config(50), disk / "data", sweep_directory=disk)
     before = {path: path.read_bytes() for path in (disk / "data").iterdir() if path.is_file()}
-    monkeypatch.delattr("throwcollect.coordinator.prepare.draw_first_points")
+    monkeypatch.delattr("throwcollect.coordinator.prepare.draw_points")
     with pytest.raises(
         ConfigError, match=r"a plan of 10000 trials takes 400 kB or more, and \d+ kB are free\n  try: free"
     ):

@@ -37,7 +37,7 @@ def test_a_plan_whose_trials_are_all_refused_is_an_error(monkeypatch: pytest.Mon
 
 
 def test_a_used_directory_is_refused_before_trials_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prepare, "draw_first_points", lambda *_, **__: pytest.fail("points are drawn"))
+    monkeypatch.setattr(prepare, "draw_points", lambda *_, **__: pytest.fail("points are drawn"))
     (tmp_path / "notes.txt").touch()
     for directory, reason in ((tmp_path, "holds notes.txt"), (tmp_path / "notes.txt", "cannot be used")):
         with pytest.raises(ConfigError, match=reason):
@@ -64,7 +64,7 @@ def test_drawing_and_checking_of_a_large_plan_are_announced(monkeypatch: pytest.
     told = Listener()
     config = Config.model_validate({**CONFIG, "trials": 450})
     assert len(prepare.draw_plan(config, directory=Path(), onlooker=told).trials) == 450
-    assert told.said == ["plan: draws 450 trials", "plan: checks 450 trials", "plan: 200 of 450 trials checked"]
+    assert told.said == ["plan: draws 450 trials", "plan: checks 450 trials", "plan: 100 of 450 trials checked"]
     told.said.clear()
     prepare.draw_plan(Config.model_validate({**CONFIG, "trials": 399}), directory=Path(), onlooker=told)
     assert told.said[0].endswith("of 399 trials checked")

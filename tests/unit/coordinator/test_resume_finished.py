@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -12,7 +13,8 @@ from tests.unit.coordinator.listener import Listener
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.damage import find_stored, flip
 
-from throwcollect.coordinator.resume import finish_without_simulating, has_all_trials, resume
+from throwcollect.coordinator.resume import has_all_trials, resume
+from throwcollect.coordinator.salvage import finish_without_simulating
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
@@ -37,7 +39,7 @@ class Trials:
         """Collect the missing trials; returns the trials that were kept."""
         kept: set[int] = set()
         writer = DatasetWriter.open(directory)
-        writer.recover(lambda trial, _: kept.add(trial))
+        writer.recover(lambda trial, _: kept.add(trial) is None)
         for trial in sorted(ALL - kept):
             writer.append(self.episodes[trial], self.results[trial])
         writer.finish(wall_s=1.0)
@@ -191,7 +193,7 @@ def test_finishing_without_simulating_takes_results_from_the_table(
     trials: Trials, dataset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (dataset / SHARD).unlink()
-    monkeypatch.setattr("throwcollect.coordinator.resume.judge_episode", lambda *_: pytest.fail("is judged again"))
+    monkeypatch.setattr("throwcollect.coordinator.salvage.judge_episode", lambda *_: pytest.fail("is judged again"))
     assert trials.finish(dataset).keys() == {2, 3}
 
 
@@ -229,6 +231,24 @@ def test_resume_refuses_a_dataset_whose_configuration_was_changed(trials: Trials
     (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
     before = contents(dataset)
     other = trials.plan.config.model_copy(update={"seed": 1})
-    with pytest.raises(DatasetError, match=r"one of the two was changed, and nothing says which"):
+    with pytest.raises(DatasetError, match="the plan belongs to another configuration"):
         resume(other, dataset, sweep_directory=dataset)
     assert contents(dataset) == before
+
+
+@pytest.mark.parametrize(("name", "lost"), [("plan.parquet", []), ("throws.parquet", []), ("quick_00001.mcap", [3])])
+def test_finishing_without_simulating_ends_a_dataset_with_until_where_it_ended(
+    tmp_path: Path, name: str, lost: list[int]
+) -> None:
+    collection, directory = Collection({"until": {"landed": 4}}), tmp_path / "dataset"
+    create(directory, collection.plan)
+    with closing(DatasetWriter.open(directory)) as writer:
+        collection.fill(writer, range(4))
+        writer.end_with(3)
+        writer.finish()
+    before = contents(directory)
+    (directory / name).unlink()
+    finish_without_simulating(collection.config, directory, sweep_directory=directory)
+    rows = pq.read_table(directory / "throws.parquet").to_pylist()
+    assert [row["outcome"] for row in rows] == ["lost" if number in lost else "landed" for number in range(4)]
+    assert lost or contents(directory) == before

@@ -10,8 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from throwcollect.dataset import journal as journal_module
-from throwcollect.dataset.directory import JOURNAL
-from throwcollect.dataset.journal import Journal, find_lost, measure_collected_s, read_journal, was_open
+from throwcollect.dataset.journal import Journal, measure_collected_s, read_journal, was_open
 from throwcollect.errors import DatasetError
 
 
@@ -76,7 +75,7 @@ DAMAGED = {
 def test_lines_of_the_journal_that_are_not_events_are_left_out(tmp_path: Path, damaged: str) -> None:
     journal_of(tmp_path, line("opened", 1.0), f"{damaged}\n", line("commit", 2.5))
     assert events_of(tmp_path) == ["opened", "commit"]
-    assert (measure_collected_s(tmp_path), find_lost(tmp_path), was_open(tmp_path)) == (1.5, frozenset(), False)
+    assert (measure_collected_s(tmp_path), was_open(tmp_path)) == (1.5, False)
 
 
 def test_the_journal_knows_whether_a_run_was_open_to_others(tmp_path: Path) -> None:
@@ -119,14 +118,3 @@ def test_the_collecting_time_is_the_one_that_the_finished_event_states(tmp_path:
         line("commit", 101.0),
     )
     assert measure_collected_s(tmp_path) == 5.5
-
-
-def test_the_journal_knows_which_trials_were_lost(tmp_path: Path) -> None:
-    assert find_lost(tmp_path) == frozenset()
-    with closing(Journal(tmp_path)) as journal:
-        journal.note("lost", trial=3, reason="died")
-        journal.note("commit", trial=3, outcome="lost")
-        journal.note("fail", trial=4, simulation="lost", reason="lost")
-    with (tmp_path / JOURNAL).open("a") as file:
-        file.write('{"event": "lost", "trial": "x"}\n{"event": "lost", "tri')
-    assert find_lost(tmp_path) == {3}

@@ -47,9 +47,7 @@ def go_on(directory: Path, source: Collection) -> None:
     writer = DatasetWriter.open(directory)
     try:
         there: list[int] = []
-        writer.recover(lambda trial, _: there.append(trial))
-        writer.extend(writer.plan.trials[len(source.plan.trials) :])
-        writer.close_plan()
+        writer.recover(lambda trial, _: there.append(trial) is None)
         source.fill(writer, [trial for trial in range(len(source.plan.trials)) if trial not in there])
         writer.finish(wall_s=1.0)
     finally:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable
 from contextlib import closing, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,9 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
 from throwcollect.side_by_side import work_side_by_side
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.round_file import append_round
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
 from .conftest import Collection
@@ -50,6 +47,11 @@ def whole(directory: Path) -> dict[str, bytes]:
     return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
 
 
+def keep_in(there: dict[int, ThrowResult]) -> Callable[[int, ThrowResult], bool]:
+    """Keep all trials, and note their results."""
+    return lambda trial, result: there.__setitem__(trial, result) is None
+
+
 class Trials:
     """Episodes and results of a collection, made once."""
 
@@ -69,7 +71,7 @@ class Trials:
         there: dict[int, ThrowResult] = {}
         writer = DatasetWriter.open(directory)
         try:
-            count = writer.recover(there.__setitem__)
+            count = writer.recover(keep_in(there))
             assert count == len(there)
             assert all(self.results[trial] == result for trial, result in there.items())
             for trial in order or range(TRIALS):
@@ -142,7 +144,7 @@ def test_recovery_by_several_processes_keeps_the_same_episodes(
 
     monkeypatch.setattr("throwcollect.dataset.recovery.work_side_by_side", ask)
     writer = DatasetWriter.open(directory)
-    assert writer.recover(there.__setitem__, processes=2) == 3
+    assert writer.recover(keep_in(there), processes=2) == 3
     abandon(writer)
     assert asked == [2]
     assert there == {trial: trials.results[trial] for trial in [0, 1, 3]}
@@ -170,7 +172,7 @@ def test_resuming_after_any_crashes_and_power_cuts_gives_the_same_files(
         there: dict[int, ThrowResult] = {}
         order = data.draw(st.permutations(range(TRIALS)), label="order")
         with KilledAt(data.draw(st.integers(0, 80), label="killed at call")):
-            writer.recover(there.__setitem__)
+            writer.recover(keep_in(there))
             for trial in order:
                 if trial not in there:
                     trials.append(writer, trial)
@@ -287,63 +289,6 @@ def test_a_lost_trial_is_run_again_on_resume(trials: Trials, expected: dict[str,
     assert files_of(directory) == expected
 
 
-def test_a_shard_is_not_finished_while_a_growing_plan_may_add_trials_to_it(
-    trials: Trials, expected: dict[str, bytes], tmp_path: Path
-) -> None:
-    directory = tmp_path / "dataset"
-    first = replace(trials.plan, trials=trials.plan.trials[:3])
-    create(directory, first)
-    writer = DatasetWriter(directory, first, growing=True)
-    for trial in (2, 0, 1):
-        trials.append(writer, trial)
-    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap", "quick_00001.mcap.part"]
-    writer.extend(trials.plan.trials[3:])
-    assert Plan.read(directory / "plan.parquet", trials.plan.config) == trials.plan
-    writer.close_plan()
-    with pytest.raises(DatasetError, match="lacks 1 trial, such as 3"):
-        writer.finish(wall_s=1.0)
-    trials.append(writer, 3)
-    writer.finish(wall_s=1.0)
-    assert files_of(directory) == expected
-
-
-def test_a_kill_while_a_plan_grows_leaves_no_extra_files(trials: Trials, tmp_path: Path) -> None:
-    first = replace(trials.plan, trials=trials.plan.trials[:1])
-    call, died = 0, True
-    while died:
-        directory = tmp_path / str(call)
-        create(directory, first)
-        begun = DatasetWriter(directory, first, growing=True)
-        with KilledAt(call) as killed:
-            begun.extend(trials.plan.trials[1:2])
-        abandon(begun)
-        with closing(DatasetWriter.open(directory)) as writer:
-            assert len(writer.plan.trials) in (1, 2)
-            writer.recover()
-        assert {path.name for path in directory.iterdir()} == {"config.yaml", "plan.parquet", "logs"}
-        call, died = call + 1, killed.died
-    assert call > 2
-
-
-def test_a_kill_while_rounds_are_joined_into_the_plan_loses_no_round(trials: Trials, tmp_path: Path) -> None:
-    call, died = 0, True
-    while died:
-        directory = tmp_path / str(call)
-        create(directory, replace(trials.plan, trials=trials.plan.trials[:1]))
-        append_round(directory / "plan.parquet", trials.plan.trials[1:2])
-        append_round(directory / "plan.parquet", trials.plan.trials[2:])
-        with KilledAt(call) as killed:
-            Plan.read(directory / "plan.parquet", trials.plan.config).take_in_rounds(directory / "plan.parquet")
-        assert Plan.read(directory / "plan.parquet", trials.plan.config) == trials.plan
-        with closing(DatasetWriter.open(directory)) as writer:
-            assert writer.plan == trials.plan
-            writer.recover()
-        assert {path.name for path in directory.iterdir()} == {"config.yaml", "plan.parquet", "logs"}
-        assert (directory / "plan.parquet").read_bytes() == trials.plan.encode()
-        call, died = call + 1, killed.died
-    assert call > 4
-
-
 def test_recovery_removes_half_written_files(trials: Trials, tmp_path: Path) -> None:
     create(tmp_path / "dataset", trials.plan)
     for name in ("plan.parquet.new", "config.yaml.new", "datapackage.json.new"):
@@ -351,18 +296,6 @@ def test_recovery_removes_half_written_files(trials: Trials, tmp_path: Path) -> 
     with closing(DatasetWriter.open(tmp_path / "dataset")) as writer:
         writer.recover()
     assert {path.name for path in (tmp_path / "dataset").iterdir()} == {"config.yaml", "plan.parquet", "logs"}
-
-
-def test_closing_a_growing_plan_finishes_complete_shards(trials: Trials, tmp_path: Path) -> None:
-    directory = tmp_path / "dataset"
-    first = replace(trials.plan, trials=trials.plan.trials[:1])
-    create(directory, first)
-    writer = DatasetWriter(directory, first, growing=True)
-    trials.append(writer, 0)
-    assert not (directory / "quick_00000.mcap").exists()
-    writer.close_plan()
-    writer.finish(wall_s=1.0)
-    assert list(map(str, verify(directory))) == ["plan.parquet: has 1 trial, the configuration draws 4"]
 
 
 def test_two_processes_cannot_collect_into_one_directory(

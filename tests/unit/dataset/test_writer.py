@@ -167,7 +167,7 @@ def test_a_dataset_cannot_be_created_below_a_file(collection: Any, tmp_path: Pat
 def test_a_dataset_cannot_be_created_at_a_link_that_leads_nowhere(collection: Any, tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to("nowhere")
-    with pytest.raises(ConfigError, match=r"link: cannot be used as .*: it is a link to nowhere, which is not there"):
+    with pytest.raises(ConfigError, match="link: cannot be used as directory of a dataset"):
         create(link, collection.plan)
     assert list(tmp_path.iterdir()) == [link]
 
@@ -227,7 +227,7 @@ def test_a_shard_that_cannot_be_finished_on_a_full_disk_keeps_all_its_episodes_f
     writer.close()
     found: list[int] = []
     with closing(DatasetWriter.open(directory)) as successor:
-        assert successor.recover(lambda trial, _: found.append(trial)) == 3
+        assert successor.recover(lambda trial, _: found.append(trial) is None) == 3
     assert found == [0, 1, 2]
     assert (directory / "quick_00000.mcap").read_bytes() == (collected / "quick_00000.mcap").read_bytes()
 

@@ -117,11 +117,12 @@ def test_merged_datasets_of_different_plans_follow_each_other_with_the_bytes_of_
         *ours.throws["digest"].to_pylist(),
         *theirs.throws["digest"].to_pylist(),
     ]
-    for number, (throw, source) in enumerate(zip(merged, [*ours, *theirs], strict=True)):
+    origins = [(source, throw) for source in (ours, theirs) for throw in source]
+    for number, (throw, (dataset, source)) in enumerate(zip(merged, origins, strict=True)):
         assert throw.trial == number
         assert np.array_equal(throw.ball.position, source.ball.position)
         assert throw.events.release.time_s == source.events.release.time_s
-        assert merged.episode(number).chunk == source.read_episode().chunk
+        assert merged.episode(number).chunk == dataset.episode(source.trial).chunk
     one, two = ours.trajectories(), theirs.trajectories()
     both = merged.trajectories()
     assert np.array_equal(both["time_s"], np.concatenate([one["time_s"], two["time_s"]]))

@@ -6,13 +6,14 @@ from pathlib import Path
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.sweep.plan import Check, Plan, check_some_left, draw_first_points, make_trials, refusal
+from throwcollect.sweep.plan import Check, Plan, check_some_left, make_trials, refusal
+from throwcollect.sweep.samplers import draw_points
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
-    """Draw all trials of a sweep; for a plan that grows, its first two rounds. `draw_plan` asks the robot, too."""
-    trials = make_trials(config, draw_first_points(config, directory=directory or Path()))
+    """Draw all trials of a sweep; `draw_plan` asks the robot, too."""
+    trials = make_trials(config, draw_points(config, directory=directory or Path()))
     if check is not None:
         trials = trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
-    check_some_left(trials)
+    check_some_left([trial.refused for trial in trials])
     return Plan(config, trials)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from tests.unit.sweep.columns import in_columns
 
-from throwcollect.sweep.rows import Rows
 from throwcollect.sweep.trials import Trial, Trials
 
 LISTED = [
@@ -46,29 +44,5 @@ def test_trials_in_columns_are_equal_only_if_all_their_fields_are(changed: dict[
     )
 
 
-def test_appending_trials_does_not_change_parts_taken_before() -> None:
-    grown = trials()[:2]
-    before, values = grown[:], grown.values
-    for index in range(2, 5):
-        grown.extend(trials()[index : index + 1])
-    assert grown == trials()
-    assert list(before) == LISTED[:2]
-    before.extend(trials()[2:3].refuse(["too slow"]))
-    assert grown == trials()
-    assert values.tolist() == [list(trial.values.values()) for trial in LISTED[:2]]
-    with pytest.raises(ValueError, match="cannot follow"):
-        grown.extend(trials()[3:])
-
-
 def test_refuse_replaces_earlier_reasons() -> None:
     assert trials().refuse(["a", None, None, "b", None]).refused == {0: "a", 3: "b"}
-
-
-def test_appended_rows_are_seldom_copied() -> None:
-    rows = Rows(np.zeros((1, 2)))
-    places = set()
-    for number in range(1000):
-        rows.append(np.full((1, 2), number))
-        places.add(rows.all.__array_interface__["data"][0])
-    assert rows.all[1:, 1].tolist() == list(range(1000))
-    assert len(places) < 15

@@ -18,7 +18,7 @@ class UntilLanded(UntilConfig):
     """When enough has been collected."""
 
     landed: Wanted
-    """Throws that should land, at least; trials are added to the plan until so many have."""
+    """Number of throws that should land: the last of them is the last trial of the dataset."""
 
 
 class ThrowConfig(TaskConfig):

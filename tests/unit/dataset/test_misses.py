@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from throwcollect.dataset.miss_quantiles import find_median, find_share90
+from throwcollect.dataset.misses import find_median, find_share90
 
 
 def test_the_median_of_an_even_number_of_misses_is_the_mean_of_the_middle_two() -> None:
