@@ -354,8 +354,8 @@ def _prepare_for(values: Mapping[str, Any]) -> None:
     This is the parsed text of the configuration, the digest of the build, the types and layouts of messages, a model of
     the robot and, if the physics engine allows it, the world. The task is only imported.
     """
+    from throwcollect.config.document import compose
     from throwcollect.config.loader import dump_yaml
-    from throwcollect.config.yaml_nodes import compose
     from throwcollect.episode.channels import Channels
     from throwcollect.robots.description import full_description
     from throwcollect.robots.tool_motion import ToolMotion
