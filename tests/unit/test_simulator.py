@@ -122,7 +122,7 @@ def test_throws_before_a_refused_point_are_returned(simulator: Simulator) -> Non
     ("point", "message"),
     [
         (REFUSED, r"points\[1\]: .*" + TOO_FAST + r".* \(task\.duration_s=0\.2\)"),
-        ({"ball.mass_kg": -1.0}, r"points\[1\]\.ball\.mass_kg: should be a number above 0"),
+        ({"ball.mass_kg": -1.0}, r"points\[1\]\.ball\.mass_kg: should be greater than 0"),
         (3, r"points\[1\]: got 3\n  expected: a mapping, such as {'task\.duration_s': 1\.1}"),
     ],
 )
@@ -140,7 +140,7 @@ def test_a_wrong_point_of_many_is_named_by_its_index(
     [
         ({"task.duration": 1.0}, "task.duration: unknown key; did you mean 'task.duration_s'"),
         ({"record.rate_hz": 100.0}, "record.rate_hz: cannot vary from trial to trial"),
-        ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be a number above 0"),
+        ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be greater than 0"),
     ],
 )
 def test_a_wrong_key_or_value_is_an_error_that_names_the_key(

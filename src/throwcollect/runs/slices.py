@@ -16,7 +16,7 @@ from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import PLAN, config_path
-from throwcollect.dataset.slice_directory import (
+from throwcollect.dataset.slices import (
     find_attempts,
     find_finished,
     make_attempt,

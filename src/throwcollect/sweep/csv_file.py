@@ -11,10 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.shape import unit_of_key
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import recognise, suggest_path
-from throwcollect.units import DECIMALS, explain_number
 from throwcollect.wording import format_count
 
 MOST_PROBLEMS = 20
@@ -102,29 +100,15 @@ def _read_row(
 ) -> tuple[list[float], dict[str, str]]:
     """Read the numbers of a row, NaN where a cell may be empty and is, and say what is wrong with it, by column."""
     if len(cells) != len(header):
-        return [], {"": _explain_count(cells, len(header))}
+        return [], {"": f"should have {format_count(len(header), 'value')}, got {len(cells)}"}
     row = dict(zip(header, cells, strict=True))
     numbers = [_read_number(row[name]) for name in names]
     wrong = {}
     for name, number in zip(names, numbers, strict=True):
         if not math.isfinite(number) and not (may_be_empty(name) and not row[name].strip()):
             expected = "a number, or empty for no target" if may_be_empty(name) else "a number"
-            hint = explain_number(row[name], unit_of_key(name))
-            wrong[name] = f"should be {expected}, got {row[name].strip()!r}{hint}"
+            wrong[name] = f"should be {expected}, got {row[name].strip()!r}"
     return numbers, wrong
-
-
-def _explain_count(cells: Sequence[str], columns: int) -> str:
-    """Say that a row has more or fewer values than there are columns."""
-    sentence = f"should have {format_count(columns, 'value')}, got {len(cells)}"
-    if len(cells) < columns:
-        numbers = re.split(r"[;\s]+", " ".join(cells).strip())
-        is_row = len(numbers) == columns and all(map(_is_number, numbers))
-        return f"{sentence}; values are separated by commas" if is_row else sentence
-    if not "".join(cells[columns:]).strip():
-        return f"{sentence}; the line should not end with a comma"
-    # A decimal comma divides a number into two cells, neither of which has a point.
-    return sentence if any("." in cell for cell in cells) else f"{sentence}; if a comma belongs to a number, {DECIMALS}"
 
 
 def _is_number(text: str) -> bool:

@@ -90,41 +90,25 @@ def test_the_row_numbers_of_pandas_are_not_taken_for_a_key(tmp_path):
             [
                 "list.csv:2: should have 2 values, got 1",
                 "list.csv:3: should have 2 values, got 3",
-                "list.csv:4: should have 2 values, got 1; values are separated by commas",
-                "list.csv:5: should have 2 values, got 3; the line should not end with a comma",
-            ],
-        ),
-        (
-            "task.end.arm_right_4_joint,task.duration_s\n-28°,1 s\n",
-            [
-                "list.csv:2: task.end.arm_right_4_joint: should be a number, got '-28°'; "
-                "angles are in radians: -28 degrees are -0.4887",
-                "list.csv:2: task.duration_s: should be a number, got '1 s'; write the number alone, in s",
-            ],
-        ),
-        (
-            "task.duration_s\n1\n1,2\n1.2,3\n",
-            [
-                "list.csv:3: should have 1 value, got 2; if a comma belongs to a number, decimals are written with a "
-                "point, as in 1.5",
-                "list.csv:4: should have 1 value, got 2",
+                "list.csv:4: should have 2 values, got 1",
+                "list.csv:5: should have 2 values, got 3",
             ],
         ),
         (
             HEADER + "0.1,1\n\n3,1\n0.1,0\n-1,1\n",
             [
-                "list.csv:4: ball.mass_kg: should be a number above 0 and up to 2 kg, got 3.0",
-                "list.csv:5: task.duration_s: should be a number from 0.1 to 10 s, got 0.0",
-                "list.csv:6: ball.mass_kg: should be a number above 0 and up to 2 kg, got -1.0",
+                "list.csv:4: ball.mass_kg: should be less than or equal to 2, got 3.0",
+                "list.csv:5: task.duration_s: should be greater than or equal to 0.1, got 0.0",
+                "list.csv:6: ball.mass_kg: should be greater than 0, got -1.0",
             ],
         ),
         (
             HEADER + "3,1\n0.1,x\n0.1\n0.1,0\n0.1,1\n",
             [
-                "list.csv:2: ball.mass_kg: should be a number above 0 and up to 2 kg, got 3.0",
+                "list.csv:2: ball.mass_kg: should be less than or equal to 2, got 3.0",
                 "list.csv:3: task.duration_s: should be a number, got 'x'",
                 "list.csv:4: should have 2 values, got 1",
-                "list.csv:5: task.duration_s: should be a number from 0.1 to 10 s, got 0.0",
+                "list.csv:5: task.duration_s: should be greater than or equal to 0.1, got 0.0",
             ],
         ),
     ],
@@ -152,7 +136,7 @@ def test_problems_of_a_long_file_are_not_listed_in_full(csv):
             [
                 "list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls",
                 "list.parquet: ball.friction: should be a column of numbers, got string",
-                "list.parquet: task.duration_s: row 3: should be a number from 0.1 to 10 s, got nan",
+                "list.parquet: task.duration_s: row 3: should be a finite number, got nan",
             ],
         ),
         (
@@ -164,8 +148,8 @@ def test_problems_of_a_long_file_are_not_listed_in_full(csv):
         (
             {"ball.mass_kg": [0.1, float("nan"), 9.0]},
             [
-                "list.parquet: ball.mass_kg: row 2: should be a number above 0 and up to 2 kg, got nan",
-                "list.parquet: ball.mass_kg: row 3: should be a number above 0 and up to 2 kg, got 9.0",
+                "list.parquet: ball.mass_kg: row 2: should be a finite number, got nan",
+                "list.parquet: ball.mass_kg: row 3: should be less than or equal to 2, got 9.0",
             ],
         ),
     ],
