@@ -123,9 +123,9 @@ def _collect(each: Round, processes: int, onlooker: Onlooker, interruptions: Cal
     if is_complete(each.directory):
         return
     if is_begun(each.directory):
-        run = resume(each.directory, processes=processes, ahead=True, onlooker=onlooker)
+        run = resume(each.directory, processes=processes, onlooker=onlooker)
     else:
-        run = prepare(each.config, output=each.directory, processes=processes, ahead=True, onlooker=onlooker)
+        run = prepare(each.config, output=each.directory, processes=processes, onlooker=onlooker)
     if run is not None:
         with run:
             run.collect(interruptions=interruptions)
