@@ -6,7 +6,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.arguments import read_path, refuse_argument
+from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.directory import CARD, CONFIG, TRIALS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
@@ -52,7 +52,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
         raise refuse_argument("to", f"unknown format {to!r}{suggest(to, formats)}")
     chosen: Exporter = load_member("exporters", to)
     require(*chosen.packages, extra="export")
-    directory, output = read_path("directory", directory), read_path("output", output)
+    directory, output = Path(directory), Path(output)
     source = ExportSource.open(directory, rate_hz=rate_hz)
     with new_directory(output) as beside:
         with explain_failure("exporters", to, f"write {output}", passing=(OSError,)):
