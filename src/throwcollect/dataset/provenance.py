@@ -63,7 +63,7 @@ class Provenance:
         revision: Git revision of the sources that ran, with ``-dirty`` behind it if they were changed; None if they lie
             in no clone.
         image: Id of the image that ran; None without one.
-        robot_sha256: SHA-256 of the robot's description; None if not known, as in datasets of earlier versions.
+        robot_sha256: SHA-256 of the robot's description; None if not known.
     """
 
     finished: datetime
@@ -122,7 +122,7 @@ def write_provenance(directory: Path, provenance: Provenance) -> None:
 
 
 def read_provenance(directory: Path) -> Provenance | None:
-    """Read how a dataset was collected; None if the file is damaged, or missing as in datasets of earlier versions."""
+    """Read how a dataset was collected; None if the file is damaged or missing."""
     with suppress(DatasetError):
         return load_provenance(directory / PROVENANCE)
     return None

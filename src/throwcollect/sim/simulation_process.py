@@ -7,32 +7,11 @@ from pathlib import Path
 
 from throwcollect import ros
 from throwcollect.config.loader import load
-from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
-from throwcollect.members import load_member
 from throwcollect.ros.self_check import begin_to_serve
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.simulation_node import SimulationNode
-
-_made: list[Simulation] = []
-"""The simulation that `make_ahead` has made, until `run` takes it."""
-
-
-def make_ahead(config: Config) -> None:
-    """Make a simulation, if its engine can be forked; processes that are forked off this one then `run` it."""
-    if load_member("engines", config.sim.engine).can_be_forked:
-        _made.append(Simulation(config))
-
-
-def _take(config: Config) -> Simulation:
-    """Take the simulation that was made ahead if it has this configuration, or else make one."""
-    while _made:
-        simulation = _made.pop()
-        if simulation.config == config:
-            return simulation
-        simulation.world.close()
-    return Simulation(config)
 
 
 def run(config: Path, *, name: str, namespace: str | None = None) -> None:
@@ -45,7 +24,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
         name: Name of the node.
         namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
     """
-    simulation = _take(load(config))
+    simulation = Simulation(load(config))
     if namespace is None and simulation.config.run.root_namespace:
         namespace = "/"
     ros.init()
