@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import check_whole_number, read_list, read_path
+from throwcollect.arguments import check_bounds
 from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
@@ -82,7 +82,7 @@ class Dataset(Sequence[Throw]):
             DatasetError: If the directory holds no dataset, an unfinished one, or one whose tables are damaged.
             ConfigError: If its ``config.yaml`` is wrong.
         """
-        path = read_path("directory", directory)
+        path = Path(directory)
         try:
             bag = read_bag_metadata(path)
             if (found := _find_custom(bag, "throwcollect.format")) != FORMAT:
@@ -291,13 +291,13 @@ class Dataset(Sequence[Throw]):
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
         if threads is not None:
-            check_whole_number("threads", threads, least=1)
+            check_bounds("threads", threads, least=1)
         trials, known = self.throws["trial"].to_pylist(), self.joints
-        chosen = known if joints is None else read_list("joints", joints, "names")
+        chosen = known if joints is None else tuple(joints)
         for joint in chosen:
             if joint not in known:
                 raise ConfigError(unknown_joint(joint, robot_of(self.config)))
-        wanted = read_list("columns", columns, "names")
+        wanted = tuple(columns)
         return read_trajectories(trials, self._stored, wanted, chosen, threads=threads)
 
     @property
@@ -339,7 +339,7 @@ def load(directory: StrPath) -> Dataset:
     Warns:
         UnfinishedDatasetWarning: If it is not finished.
     """
-    path = read_path("directory", directory)
+    path = Path(directory)
     # If the directory is no dataset at all, `open` says what is wrong.
     if is_there(path / METADATA) or not is_there(path / PLAN):
         return Dataset.open(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import dataclass
 
-from throwcollect.arguments import read_path, refuse_argument
+from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.directory import CARD, CONFIG, TRIALS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
@@ -51,7 +51,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
         raise refuse_argument("to", f"unknown format {to!r}{suggest(to, formats)}")
     chosen: Exporter = load_member("exporters", to)
     require(*chosen.packages, extra="export")
-    directory, output = read_path("directory", directory), read_path("output", output)
+    directory, output = Path(directory), Path(output)
     source = ExportSource.open(directory, rate_hz=rate_hz)
     with new_directory(output) as beside:
         with explain_failure("exporters", to, f"write {output}", passing=(OSError,)):

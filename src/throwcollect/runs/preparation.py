@@ -10,7 +10,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.arguments import check_whole_number, read_path
+from throwcollect.arguments import check_bounds
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
@@ -76,9 +76,9 @@ def prepare(
             main program, as processes of `multiprocessing` do.
         onlooker: Is told what goes on.
     """
-    check_whole_number("processes", processes, least=1)
+    check_bounds("processes", processes, least=1)
     started = datetime.now(timezone.utc)
-    file, named = read_path("config", config), None if output is None else read_path("output", output)
+    file, named = Path(config), None if output is None else Path(output)
     with load_locating_errors(file, overrides) as read:
         directory = named or _name_directory(read.name)
         records = Records()
@@ -121,8 +121,8 @@ def resume(
         The run; None if every trial has ended, so that nothing is left to do, or if nothing should be simulated.
     """
     started = datetime.now(timezone.utc)
-    directory = read_path("directory", directory)
-    file = None if config is None else read_path("config", config)
+    directory = Path(directory)
+    file = None if config is None else Path(config)
     with reading_config(directory, file, overrides) as read:
         sweep_directory = directory if file is None else file.parent
         if not simulate:

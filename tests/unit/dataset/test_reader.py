@@ -225,14 +225,6 @@ def test_a_dataset_of_another_format_is_refused(dataset: Path) -> None:
         Dataset.open(dataset)
 
 
-def test_a_text_in_place_of_a_list_of_names_is_refused(loaded: Dataset) -> None:
-    with pytest.raises(ConfigError, match=r"^columns: 'ball_position' is a text") as caught:
-        loaded.trajectories("ball_position")
-    assert caught.value.expected == "a list of names: ['ball_position']"
-    with pytest.raises(ConfigError, match=r"^joints: 'arm_right_4_joint' is a text"):
-        loaded.trajectories(["joints_position"], joints="arm_right_4_joint")
-
-
 def test_an_episode_is_read_back_as_it_was_written(collection: Any, dataset: Path) -> None:
     loaded = Dataset.open(dataset)
     for trial in (5, 0, 6):

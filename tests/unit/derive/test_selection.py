@@ -236,10 +236,7 @@ def test_filtering_an_episode_that_differs_from_its_digest_in_the_table_is_refus
         filter_trials(dataset, tmp_path / "some", where="trial == 0")
 
 
-def test_merge_refuses_a_single_path_and_an_empty_list(collected: Path, tmp_path: Path) -> None:
-    for one, kind in ((str(collected), "a text"), (collected, "no list")):
-        with pytest.raises(ConfigError, match=f"^directories: .* is {kind}\n  expected: a list of directories"):
-            merge(one, tmp_path / "new")
+def test_merge_refuses_an_empty_list(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^directories: got none\n  expected: at least one dataset"):
         merge([], tmp_path / "new")
     assert list(tmp_path.iterdir()) == []
@@ -248,7 +245,7 @@ def test_merge_refuses_a_single_path_and_an_empty_list(collected: Path, tmp_path
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda *paths: sample(*paths, count="2"), "count: should be from 1 to 7, .*, got '2'"),
+        (lambda *paths: sample(*paths, count=8), "count: should be from 1 to 7, .*, got 8"),
         (lambda *paths: sample(*paths, count=2, seed=-1), "seed: got -1\n  expected: 0 or more"),
     ],
 )

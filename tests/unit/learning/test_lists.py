@@ -30,7 +30,7 @@ def test_a_list_may_have_its_columns_in_any_order_among_others(table: Path) -> N
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"{HEADER}\n1,0\n1,63,-0,29\n", f":3: should have 2 values, got 4; {POINTS}"),
+        (f"{HEADER}\n1,0\n1,63,-0,29\n", ":3: should have 2 values, got 4"),
         (f"{HEADER}\n1.63,-0.29,0.3\n", ":2: should have 2 values, got 3"),
         (f"{HEADER},note\n1.63,-0.29\n", ":2: should have 3 values, got 2"),
         (f"{HEADER.replace(',', ';')}\n1;0\n", f":1: {FIRST_LINE} semicolons"),
