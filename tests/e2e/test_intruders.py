@@ -74,8 +74,9 @@ POSE = f"""
 import os, sys
 import concurrent.futures.process, concurrent.futures.thread, email.parser, mmap, multiprocessing.pool
 import pinocchio, pyarrow.parquet, scipy.stats
-import throwcollect.coordinator.coordinator_process, throwcollect.coordinator.resume, throwcollect.dataset.reader
-import throwcollect.cli.node_commands, throwcollect.engines.bullet.bullet_engine, throwcollect.sim.simulation_process
+import throwcollect.ros.nodes.coordinator.process, throwcollect.coordinator.resume, throwcollect.dataset.reader
+import throwcollect.cli.node_commands, throwcollect.engines.bullet.bullet_engine
+import throwcollect.ros.nodes.simulation.process
 from throwcollect.cli.main import main
 from rclzenoh import context
 context._PATIENCE_S = 0.5
