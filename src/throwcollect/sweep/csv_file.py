@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.shape import unit_of_key
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import recognise, suggest_path
-from throwcollect.units import explain_number
 from throwcollect.wording import format_count
 
 MOST_PROBLEMS = 20
@@ -58,10 +56,7 @@ def read_csv(
                 numbers = {name: _read_number(row[name]) for name in names}
                 for name, number in numbers.items():
                     if not math.isfinite(number) and not (may_be_empty(name) and not row[name]):
-                        sentence = (
-                            f"should be a number, got {row[name]!r}{explain_number(row[name], unit_of_key(name))}"
-                        )
-                        problems.append(Problem(sentence, name, path, line))
+                        problems.append(Problem(f"should be a number, got {row[name]!r}", name, path, line))
                 rows.append(list(numbers.values()))
                 lines.append(line)
                 if len(problems) >= MOST_PROBLEMS:

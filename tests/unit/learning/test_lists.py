@@ -11,7 +11,6 @@ TARGETS = ("landing_x_m", "landing_y_m")
 HEADER = "landing_x_m,landing_y_m"
 
 
-
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
     return tmp_path / "table.csv"
@@ -28,10 +27,6 @@ def test_a_list_may_have_its_columns_in_any_order_among_others(table: Path) -> N
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-<<<<<<< HEAD
-        (f"{HEADER}\n1,0\n1,63,-0,29\n", ":3: should have 2 values, got 4"),
-=======
->>>>>>> plans
         (f"{HEADER}\n1.63,-0.29,0.3\n", ":2: should have 2 values, got 3"),
         (f"{HEADER},note\n1.63,-0.29\n", ":2: should have 3 values, got 2"),
         ("x,y\n1,0\n", ":1: no column landing_x_m and landing_y_m"),
