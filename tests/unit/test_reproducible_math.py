@@ -13,7 +13,6 @@ import pytest
 from numpy.typing import NDArray
 from tests import processors
 from tests.unit.sweep.own_plan import make_plan
-from tests.unit.sweep.thrower import collect, configuration
 
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame
@@ -46,7 +45,6 @@ def compute() -> Iterator[str]:
             sent = (trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
             yield show("sent", *sent)
             yield show("desired", *sample_quintic(trajectory, np.linspace(0, 2, 500)))
-    yield show("grown", *([*trial.values.values()] for trial in collect(configuration(trials=384))))
     frame = MovingFrame("a", "b", (0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), "j", (0.36, 0.48, 0.8))
     yield show("frame", frame.rotation_at(np.linspace(-7, 7, 5000)))
 
