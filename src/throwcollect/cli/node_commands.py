@@ -48,8 +48,8 @@ def sim(
     """Run one simulation."""
     from socket import gethostname
 
+    from throwcollect.ros.nodes.simulation.process import run
     from throwcollect.runtimes.nodes import simulation_name_of
-    from throwcollect.sim.simulation_process import run
 
     run(config, name=name or simulation_name_of(gethostname()), namespace=namespace)
 
@@ -62,7 +62,7 @@ def coordinator(
     ] = None,
 ) -> None:
     """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
-    from throwcollect.coordinator.coordinator_process import run
+    from throwcollect.ros.nodes.coordinator.process import run
 
     if config is None:
         run(directory)

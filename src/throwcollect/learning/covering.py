@@ -29,7 +29,9 @@ into the same cell differ more; with more, a cell is found to be in reach more o
 _NEIGHBOURS = 8
 """Number of trials near a throw that show whether it is likely to fail."""
 _RISK = 0.5
-"""Largest share of these that may have failed."""
+"""Largest share of these that may have failed, ..."""
+_RISKY = 2
+"""... but for so many throws at each cell in a round."""
 _GROWTH = 3
 """Most throws that a cell may have at the end of a round, in multiples of those that have landed in it before."""
 _PATIENCE = 20
@@ -204,9 +206,11 @@ def _aim(
         starts = randomness.permutation(len(learned.values))[:_STARTS]
         aims = aim(_start_from(learned, starts), goals, learned.scale(KeyRole.CONTEXT, context))
         values = np.hstack([learned.unscale(KeyRole.PARAMETER, aims.parameters), context])
-        hits = (grid.find_cells(aims.predicted) == cells) & tried.find_promising(values)
-        for cell, hit, row in zip(cells.tolist(), hits.tolist(), values, strict=True):
-            # The first throw at an empty cell goes as near to it as it can, so that the edge of the region moves on.
+        predicted, safe = grid.find_cells(aims.predicted) == cells, tried.find_promising(values)
+        for cell, inside, sure, row in zip(cells.tolist(), predicted.tolist(), safe.tolist(), values, strict=True):
+            # At the edge of what is in reach, many throws have failed; some risk shows where the edge is.
+            hit = inside and (sure or planned[cell] < landed[cell] + _RISKY)
+            # The first throw at an empty cell goes as near to it as it can, so that the edge moves on.
             if hit or not (planned[cell] or missed[cell]):
                 found.append(row)
             planned[cell] += hit

@@ -5,9 +5,9 @@ from __future__ import annotations
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.ros import Node
 from throwcollect.ros.msg import SimulatorFeatures as Features
+from throwcollect.ros.nodes.simulation.answers import offer
+from throwcollect.ros.nodes.simulation.entities import EntityServices
 from throwcollect.ros.srv import GetSimulationState, GetSimulatorFeatures, ResetSimulation, SetSimulationState
-from throwcollect.sim.entity_services import EntityServices
-from throwcollect.sim.service_results import offer
 from throwcollect.sim.simulation import Scope, Simulation, StateCode
 from throwcollect.version import __version__
 

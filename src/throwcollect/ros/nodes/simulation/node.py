@@ -29,16 +29,15 @@ from throwcollect.ros import (
     graph_changes,
 )
 from throwcollect.ros.msg import SetParametersResult, String, UInt8MultiArray
+from throwcollect.ros.nodes import descriptors
+from throwcollect.ros.nodes.controller.node import ControllerManager, ControllerNode
+from throwcollect.ros.nodes.own_time import make_own_time
+from throwcollect.ros.nodes.simulation.control import SimulationControl
+from throwcollect.ros.nodes.simulation.leases import LeaseQueue
+from throwcollect.ros.nodes.simulation.stepping import Stepping
 from throwcollect.run_key import Signer
-from throwcollect.sim import descriptors
-from throwcollect.sim.controller_manager import ControllerManager
-from throwcollect.sim.controller_node import ControllerNode
-from throwcollect.sim.lease_queue import LeaseQueue
-from throwcollect.sim.own_time import make_own_time
 from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.sim.simulation import Simulation, StateCode
-from throwcollect.sim.simulation_control import SimulationControl
-from throwcollect.sim.stepping import Stepping
 from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.trial.lease import LEASES, Lease, leases_from_json
 from throwcollect.units import NS_PER_S

@@ -11,12 +11,12 @@ from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect import ros
 from throwcollect.config.loader import load
-from throwcollect.coordinator import coordinator_node as coordinator_node
 from throwcollect.coordinator.collection import TrialCollection
-from throwcollect.coordinator.coordinator_node import Coordinator
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.ros import get_message
+from throwcollect.ros.nodes.coordinator import node as coordinator_node
+from throwcollect.ros.nodes.coordinator.node import Coordinator
 from throwcollect.ros.router import router
 from throwcollect.trial.lease import LEASES
 

@@ -9,7 +9,7 @@ from typing import Any
 from throwcollect.control import ControllerState, GoalResult, GoalStatus
 from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node
 from throwcollect.ros.action import FollowJointTrajectory
-from throwcollect.sim.controller_messages import feedback_message, read_goal
+from throwcollect.ros.nodes.controller.messages import feedback_message, read_goal
 from throwcollect.sim.simulation import Simulation
 
 _RESULT_TIMEOUT_S = 10

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from throwcollect import ros
 from throwcollect.coordinator.collection import TrialCollection
-from throwcollect.coordinator.coordinator_node import Coordinator
 from throwcollect.errors import WorkerError
 from throwcollect.heartbeat import Heartbeat
+from throwcollect.ros.nodes.coordinator.node import Coordinator
 from throwcollect.ros.self_check import begin_to_serve
 from throwcollect.side_by_side import count_cores
 

@@ -8,8 +8,8 @@ from throwcollect.errors import RequestError
 from throwcollect.ros import ActionServer, CancelResponse, Future, Node
 from throwcollect.ros.action import SimulateSteps
 from throwcollect.ros.msg import Result
+from throwcollect.ros.nodes.simulation.answers import refusal
 from throwcollect.ros.srv import StepSimulation
-from throwcollect.sim.service_results import refusal
 from throwcollect.sim.simulation import Simulation, StepRequest
 
 _ACTION = "simulate_steps"

@@ -9,9 +9,9 @@ from tests.integration.robot import ARM, goal, stamp_ns
 from rclzenoh.interfaces import deserialize, serialize
 from throwcollect.config.schema import Config
 from throwcollect.ros import GoalResponse
-from throwcollect.sim import controller_action
-from throwcollect.sim.controller_action import ControllerAction
-from throwcollect.sim.controller_messages import feedback_message, read_goal, read_trajectory
+from throwcollect.ros.nodes.controller import action as controller_action
+from throwcollect.ros.nodes.controller.action import ControllerAction
+from throwcollect.ros.nodes.controller.messages import feedback_message, read_goal, read_trajectory
 from throwcollect.sim.simulation import Simulation
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from throwcollect.control import ControllerParameters
 from throwcollect.errors import ConfigError
 from throwcollect.ros import Node, Parameter, ParameterDescriptor, SetParametersResult
-from throwcollect.sim.descriptors import floating_range
+from throwcollect.ros.nodes.descriptors import floating_range
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import PresentTrial
 

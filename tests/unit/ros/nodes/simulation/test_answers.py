@@ -8,8 +8,8 @@ import pytest
 
 from throwcollect.errors import ConfigError, MemberError, RequestError
 from throwcollect.ros.msg import Result
+from throwcollect.ros.nodes.simulation.answers import offer
 from throwcollect.ros.srv import ResetSimulation
-from throwcollect.sim.service_results import offer
 
 
 class NodeOfOneService:

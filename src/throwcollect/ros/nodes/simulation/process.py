@@ -9,9 +9,9 @@ from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
+from throwcollect.ros.nodes.simulation.node import SimulationNode
 from throwcollect.ros.self_check import begin_to_serve
 from throwcollect.sim.simulation import Simulation
-from throwcollect.sim.simulation_node import SimulationNode
 
 
 def run(config: Path, *, name: str, namespace: str | None = None) -> None:

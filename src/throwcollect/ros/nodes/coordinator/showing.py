@@ -1,16 +1,29 @@
-"""Publishes the newest episodes for onlookers, once a second, and only while a topic has subscribers.
+"""Topics of the coordinator for viewers, who may subscribe late: its progress, and the newest episodes.
 
-Onlookers must not subscribe to the episodes themselves, because a simulation waits until all subscribers have received
-each of them.
+The newest episodes are published once a second, and only while a topic has subscribers.
+
+Viewers must not subscribe to the episodes of a simulation themselves, because a simulation waits until all subscribers
+have received each of them.
 """
 
 from __future__ import annotations
 
-from throwcollect.coordinator.shown_topics import SHOWN_QOS, make_shown_topic
-from throwcollect.ros import Node, Publisher
+from throwcollect.ros import DurabilityPolicy, Node, Publisher, QoSProfile, ReliabilityPolicy
 from throwcollect.ros.msg import UInt8MultiArray
 
+PROGRESS_TOPIC = "/coordinator/progress"
+"""The progress: a std_msgs/String of JSON."""
+PROGRESS_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+SHOWN_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""A slow subscriber misses some episodes, and delays nobody."""
+
 _PERIOD_S = 1.0
+
+
+def make_shown_topic(simulation: str) -> str:
+    """Name the topic of a simulation's newest episode, by its node's name; messages are as the simulation sent them."""
+    return f"/coordinator/shown/{simulation}"
 
 
 class Showing:

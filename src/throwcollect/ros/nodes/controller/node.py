@@ -1,4 +1,4 @@
-"""The ROS 2 node of one controller, with the names that it has on the real robot."""
+"""The ROS 2 nodes of controllers, with the names that they have on the real robot, and the node that lists them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,21 @@ import time
 
 from throwcollect.control import REPEATED, ControllerState
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, pass_on_log
+from throwcollect.ros.msg import ControllerState as ControllerDescription
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
-from throwcollect.ros.srv import QueryTrajectoryState
-from throwcollect.sim.controller_action import ControllerAction
-from throwcollect.sim.controller_messages import nanoseconds, read_trajectory, state_message
-from throwcollect.sim.controller_parameters import ControllerParameterServer
-from throwcollect.sim.own_time import make_own_time
+from throwcollect.ros.nodes.controller.action import ControllerAction
+from throwcollect.ros.nodes.controller.messages import nanoseconds, read_trajectory, state_message
+from throwcollect.ros.nodes.controller.parameters import COMMAND_INTERFACES, ControllerParameterServer, state_interfaces
+from throwcollect.ros.nodes.own_time import make_own_time
+from throwcollect.ros.srv import ListControllers, QueryTrajectoryState
+from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.simulation import Simulation
 
 _SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = QoSProfile(depth=100)
 """Deep enough for all states of one stretch of time, because they leave together."""
 _REPEATED_S = 1.0
+_TYPE = "joint_trajectory_controller/JointTrajectoryController"
 
 
 class ControllerNode(Node):
@@ -123,3 +126,35 @@ class _LogHandler(logging.Handler):
                 return
             self._passed_on_s[about] = now_s
         pass_on_log(self._node, record)
+
+
+class ControllerManager(Node):
+    """Lists the controllers of a simulation, as ros2_control's controller manager does."""
+
+    def __init__(self, parent: Node, simulation: Simulation) -> None:
+        super().__init__("controller_manager", namespace=parent.get_namespace(), context=parent.context)
+        make_own_time(self)
+        hz = simulation.config.sim.physics_hz
+        self._controllers = [_describe(limb, hz) for limb in simulation.limbs.values()]
+        self.create_service(ListControllers, "~/list_controllers", self._list)
+
+    def _list(self, _request: ListControllers.Request, response: ListControllers.Response) -> ListControllers.Response:
+        response.controller = self._controllers
+        return response
+
+
+def _describe(limb: LimbController, hz: int) -> ControllerDescription:
+    parameters = limb.controller.parameters
+    commands, states = (
+        [f"{joint}/{interface}" for joint in parameters.joints for interface in interfaces]
+        for interfaces in (COMMAND_INTERFACES, state_interfaces(parameters))
+    )
+    return ControllerDescription(
+        name=limb.name,
+        state="active",
+        type=_TYPE,
+        update_rate=hz,
+        claimed_interfaces=commands,
+        required_command_interfaces=commands,
+        required_state_interfaces=states,
+    )

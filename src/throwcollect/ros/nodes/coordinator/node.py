@@ -9,13 +9,12 @@ from collections.abc import Set as AbstractSet
 
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.showing import Showing
-from throwcollect.coordinator.shown_topics import PROGRESS_QOS, PROGRESS_TOPIC
-from throwcollect.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
 from throwcollect.episode.episode_message import TrialRefusal, unpack
 from throwcollect.errors import DatasetError
 from throwcollect.ros import Node, graph_changes
 from throwcollect.ros.msg import String
+from throwcollect.ros.nodes.coordinator.showing import PROGRESS_QOS, PROGRESS_TOPIC, Showing
+from throwcollect.ros.nodes.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
 from throwcollect.run_key import Signer
 from throwcollect.trial.lease import Lease
 
@@ -47,8 +46,8 @@ class Coordinator(Node):
         self._left: dict[str, tuple[AbstractSet[bytes], float]] = {}
         """Publishers of simulations that are out of sight, by namespace, and since when [s]."""
         self._signer = Signer.of_environment()
-        # A real-time factor slows trials down on purpose, even one that onlookers set, which the coordinator does not
-        # learn of. Add the time that this takes before a simulation counts as lost.
+        # A real-time factor slows trials down on purpose, even one that a viewer has set without the coordinator.
+        # The slowest one is allowed for before a simulation counts as lost.
         self._patience_s = config.run.trial_timeout_s + config.sim.max_trial_s / config.sim.slowest_factor
         self._showing = Showing(self)
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)

@@ -6,8 +6,8 @@ from typing import Any
 
 from throwcollect.episode.episode_message import TrialRefusal
 from throwcollect.errors import ThrowcollectError
+from throwcollect.ros.nodes.simulation.leases import LeaseQueue
 from throwcollect.run_key import Signer
-from throwcollect.sim.lease_queue import LeaseQueue
 from throwcollect.trial.lease import Lease
 
 A, B, C, D = (Lease.make("/sim_0", trial, {}, Signer(b"")) for trial in range(4))

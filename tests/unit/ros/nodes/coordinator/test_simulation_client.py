@@ -9,9 +9,9 @@ import pytest
 
 from rclzenoh.interfaces import get_service
 from throwcollect import ros
-from throwcollect.coordinator import simulation_client
-from throwcollect.coordinator.simulation_client import SimulationClient
 from throwcollect.ros import SetParametersResult
+from throwcollect.ros.nodes.coordinator import simulation_client
+from throwcollect.ros.nodes.coordinator.simulation_client import SimulationClient
 from throwcollect.ros.router import router
 from throwcollect.run_key import Signer
 from throwcollect.trial.lease import LEASES, Lease, leases_from_json

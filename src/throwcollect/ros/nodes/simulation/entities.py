@@ -8,8 +8,8 @@ from throwcollect.engines.engine import BodyState
 from throwcollect.errors import RequestError
 from throwcollect.ros import Node
 from throwcollect.ros.msg import EntityFilters, EntityState
+from throwcollect.ros.nodes.simulation.answers import offer
 from throwcollect.ros.srv import GetEntities, GetEntitiesStates, GetEntityState, SetEntityState
-from throwcollect.sim.service_results import offer
 from throwcollect.sim.simulation import Simulation
 from throwcollect.units import NS_PER_S
 
