@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.files import recognise, suggest_path
+from throwcollect.files import suggest_path
 from throwcollect.wording import format_count
 
 MOST_PROBLEMS = 20
@@ -37,8 +37,6 @@ def read_csv(
     rows: list[list[float]] = []
     lines: list[int] = []
     try:
-        if other := recognise(path):
-            raise ConfigError([Problem(f"should be CSV in UTF-8, got {other}", path=path)])
         # Spreadsheets write a byte order mark, hence the encoding; `csv` wants line ends as they are, hence `newline`.
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file, skipinitialspace=True)

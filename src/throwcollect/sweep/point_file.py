@@ -15,7 +15,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.files import recognise, suggest_path
+from throwcollect.files import suggest_path
 from throwcollect.sweep.csv_file import MOST_PROBLEMS, read_csv
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.points import Points, Targets
@@ -89,7 +89,7 @@ def _read_parquet(path: Path, config: Config) -> _Read:
     try:
         table: Any = pq.ParquetFile(path).read()
     except (pa.ArrowException, OSError) as error:
-        raise ConfigError([Problem(f"cannot be read as Parquet: {recognise(path) or error}", path=path)]) from error
+        raise ConfigError([Problem(f"cannot be read as Parquet: {error}", path=path)]) from error
     table = table.drop_columns([name for name in table.column_names if _UNNAMED_INDEX.fullmatch(name)])
     _check_columns(tuple(table.column_names), None, path=path, config=config)
     if wrong := [

@@ -151,23 +151,6 @@ def test_a_file_that_is_no_table_is_a_problem(tmp_path):
 TARGETED = "task.duration_s,target_y_m,target_x_m\n"
 
 
-@pytest.mark.parametrize(
-    ("content", "kind"),
-    [
-        (f"{HEADER}1,1\n".encode("utf-16"), "UTF-16"),
-        (b"PK\x03\x04\x14\x00", "a ZIP archive, as those of spreadsheets are"),
-        (b"PAR1\x15\x04", "Parquet"),
-        (
-            b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n",
-            "a Git LFS pointer, in whose place `git lfs pull` puts the file",
-        ),
-        (b"ball.mass_kg\n\x00", "bytes that are no text"),
-    ],
-)
-def test_a_file_that_is_no_csv_is_named_by_what_it_is(csv, content, kind):
-    assert problems(csv(content)) == [f"list.csv: should be CSV in UTF-8, got {kind}"]
-
-
 def test_blanks_behind_commas_and_lines_of_blanks_do_not_count(csv):
     points = read_points(csv('  \n"ball.mass_kg", "task.duration_s"\n0.1, "1"\n \n'), Config())
     assert points.keys == ("ball.mass_kg", "task.duration_s")

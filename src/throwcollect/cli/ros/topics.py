@@ -12,7 +12,7 @@ import typer
 
 from throwcollect import ros
 from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_graph, require_name
-from throwcollect.cli.streams import end_with_reader, has_reader
+from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, full_name, is_hidden
 from throwcollect.wording import suggest
@@ -61,7 +61,6 @@ def echo(
     from throwcollect.cli.ros.yaml_values import shorten, yaml_text
     from throwcollect.ros.message_values import plain
 
-    end_with_reader()
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic, kind)
         path = field.split(".") if field else []
@@ -93,7 +92,6 @@ def show_rate(
     run: RunOption = None,
 ) -> None:
     """Print how often messages arrive."""
-    end_with_reader()
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic, None)
         # A gap lies between two arrivals, so one arrival more is kept.
