@@ -18,11 +18,6 @@ from throwcollect.interruption import die_with_parent
 _THROWS_A_START = 20
 """Number of throws that a process simulates in about the time that it takes to start."""
 
-_SAFE_PATH = "PYTHONSAFEPATH"
-_safe_path_lock = threading.Lock()
-_values_before: list[str | None] = []
-"""Value of the variable `_SAFE_PATH` before each block of any thread that has set it and still runs; oldest first."""
-
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
 
@@ -89,13 +84,12 @@ def working_side_by_side(
         return
     # If there are several threads, new interpreters are started: a fork could wait for ever for another thread's lock.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
-    with _hiding_working_directory():
-        pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
+    pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
     try:
         # Only this process shall see Ctrl-C and then end the others, so the others start with the signal blocked.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         try:
-            with _hiding_working_directory(), warnings.catch_warnings():
+            with warnings.catch_warnings():
                 # From 3.12 on, Python warns about the threads of Arrow and BLAS, which forked processes do not use.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
                 found = pool.map(_work, pieces)
@@ -112,28 +106,6 @@ def working_side_by_side(
         for process in list(pool._processes.values()):
             process.kill()
         pool.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def _hiding_working_directory() -> Iterator[None]:
-    """Keep Python processes that are started in the block from looking for modules in the working directory.
-
-    They would run files in that directory, perhaps somebody else's dataset, in place of modules of Python's own
-    library. A pool that has just been made starts a process, too, which looks after what the others share. Python
-    before 3.11 has no way to prevent that.
-    """
-    with _safe_path_lock:
-        _values_before.append(os.environ.get(_SAFE_PATH))
-        os.environ[_SAFE_PATH] = "1"
-    try:
-        yield
-    finally:
-        with _safe_path_lock:
-            # While other threads are in such a block, the newest value was set by a block, so the variable stays set.
-            if (before := _values_before.pop()) is None:
-                del os.environ[_SAFE_PATH]
-            else:
-                os.environ[_SAFE_PATH] = before
 
 
 _make: list[Callable[[], Callable[[Any], Any]]] = []
