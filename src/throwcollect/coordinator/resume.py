@@ -32,7 +32,7 @@ from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws, read_throws_table
-from throwcollect.dataset.verify_tables import find_wrong_trials, read_list
+from throwcollect.dataset.verify_plan import find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
