@@ -28,9 +28,8 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import MANIFEST, PLAN, THROWS, shard_name
-from throwcollect.dataset.join import join
 from throwcollect.dataset.manifest import entry_of, manifest_text, read_manifest
-from throwcollect.dataset.slice_directory import slice_directory
+from throwcollect.dataset.slices import join, slice_directory
 from throwcollect.runs.preparation import prepare
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.sweep.plan import Plan

@@ -51,7 +51,8 @@ _SAMPLERS = """\
 The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
 Each of a set of `values` is drawn equally often. All draws follow from `seed`.
 
-With `until`, a dataset ends with the trial at which enough have succeeded: [targets.md](targets.md).
+With `until`, a dataset ends with the trial at which enough have succeeded. With `target`,
+`throwcollect cover` spreads throws evenly over its cells: [targets.md](targets.md).
 """
 
 _TARGETS = """\

@@ -103,22 +103,16 @@ class ConfigError(ThrowcollectError):
 
     Args:
         problems: All problems that were found, at least one; or a single problem as a sentence.
-        more: Number of further problems, which the message only counts.
     """
 
     exit_code = 2
 
     def __init__(
-        self,
-        problems: str | Sequence[Problem],
-        *,
-        expected: str | None = None,
-        hint: str | None = None,
-        more: int = 0,
+        self, problems: str | Sequence[Problem], *, expected: str | None = None, hint: str | None = None
     ) -> None:
         self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)
         lines = list(map(str, self.problems[:_MOST_PROBLEMS]))
-        if unlisted := len(self.problems) - len(lines) + more:
+        if unlisted := len(self.problems) - len(lines):
             lines.append(f"and {unlisted} more")
         super().__init__("\n".join(lines), expected=expected, hint=hint)
 

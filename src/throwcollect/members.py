@@ -20,9 +20,8 @@ from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
-from typing import Any, ClassVar, get_args, get_origin, get_type_hints
+from typing import Any
 
-from throwcollect.declared_types import check_type
 from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
 from throwcollect.extras import explain_missing
 
@@ -102,10 +101,8 @@ def load_member(family: str, name: str) -> Any:
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
     found, kind, where = _import(entry.value, what), _load(_KINDS[family]), f"{what}: {entry.value}"
-    if family in _VALUES:
-        _check(where, found, kind)
-    else:
-        _check_class(where, found, kind)
+    if not (isinstance(found, kind) if family in _VALUES else isinstance(found, type) and issubclass(found, kind)):
+        raise ConfigError(f"{where} should be of {kind.__module__}.{kind.__name__}, is {found!r}")
     # A section of a configuration has its name as the default of a key; engines, runtimes and exporters have none.
     key = getattr(found, "model_fields", {}).get("name")
     if (given := getattr(found, "name", name) if key is None else key.default) != name:
@@ -148,15 +145,9 @@ def list_origins(family: str, name: str) -> list[str]:
     return sorted(f"{each.group} {name}: {each.value} of {_name_owner(each)}" for each in namesakes)
 
 
-def load_part(family: str, name: str, path: str, kind: type | None = None) -> Any:
-    """Import the object ``module:name`` that a member names; of a given kind, it has to be a complete class."""
-    if is_own(family, name):
-        return _load_own(path)
-    where = f"{_describe(family, name)}: {path}"
-    found = _import(path, where)
-    if kind is not None:
-        _check_class(where, found, kind)
-    return found
+def load_part(family: str, name: str, path: str) -> Any:
+    """Import the object ``module:name`` that a member names."""
+    return _load_own(path) if is_own(family, name) else _import(path, f"{_describe(family, name)}: {path}")
 
 
 @contextmanager
@@ -213,28 +204,6 @@ def _import(path: str, what: str) -> Any:
     # `SystemExit` would end the process without a word.
     except (Exception, SystemExit) as error:
         raise ConfigError(f"{what} cannot be loaded: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
-
-
-def _check(where: str, value: object, declared: Any) -> None:
-    """Make sure that a value of another package is of the type that is declared for it, and all that it contains."""
-    try:
-        check_type(where, value, declared)
-    except TypeError as error:
-        raise ConfigError(str(error), hint=_WAY_OUT) from error
-
-
-def _check_class(where: str, found: Any, kind: type) -> None:
-    """Make sure that an object of another package is a class derived from a kind, and lacks nothing."""
-    if not (isinstance(found, type) and issubclass(found, kind)):
-        raise ConfigError(f"{where} should be a class derived from {kind.__module__}.{kind.__name__}, is {found!r}")
-    # A class variable that is declared without a value has to be set by each derived class.
-    hints = get_type_hints(kind, include_extras=True).items()
-    variables = {name: get_args(hint)[0] for name, hint in hints if get_origin(hint) is ClassVar}
-    lacking = {name for name in variables if not hasattr(found, name)}
-    if lacking := lacking | getattr(found, "__abstractmethods__", frozenset()):
-        raise ConfigError(f"{where} lacks {', '.join(sorted(lacking))}")
-    for name, declared in variables.items():
-        _check(f"{where}.{name}", getattr(found, name), declared)
 
 
 def _describe(family: str, name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,14 +11,7 @@ from threading import RLock
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import (
-    as_float,
-    check_list,
-    check_mapping,
-    check_whole_number,
-    refuse_argument,
-    show_value,
-)
+from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
@@ -45,8 +37,6 @@ Point = Mapping[str, float]
 """Values that replace those of the configuration, by dotted key, in the key's unit."""
 _FORKED_S = 1.0
 """Time that a forked process waits for the first throw of another thread of its own [s]."""
-_POINT = "{'task.duration_s': 1.1}"
-_TARGET = "{'target_x_m': 1.4, 'target_y_m': -0.2}"
 
 
 class Simulator:
@@ -78,12 +68,8 @@ class Simulator:
                     "overrides", "win over a file, got a Config", hint="load_config(FILE, overrides) applies them"
                 )
             self.config, self._source = config, config.name
-        elif isinstance(config, str | os.PathLike):
-            self.config, self._source = load(config, overrides), os.fspath(config)
         else:
-            raise refuse_argument(
-                "config", f"got {show_value(config)}", expected="a YAML file, or a Config as load_config gives it"
-            )
+            self.config, self._source = load(config, overrides), os.fspath(config)
         # A throw changes the robot's model and the world. A handler of a signal may close during a throw of its thread.
         self._lock = RLock()
         self._holder = os.getpid()
@@ -127,15 +113,13 @@ class Simulator:
             PlanError: If the plan of a collection would refuse the throw; the error gives the plan's reason.
         """
         self._require_open()
-        check_whole_number("trial", trial, least=0, most=MOST_TRIALS - 1)
-        check_mapping("values", {} if values is None else values, _POINT)
-        check_mapping("target", {} if target is None else target, _TARGET)
+        check_bounds("trial", trial, least=0, most=MOST_TRIALS - 1)
         point = dict(values or {})
         wrong = self.config.task.find_wrong_targets(target or {})
         wrong |= {
-            name: f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {show_value(value)}"
+            name: f"should be from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {value}"
             for name, value in (target or {}).items()
-            if not abs(as_float(value)) <= LARGEST_TARGET
+            if not abs(value) <= LARGEST_TARGET
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
@@ -155,7 +139,6 @@ class Simulator:
             ConfigError: If a key cannot vary, or a value is out of its range.
             ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
         """
-        check_mapping("values", values, _POINT)
         wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
         if wrong:
             raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
@@ -181,18 +164,14 @@ class Simulator:
             ConflictError: If the simulator is closed.
             WorkerError: If the physics engine of a process does not start, or a process is killed.
         """
-        check_whole_number("processes", processes, least=1)
-        check_list("points", points, "mappings, one for each throw")
+        check_bounds("processes", processes, least=1)
         self._require_open()
         if processes == 1:
             for trial, point in enumerate(points):
                 yield self._throw_numbered((trial, point))
             return
-        pieces = tuple(enumerate(points))
-        for index, point in pieces:
-            _check_that_it_can_be_sent(index, point)
         yield from work_side_by_side(
-            pieces, _begin, (self.config, self._source), processes=processes, doing="simulates"
+            tuple(enumerate(points)), _begin, (self.config, self._source), processes=processes, doing="simulates"
         )
 
     def _throw_numbered(self, numbered: tuple[int, Point]) -> Throw:
@@ -241,15 +220,6 @@ class Simulator:
         return Throw(table.table([row]), 0, keys, episode, self._source)
 
 
-def _check_that_it_can_be_sent(index: int, point: object) -> None:
-    """Refuse a point of a list that cannot be sent to another process."""
-    try:
-        pickle.dumps(point)
-    except Exception as error:
-        reason = f"cannot be sent to another process: {error}"
-        raise refuse_argument(f"points[{index}]", reason, expected=f"a mapping, such as {_POINT}") from error
-
-
 def _locate(problem: Problem, index: int, point: Point) -> Problem:
     """Name the point of a list that has a problem: its index and, if the problem names no key, all its values."""
     place = f"points[{index}]"
@@ -257,7 +227,7 @@ def _locate(problem: Problem, index: int, point: Point) -> Problem:
         return replace(problem, key=place)
     if problem.key:
         return replace(problem, key=f"{place}.{problem.key}", argument=True)
-    values = ", ".join(f"{key}={show_value(value)}" for key, value in (point or {}).items())
+    values = ", ".join(f"{key}={value}" for key, value in (point or {}).items())
     return Problem(f"{problem.message} ({values or 'with no value of its own'})", place, argument=True)
 
 

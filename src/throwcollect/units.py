@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 
 NS_PER_S = 1_000_000_000
 """Nanoseconds in a second: stamps are integers [ns], times are floats [s]."""
@@ -23,9 +22,6 @@ _SUFFIXES = {
     "_s": "s",
 }
 _ASCII = str.maketrans({"²": "^2", "³": "^3"})
-DECIMALS = "decimals are written with a point, as in 1.5"
-_DEGREES = ("°", "deg", "degree", "degrees")
-_NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?)\s*([^-+.,\d\s].*?|)\s*")
 _SHOWN_AS = {"m": (100.0, "cm"), "rad": (math.degrees(1), "°")}
 _LEAST_SHOWN = 0.01
 """A smaller number is shown with two significant digits, because its first two decimals would be zeros."""
@@ -39,25 +35,6 @@ def unit_of_name(name: str) -> str:
 def ascii_unit(unit: str) -> str:
     """Write a unit in ASCII, such as ``m/s^2``; ``1`` for counts and shares."""
     return unit.translate(_ASCII) or "1"
-
-
-def explain_number(given: object, unit: str) -> str:
-    """Write the end of a message on a value that is not allowed where a number of a unit should be.
-
-    Returns:
-        How such a number is written, if the value is one in degrees, with a unit or with a decimal comma; else nothing.
-    """
-    if isinstance(given, bool) or not isinstance(given, str | int | float):
-        return ""
-    match = _NUMBER_AND_UNIT.fullmatch(given if isinstance(given, str) else f"{given}{_DEGREES[0] * (unit == 'rad')}")
-    if match is None:
-        return ""
-    text, word = match[1].replace(",", "."), match[2]
-    if unit == "rad" and word.lower() in _DEGREES:
-        return f"; angles are in radians: {float(text):g} degrees are {math.radians(float(text)):.4f}"
-    if text != match[1]:
-        return f"; {DECIMALS}"
-    return f"; write the number alone{unit and f', in {unit}'}" if word else ""
 
 
 def choose_shown_unit(unit: str) -> tuple[float, str]:

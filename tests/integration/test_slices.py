@@ -17,9 +17,8 @@ from throwcollect import runs
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.directory import METADATA
-from throwcollect.dataset.join import join
 from throwcollect.dataset.shard import OpenShard
-from throwcollect.dataset.slice_directory import SLICES, find_attempts, find_finished, make_attempt, publish
+from throwcollect.dataset.slices import SLICES, find_attempts, find_finished, join, make_attempt, publish
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError
 from throwcollect.files import unwritable
@@ -31,7 +30,7 @@ INPROCESS = ["run.runtime=inprocess"]
 KILLED_ANYWHERE = """
 import os, shutil, signal, sys
 from pathlib import Path
-from throwcollect.dataset.join import join
+from throwcollect.dataset.slices import join
 
 source, copies = map(Path, sys.argv[1:])
 

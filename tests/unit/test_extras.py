@@ -41,8 +41,8 @@ def test_an_unknown_attribute_of_a_lazy_module_is_an_attribute_error() -> None:
 def test_a_missing_package_is_an_error_that_names_its_extra(without_scipy) -> None:
     with pytest.raises(MissingExtraError) as raised:
         _ = lazily("scipy.io").savemat
-    assert str(raised.value) == "this needs scipy, which is not installed\n  try: pip install 'throwcollect[collect]'"
-    assert (raised.value.package, raised.value.extra, raised.value.exit_code) == ("scipy", "collect", 2)
+    assert str(raised.value) == "this needs scipy, which is not installed\n  try: pip install 'throwcollect[export]'"
+    assert (raised.value.package, raised.value.extra, raised.value.exit_code) == ("scipy", "export", 2)
 
 
 def test_a_missing_package_of_several_extras_names_the_requested_one(without_scipy) -> None:

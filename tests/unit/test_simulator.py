@@ -80,10 +80,10 @@ def test_a_target_adds_only_the_miss_to_a_throw(simulator: Simulator) -> None:
     ("target", "sentence"),
     [
         ({"target_x_m": 1.4}, "target_y_m: is missing beside target_x_m"),
-        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be a number from .* got nan"),
+        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be from .* got nan"),
         (
             {"target_x_m": 1e308, "target_y_m": 0.0},
-            r"target_x_m: should be a number from -1e\+06 to 1e\+06, got 1e\+308",
+            r"target_x_m: should be from -1e\+06 to 1e\+06, got 1e\+308",
         ),
         ({"x": 1.4}, "x: the task throw has no such target"),
     ],
@@ -122,8 +122,7 @@ def test_throws_before_a_refused_point_are_returned(simulator: Simulator) -> Non
     ("point", "message"),
     [
         (REFUSED, r"points\[1\]: .*" + TOO_FAST + r".* \(task\.duration_s=0\.2\)"),
-        ({"ball.mass_kg": -1.0}, r"points\[1\]\.ball\.mass_kg: should be a number above 0"),
-        (3, r"points\[1\]: got 3\n  expected: a mapping, such as {'task\.duration_s': 1\.1}"),
+        ({"ball.mass_kg": -1.0}, r"points\[1\]\.ball\.mass_kg: should be greater than 0"),
     ],
 )
 def test_a_wrong_point_of_many_is_named_by_its_index(
@@ -140,7 +139,7 @@ def test_a_wrong_point_of_many_is_named_by_its_index(
     [
         ({"task.duration": 1.0}, "task.duration: unknown key; did you mean 'task.duration_s'"),
         ({"record.rate_hz": 100.0}, "record.rate_hz: cannot vary from trial to trial"),
-        ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be a number above 0"),
+        ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be greater than 0"),
     ],
 )
 def test_a_wrong_key_or_value_is_an_error_that_names_the_key(
@@ -159,49 +158,12 @@ def test_numbers_of_trials_and_processes_out_of_range_are_refused(simulator: Sim
         next(simulator.throw_many([{}], processes=0))
 
 
-def test_a_text_or_mapping_in_place_of_a_list_is_refused(simulator: Simulator) -> None:
-    with pytest.raises(ConfigError, match=r"^overrides: 'task\.duration_s=1' is a text"):
-        Simulator(ROOT / "configs" / "quickstart.yaml", overrides="task.duration_s=1")
-    with pytest.raises(ConfigError, match=r"^points: {'task\.duration_s': 1\.1.* is a mapping"):
-        next(simulator.throw_many(POINT))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"trial": "1"}, "trial: got '1'"),
-        ({"values": [1.1]}, r"values: got \[1\.1\]\n  expected: a mapping, such as {'task\.duration_s': 1\.1}"),
-        ({"target": [1.4, 0.0]}, r"target: got \[1\.4, 0\.0\]\n  expected: a mapping, such as {'target_x_m'"),
-        ({"target": {"target_x_m": "a", "target_y_m": 0.0}}, "target_x_m: should be a number from .*, got 'a'"),
-        ({"target": {"target_x_m": "1", "target_y_m": 0.0}}, "target_x_m: should be a number from .*, got '1'"),
-        ({"target": {"target_x_m": 1.0, "target_y_m": np.True_}}, "target_y_m: should be a number from .*, got True"),
-    ],
-)
-def test_an_argument_of_a_wrong_type_is_named(simulator: Simulator, arguments, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"^{message}"):
-        simulator.throw(**arguments)
-
-
-def test_find_refusal_and_throw_many_check_their_arguments(simulator: Simulator) -> None:
-    with pytest.raises(ConfigError, match=r"^values: got \[1\]"):
-        simulator.find_refusal([1])
-    with pytest.raises(ConfigError, match=r"^processes: got 1\.5\n  expected: a whole number, 1 or more"):
-        next(simulator.throw_many([{}], processes=1.5))
-    with pytest.raises(ConfigError, match=r"^points\[1\]: cannot be sent to another process: .*\n  expected: a map"):
-        next(simulator.throw_many([{}, {"task.duration_s": lambda: 1.1}], processes=2))
-
-
 def test_a_simulator_of_a_config_throws_as_that_of_its_file(simulator: Simulator) -> None:
     config = load_config(ROOT / "configs" / "quickstart.yaml")
     with Simulator(config) as other:
         assert other.throw(POINT).row == simulator.throw(POINT).row
     with pytest.raises(ConfigError, match=r"^overrides: win over a file, got a Config\n  try: load_config"):
         Simulator(config, overrides=["seed=1"])
-
-
-def test_a_simulator_of_neither_file_nor_config_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"^config: got {'task': 1}\n  expected: a YAML file, or a Config"):
-        Simulator({"task": 1})
 
 
 def test_a_simulator_throws_for_several_threads_one_after_the_other(simulator: Simulator) -> None:

@@ -1,4 +1,4 @@
-"""`throwcollect up`, `resume`, `join-run` and `join`: collect a dataset, in this terminal or by a detached launcher."""
+"""`throwcollect up`, `resume`, `cover`, `join-run` and `join`: collect, in this terminal or by a detached launcher."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
+from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import print_json, tell
-from throwcollect.cli.streams import ensure_written, only_log
+from throwcollect.cli.streams import ensure_written
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
 from throwcollect.interruption import count_interruptions
-from throwcollect.own_process import keep_objects
 from throwcollect.side_by_side import count_cores
-from throwcollect.wording import command
+from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
     from throwcollect.runs.prepared_run import PreparedRun
@@ -157,7 +156,7 @@ def resume(
 def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
     """Finish a dataset with what is whole; `runs` would need the libraries of the nodes."""
     from throwcollect.cli.dataset.info import print_collected
-    from throwcollect.coordinator.resume import finish_without_simulating
+    from throwcollect.coordinator.salvage import finish_without_simulating
     from throwcollect.dataset.configuration import reading_config
     from throwcollect.dataset.inspect import info
 
@@ -180,11 +179,46 @@ def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
         tell(f"{directory}: nothing is left to submit")
 
 
+def cover(
+    config: ConfigArgument = DEFAULT_CONFIG,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Directory of the datasets, one for each round."),
+    ] = None,
+    rounds: Annotated[int, typer.Option("--rounds", metavar="K", min=2, max=99, help="Number of rounds.")] = 8,
+    simulations: SimulationsOption = None,
+    settings: SetOption = None,
+    runtime: RuntimeOption = None,
+    trials: TrialsOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Spread throws evenly over the cells of sweep.target: collect, learn, aim, and collect again."""
+    from throwcollect.config.loader import load
+    from throwcollect.runs.covering import cover as cover_cells
+
+    changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
+    directory = output or Path("datasets", load(config, changes).name)
+    with display(quiet=json) as shown, count_interruptions() as interruptions:
+        found = cover_cells(
+            config,
+            directory,
+            rounds=rounds,
+            overrides=changes,
+            processes=count_cores(),
+            onlooker=shown,
+            interruptions=interruptions,
+        )
+    if json:
+        print_json([str(each) for each in found])
+        return
+    typer.echo(f"{directory}: {format_count(len(found), 'dataset')}")
+    tell(f"make one of them: {command('dataset', 'merge', *found, directory / 'all')}")
+
+
 def launch(run: str, lock: LockOption) -> None:
     """Launch a prepared run; `up -d` starts this command."""
     from throwcollect.runs.launcher import launch_inherited
 
-    only_log()
     with display(quiet=True) as shown, count_interruptions() as interruptions:
         launch_inherited(run, lock, onlooker=shown, interruptions=interruptions)
 
@@ -193,14 +227,13 @@ def begin(run: str, lock: LockOption) -> None:
     """Prepare and launch a run that another process has begun; that process writes the order to standard input."""
     from throwcollect.runs.background import carry_out
 
-    only_log()
     order = sys.stdin.buffer.read()
     with display(quiet=True) as shown, count_interruptions() as interruptions:
         carry_out(run, lock, order, onlooker=shown, interruptions=interruptions)
 
 
 def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
-    from throwcollect.dataset.slice_directory import slice_directory
+    from throwcollect.dataset.slices import slice_directory
     from throwcollect.runs.slices import collect_slice
     from throwcollect.sweep.slice import Slice
 
@@ -237,7 +270,7 @@ def join(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Make one dataset of the slices that `up --slice` has collected."""
     from throwcollect.cli.dataset.info import print_collected
     from throwcollect.dataset.inspect import info
-    from throwcollect.dataset.join import join as join_slices
+    from throwcollect.dataset.slices import join as join_slices
 
     join_slices(directory)
     print_collected(info(directory), directory, as_json=json)
@@ -258,13 +291,11 @@ def _collect(
     """
     shown = display(quiet=json, bar=not detach)
     with ExitStack() as held:
-        if (run := prepare_run(ahead=not detach, onlooker=shown)) is not None:
+        if (run := prepare_run(onlooker=shown)) is not None:
             held.enter_context(run)
             _announce(run, token_file, view=view)
             if not detach:
-                # The bar comes only now: while its thread runs, nodes are not forked off this process, and start later.
                 with shown, count_interruptions() as interruptions:
-                    keep_objects()
                     summary = run.collect(interruptions=interruptions)
         if run is not None and detach:
             _start(run, json=json)

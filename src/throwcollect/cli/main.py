@@ -34,7 +34,7 @@ def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool 
         app.command(rich_help_panel=panel, hidden=hidden)(command)
 
 
-_add(show.init, collect.up, collect.resume, collect.join_run, cluster_commands.submit, collect.join)
+_add(show.init, collect.up, collect.resume, collect.cover, collect.join_run, cluster_commands.submit, collect.join)
 _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.down, panel="Runs")
 _add(serve.serve, serve.view, panel="Runs")
 _add(learning.fit, learning.aim, learning.throw, learning.score, learning.adapt, panel="From a dataset to a throw")

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument
-from throwcollect.cli.streams import keep_output, only_log, write_utf_8
+from throwcollect.cli.streams import keep_output
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import LossError, NotFoundError
 from throwcollect.files import write_all
@@ -32,7 +32,6 @@ def router(
     """Run the router that all nodes connect to."""
     from throwcollect.ros.router import serve
 
-    only_log()
     serve(listen, key)
 
 
@@ -49,10 +48,9 @@ def sim(
     """Run one simulation."""
     from socket import gethostname
 
+    from throwcollect.ros.nodes.simulation.process import run
     from throwcollect.runtimes.nodes import simulation_name_of
-    from throwcollect.sim.simulation_process import run
 
-    only_log()
     run(config, name=name or simulation_name_of(gethostname()), namespace=namespace)
 
 
@@ -64,9 +62,8 @@ def coordinator(
     ] = None,
 ) -> None:
     """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
-    from throwcollect.coordinator.coordinator_process import run
+    from throwcollect.ros.nodes.coordinator.process import run
 
-    only_log()
     if config is None:
         run(directory)
         return
@@ -94,7 +91,6 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
     from throwcollect.replay.replayer import Replayer
     from throwcollect.sweep.plan import Plan
 
-    write_utf_8()
     # The coordinator reads standard output, so whatever engine, robot and task print must go elsewhere.
     with keep_output() as results:
         plan = Plan.read(directory / PLAN, load(directory / CONFIG))

@@ -17,7 +17,7 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import JOURNAL, METADATA, PLAN, THROWS
 from throwcollect.dataset.journal import read_journal
-from throwcollect.dataset.slice_directory import find_finished, slice_directory
+from throwcollect.dataset.slices import find_finished, slice_directory
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan

@@ -5,12 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.document import Document
-from throwcollect.config.problems import findings
-from throwcollect.errors import ConfigError
 
 
 def site_path() -> Path:
@@ -24,14 +20,6 @@ def with_site(cluster: ClusterConfig) -> ClusterConfig:
     path = site_path()
     if not path.is_file():
         return cluster
-    document = Document(path)
-    try:
-        site = ClusterConfig.model_validate(document.values)
-    except ValidationError as error:
-        raise ConfigError(
-            [document.problem(each.location, each.sentence) for each in findings(error, document.values)]
-        ) from error
-    if document.problems:
-        raise ConfigError(document.problems)
+    site = Document(path).validate(ClusterConfig)
     own = {name: getattr(cluster, name) for name in cluster.model_fields_set}
     return site.model_copy(update=own)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Annotated
@@ -19,33 +18,8 @@ _LEAST_MEMORY = 6 * 1024**2
 """Smallest limit of memory that Docker engines accept [bytes]."""
 
 _SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
-_OWN_VARIABLES = (
-    *("THROWCOLLECT_NODE", "THROWCOLLECT_KEY", "THROWCOLLECT_HOST", "THROWCOLLECT_DIRECTORY"),
-    *("ZENOH_CONFIG_OVERRIDE", "ROS_DOMAIN_ID"),
-)
 _OWN_DIRECTORIES = ("/data", "/key")
 _SOCKETS = ("docker.sock", "containerd.sock", "podman.sock")
-_LABELS = "throwcollect."
-
-_POWER = "is refused, as it would give a container power over its host"
-_SEE = "should be left out; use {} beside options"
-_LAUNCHER = "is refused, as the launcher decides it"
-_REFUSED = {
-    **dict.fromkeys(("privileged", "cap_add", "security_opt", "device_cgroup_rules", "volumes_from"), _POWER),
-    **dict.fromkeys(("pid_mode", "ipc_mode", "uts_mode", "userns_mode", "cgroupns", "cgroup_parent"), _POWER),
-    **dict.fromkeys(
-        ("network_mode", "network_disabled", "network", "networking_config", "links"), _SEE.format("networks")
-    ),
-    **dict.fromkeys(("volumes", "mounts", "binds"), _SEE.format("mounts")),
-    **dict.fromkeys(("mem_limit", "memswap_limit"), _SEE.format("memory")),
-    **dict.fromkeys(("nano_cpus", "cpu_period", "cpu_quota", "cpu_count"), _SEE.format("cpus")),
-    "cpuset_cpus": _SEE.format("cpuset"),
-    "environment": _SEE.format("environment"),
-    **dict.fromkeys(("ports", "publish_all_ports"), _SEE.format("ports")),
-    **dict.fromkeys(("image", "command", "entrypoint", "name", "user", "working_dir", "healthcheck"), _LAUNCHER),
-    **dict.fromkeys(("detach", "tty", "stdin_open", "auto_remove", "restart_policy", "log_config"), _LAUNCHER),
-    **dict.fromkeys(("init", "read_only", "cap_drop", "stop_signal"), _LAUNCHER),
-}
 
 
 def _check_size(text: str) -> str:
@@ -82,33 +56,6 @@ def _check_network(text: str) -> str:
     return text
 
 
-def _check_variable(text: str) -> str:
-    if text in _OWN_VARIABLES:
-        raise ValueError(_LAUNCHER)
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", text):
-        raise ValueError("should be the name of a variable: letters, digits and _")
-    return text
-
-
-def _check_port(text: str) -> str:
-    match = re.fullmatch(r"([1-9][0-9]{0,4})(/tcp|/udp)?", text)
-    if match is None or int(match[1]) > 65535:
-        raise ValueError("should be a port of the container from 1 to 65535, with /udp if it is not TCP")
-    return text
-
-
-def _check_label(text: str) -> str:
-    if text.startswith(_LABELS):
-        raise ValueError(f"is refused, as labels that begin with {_LABELS} are the launcher's")
-    return text
-
-
-def _check_tmpfs(text: str) -> str:
-    if not text.startswith("/") or ".." in text.split("/") or normal_path(text) == "/" or _is_own_path(text):
-        raise ValueError("should be an absolute path in the container, outside of /data and /key")
-    return text
-
-
 def _check_device(text: str) -> str:
     host, _, rest = text.partition(":")
     inside, _, permissions = rest.partition(":")
@@ -133,8 +80,8 @@ Volume = Annotated[
     match(r"[a-zA-Z0-9][a-zA-Z0-9_.-]+", "a volume's name: letters, digits, _, . and -"),
     in_words("a volume's name"),
 ]
-Variable = Annotated[str, AfterValidator(_check_variable)]
-ContainerPort = Annotated[str, AfterValidator(_check_port)]
+Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+ContainerPort = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,4}(/tcp|/udp)?$")]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
 Device = Annotated[str, AfterValidator(_check_device), in_words("HOST:CONTAINER:PERMISSIONS")]
 
@@ -160,8 +107,9 @@ class DeviceRequest(TypedDict, total=False):
 class ContainerOptions(TypedDict, total=False):
     """Further keywords of `docker.containers.create` of the Docker SDK for Python; by default they are the engine's."""
 
-    # Unknown keywords are errors. For those that Docker knows and we refuse, the message gives the reason.
-    __pydantic_config__ = ConfigDict(**_OPTIONAL_KEYS, json_schema_extra={"refused": _REFUSED})  # type: ignore[misc]
+    # Keywords that are not listed here are errors: they would give a container power over its host, or are decided by
+    # the launcher, or by the keys beside `options`.
+    __pydantic_config__ = _OPTIONAL_KEYS  # type: ignore[misc]
     hostname: str
     """Name of the host inside."""
     domainname: str
@@ -174,13 +122,13 @@ class ContainerOptions(TypedDict, total=False):
     """Options of the resolver."""
     extra_hosts: dict[str, str]
     """Further host names and their addresses."""
-    labels: dict[Annotated[str, AfterValidator(_check_label)], str]
+    labels: dict[str, str]
     """Further labels."""
     group_add: list[str | int]
     """Further groups of the process."""
     shm_size: Size
     """Size of /dev/shm."""
-    tmpfs: dict[Annotated[str, AfterValidator(_check_tmpfs)], str]
+    tmpfs: dict[str, str]
     """Further directories in memory and their mount options; options for /tmp are added to those that it has anyway."""
     ulimits: dict[str, int]
     """Resource limits by their names, such as `nofile`."""
@@ -227,11 +175,6 @@ class NodeContainerConfig(Section):
     options: ContainerOptions = {}
     """Further options."""
 
-    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
-        for port in self.ports:
-            if port.endswith("/tcp") and (same := port.removesuffix("/tcp")) in self.ports:
-                yield f"ports.{port}", f"should be left out, as {same} is the same port"
-
 
 @dataclass(frozen=True)
 class ContainerSpec:
@@ -261,12 +204,3 @@ class ContainersConfig(Section):
     """Each simulation."""
     coordinator: NodeContainerConfig = NodeContainerConfig()
     """The coordinator."""
-
-    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
-        taken: dict[int, str] = {}
-        for node in ("router", "sim", "coordinator"):
-            for port, host_port in getattr(self, node).ports.items():
-                key = f"{node}.ports.{port}"
-                if host_port in taken:
-                    yield key, f"should differ from {taken[host_port]}, got {host_port}, too"
-                taken.setdefault(host_port, key)

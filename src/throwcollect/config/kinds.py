@@ -9,7 +9,6 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
 from pydantic_core import CoreSchema
 
-from throwcollect.arguments import show_value
 from throwcollect.members import load_member, usable_names
 from throwcollect.wording import suggest
 
@@ -26,17 +25,9 @@ class ContradictionError(ValueError):
         super().__init__("; ".join(f"{key}: {sentence}" for key, sentence in self.sentences.items()))
 
 
-class UnknownJointError(ValueError):
-    """A name that is no joint of the robot; `problems` makes a message of the first ones, as that takes a search."""
-
-    def __init__(self, name: str, robot: Any) -> None:
-        self.name, self.robot = name, robot
-        super().__init__(f"{robot.title} has no joint {name!r}")
-
-
 def unknown_joint(name: str, robot: Any) -> str:
     """Make the sentence for a name that is no joint of a robot."""
-    return f"{robot.title} has no joint {show_value(name)}{suggest(name, robot.joints)}"
+    return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"
 
 
 def all_joints() -> tuple[str, ...]:
@@ -50,7 +41,7 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
     if info.context is not None:
         robot = load_member("robots", info.context)
         if name not in robot.joints:
-            raise UnknownJointError(name, robot)
+            raise ValueError(unknown_joint(name, robot))
     return name
 
 

@@ -250,11 +250,9 @@ class Config(Section):
             yield "sweep.target", f"should be left out, as the task {self.task.name} throws no ball"
         if self.until is not None and self.sweep.sampler == "list":
             yield "until", "should be left out, as the file of the sampler list is not part of the dataset"
-        several = f"should be left out, as {self.run.simulations} simulations"
-        if self.containers.sim.ports and self.run.simulations > 1:
-            yield "containers.sim.ports", f"{several} cannot share a port of this machine"
         if self.run.root_namespace and self.run.simulations > 1:
-            yield "run.root_namespace", f"{several} (-n) cannot share a namespace"
+            several = f"{self.run.simulations} simulations (-n)"
+            yield "run.root_namespace", f"should be left out, as {several} cannot share a namespace"
 
     def _find_unknown_joints(self) -> Iterator[tuple[str, str]]:
         robot = load_member("robots", self.robot.name)

@@ -89,18 +89,15 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
     return Annotated[reduce(or_, [Annotated[kind, Tag(_make_tag(kind))] for kind in kinds]), Discriminator(find_tag)]
 
 
-def list_sections(kind: Any) -> Iterator[type[Section]]:
-    """List the sections that a value of some type may be; sections that are items of a list or a mapping are left out.
-
-    Args:
-        kind: The type, such as that of a field; with `any_of`, it has several.
-    """
-    if isinstance(kind, type):
-        if issubclass(kind, Section):
-            yield kind
-    elif get_origin(kind) in (Annotated, Union, UnionType):
+def list_kinds(kind: Any) -> Iterator[Any]:
+    """List the types that a value of some type may have: those of a union, without their annotations."""
+    if get_origin(kind) is Annotated:
+        yield from list_kinds(get_args(kind)[0])
+    elif get_origin(kind) in (Union, UnionType):
         for each in get_args(kind):
-            yield from list_sections(each)
+            yield from list_kinds(each)
+    else:
+        yield kind
 
 
 def _make_tag(section: type[Section]) -> str:

@@ -77,7 +77,7 @@ class Bins(Section):
 
 
 class TargetConfig(Section):
-    """Cells of landings, in which reports count throws."""
+    """Cells of landings, which `throwcollect cover` fills evenly, and in which reports count throws."""
 
     distance_m: Bins | None = None
     """Horizontal distance of the landing ball from the origin of the robot's base."""
@@ -123,7 +123,7 @@ class SweepConfig(Section):
     `tool`, `ball` and `robot` have their defaults, except `posture`, `locked` and `base_height_m`. Somebody who plans
     motions for a real robot knows only the nominal one."""
     target: TargetConfig | None = None
-    """Cells of landings, in which reports count throws."""
+    """Cells of landings, which `throwcollect cover` fills evenly, and in which reports count throws."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.sampler == "list":

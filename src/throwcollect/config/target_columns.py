@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
-
-from pydantic import Field
 
 TARGET_PREFIX = "target_"
 """Prefix of the columns of targets. No other columns have it: keys have dots, and results have other names."""
@@ -27,7 +24,7 @@ class TargetColumn:
         required: Whether a target has to have it.
     """
 
-    name: Annotated[str, Field(pattern=f"^{TARGET_PREFIX}")]
+    name: str
     of: str
     miss: str
     word: str

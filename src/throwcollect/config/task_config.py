@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
@@ -14,13 +14,6 @@ from throwcollect.config.section import Section
 from throwcollect.config.target_columns import TargetColumn
 from throwcollect.config.until import UntilConfig
 from throwcollect.wording import join_names, suggest
-
-
-def _refuse_base(until: type[UntilConfig]) -> type[UntilConfig]:
-    """Make sure that a section `until` has a key."""
-    if until is UntilConfig:
-        raise ValueError("should be derived from UntilConfig, with the outcome that is counted as its key")
-    return until
 
 
 class TaskConfig(Section):
@@ -40,7 +33,7 @@ class TaskConfig(Section):
     """
 
     implementation: ClassVar[str]
-    until: ClassVar[Annotated[type[UntilConfig], AfterValidator(_refuse_base)]]
+    until: ClassVar[type[UntilConfig]]
     throws: ClassVar[bool] = False
     targets: ClassVar[tuple[str, ...]] = ()
     given: ClassVar[tuple[str, ...]] = ()
@@ -58,6 +51,12 @@ class TaskConfig(Section):
     """How the joints go from start to end."""
     points_hz: Annotated[float, Field(ge=5, le=1000)] = 25.0
     """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Refuse a task without `until`: all configurations need to know the keys of that section."""
+        if not hasattr(cls, "until"):
+            raise TypeError(f"{cls.__qualname__} lacks until")
 
     @property
     def success(self) -> str:

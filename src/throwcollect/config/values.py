@@ -11,13 +11,11 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from throwcollect.config.key import Effect, Key, key_of_field, overlay
-from throwcollect.config.kinds import unknown_joint
-from throwcollect.config.problems import Location, findings, join_key, unknown_key
+from throwcollect.config.problems import Location, find_problems, join_key, read_index, unknown_key
 from throwcollect.config.schema import Config
-from throwcollect.config.section import Section, list_sections
-from throwcollect.config.shape import index_or_key, shape_of
+from throwcollect.config.section import Section, list_kinds
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.members import load_member
+from throwcollect.wording import suggest
 
 AnySection = TypeVar("AnySection", bound=Section)
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_]")
@@ -109,7 +107,13 @@ def reason_not_sweepable(config: Config, key: str) -> str | None:
     leaf = next((leaf for leaf in leaves(config) if leaf.name == key), None)
     if leaf is not None:
         return _find_obstacle(config, leaf)
-    return _explain_absent_joint(config, key) or unknown_key(key, sweepable_keys(config))
+    above, _, name = key.rpartition(".")
+    holder: Any = config
+    for part in above.split("."):
+        holder = getattr(holder, part, None)
+    if isinstance(holder, dict):
+        return f"{above} does not name {name}{suggest(name, holder)}"
+    return unknown_key(key, sweepable_keys(config))
 
 
 def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
@@ -121,46 +125,8 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
         return "cannot be swept, as it is not a number"
     joint = leaf.name.removeprefix("task.start.")
     if joint != leaf.name and joint not in config.task.end:
-        return _explain_unnamed(joint, "task.end")
+        return f"cannot vary from trial to trial, as task.end does not name {joint}"
     return None
-
-
-def _explain_absent_joint(config: Config, key: str) -> str | None:
-    """Say why a sweep may not vary a value of a joint that the configuration does not name in that place.
-
-    Returns:
-        The reason; None if the key does not lead to a mapping from joints, so that the key itself is wrong.
-    """
-    holder: Any = config
-    annotation = Key()
-    parts = key.split(".")
-    depth = 0
-    while depth < len(parts) and parts[depth] in (inner := _list_values(holder)):
-        if isinstance(holder, Section):
-            annotation = overlay(annotation, type(holder), parts[depth])
-        holder = inner[parts[depth]]
-        depth += 1
-    if depth == len(parts) or not isinstance(holder, dict) or not shape_of(parts[:depth]).maps_joints:
-        return None
-    if not annotation.swept:
-        return "cannot vary from trial to trial"
-    robot, joint = load_member("robots", config.robot.name), parts[depth]
-    if joint not in robot.joints:
-        return unknown_joint(joint, robot)
-    if joint not in config.task.end:
-        return _explain_unnamed(joint, "task.end")
-    # Only a value that is a single number can be added without knowing more of the motion.
-    advice = "; give it a value there first, such as 0.0" if depth == len(parts) - 1 else ""
-    return _explain_unnamed(joint, join_key(tuple(parts[:depth]))) + advice
-
-
-def _list_values(holder: Any) -> dict[str, Any]:
-    """Map the names in a section or a mapping to their values; empty for anything else."""
-    return holder.__dict__ if isinstance(holder, Section) else holder if isinstance(holder, dict) else {}
-
-
-def _explain_unnamed(joint: str, mapping: str) -> str:
-    return f"cannot vary from trial to trial, as {mapping} does not name {joint}"
 
 
 def _find_operator_keys(section: type[Section]) -> Iterator[str]:
@@ -169,7 +135,10 @@ def _find_operator_keys(section: type[Section]) -> Iterator[str]:
             yield name
             continue
         # Sections of members may have the same key.
-        inner = dict.fromkeys(key for each in list_sections(field.annotation) for key in _find_operator_keys(each))
+        sections = [
+            each for each in list_kinds(field.annotation) if isinstance(each, type) and issubclass(each, Section)
+        ]
+        inner = dict.fromkeys(key for each in sections for key in _find_operator_keys(each))
         yield from (f"{name}.{key}" for key in inner)
 
 
@@ -194,8 +163,9 @@ def _change(section: AnySection, changes: Mapping[str, Any], location: Location)
         # Strictly, so that a text in quotes is not taken for a number. Pydantic does not validate sections again.
         return type(section).model_validate(values, strict=True)
     except ValidationError as error:
-        found = findings(error, values, above=location)
-        raise ConfigError([Problem(each.sentence, each.key) for each in found]) from error
+        found = find_problems(error, type(section), values)
+        problems = [Problem(sentence, join_key((*location, *place))) for place, sentence in found.items()]
+        raise ConfigError(problems) from error
 
 
 def _replace(value: Any, change: Any, location: Location) -> Any:
@@ -206,7 +176,7 @@ def _replace(value: Any, change: Any, location: Location) -> Any:
     # A list is changed as a mapping from index to item; of any other value, each part is an unknown key.
     copy: Any = dict(enumerate(value)) if isinstance(value, list) else dict(value) if isinstance(value, dict) else {}
     for part, inner in change.items():
-        index = index_or_key(part) if isinstance(value, list) else part
+        index = read_index(value, part)
         if index not in copy:
             raise _make_unknown_key_error((*location, part), list(map(str, copy)))
         copy[index] = _replace(copy[index], inner, (*location, index))

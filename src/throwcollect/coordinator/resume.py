@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Mapping
-from contextlib import closing, suppress
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,27 +21,19 @@ from throwcollect.coordinator.prepare import (
     prepare,
     read_listed_points,
 )
-from throwcollect.dataset.configuration import read_config, unfitting_plan
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS, config_path
-from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import entry_of, entry_of_file, find_damage, is_as_written, is_begun
-from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.provenance import read_provenance
+from throwcollect.dataset.manifest import entry_of, entry_of_file, find_damage, is_begun
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws, read_throws_table
+from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify_plan import find_wrong_trials, read_list
-from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.channels import Channels
-from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
-from throwcollect.robots.description import is_available
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.result import LOST, REFUSED, Result
-from throwcollect.wording import command
+from throwcollect.tasks.result import LOST
 
 _NO_EPISODE = "no whole episode of it was left"
 _MUCH_BYTES = 50_000_000
@@ -81,16 +71,14 @@ def resume(
                 path=directory,
                 hint="derive it again if it is damaged",
             )
+        given = make_self_contained(config)
         stored = _read_stored_config(directory)
         if stored is not None:
-            refuse_changes(directory, stored, make_self_contained(config))
-        old = _read_stored_plan(directory, stored, make_self_contained(config))
+            refuse_changes(directory, stored, given)
         damaged = _find_damaged(directory, onlooker)
+        old = None if PLAN in damaged else _read_stored_plan(directory, stored, given)
         # The list may be read and written below, and a link in its place could lead to any file of the user.
         check_regular(directory / TRIALS)
-        # With `until`, the plan of a finished dataset ends where that does, and is not drawn to the same end.
-        if old is not None and (PLAN in damaged or find_wrong_trials(old)):
-            old = None
         plan, listed = _make_plan(config, directory, sweep_directory, old, damaged, processes, onlooker)
         # The dataset may be finished only by its earlier configuration, or by files that are gone.
         changes = bool(damaged) or (stored is not None and stored.without_run() != plan.config.without_run())
@@ -103,64 +91,7 @@ def resume(
         if changes:
             remove(directory / METADATA)
         _write(plan, directory, stored, ended=ended)
-        _announce_search(directory, onlooker)
         return plan
-
-
-def finish_without_simulating(
-    config: Config, directory: Path, *, sweep_directory: Path, onlooker: Onlooker = SILENT
-) -> None:
-    """Finish a dataset with the episodes that are whole, and give all other trials up as lost; else as `resume`.
-
-    An episode that the table of throws has keeps its result there, so neither the robot nor an engine is needed. A
-    finished dataset of which nothing is missing or damaged stays as it is.
-    """
-    plan = resume(config, directory, sweep_directory=sweep_directory, onlooker=onlooker)
-    if is_there(directory / METADATA):
-        onlooker.say(f"{directory}: is finished, and no file of it is missing or damaged")
-        return
-    table, provenance = ThrowsTable.of(plan), read_provenance(directory)
-    rows: Mapping[int, Row] = {}
-    with suppress(DatasetError):
-        rows = RowsByTrial(read_throws_table(directory / THROWS, plan))
-
-    def judge(config: Config, episode: Episode) -> Result:
-        row = rows.get(episode.header.trial)
-        return table.result(row) if row and row["digest"] == episode.digest else judge_episode(config, episode)
-
-    there: list[int] = []
-    wanted = math.inf if plan.config.until is None else plan.config.until.wanted
-
-    def keep(trial: int, result: Result) -> bool:
-        """Note an episode; with `until`, drop those that follow the last trial that is wanted."""
-        nonlocal wanted
-        if wanted <= 0:
-            return False
-        there.append(trial)
-        wanted -= result.outcome.value == plan.config.task.success
-        return True
-
-    with closing(DatasetWriter.open(directory, channels=_read_channels(directory, plan))) as writer:
-        writer.recover(keep, judge=judge)
-        if plan.config.until is not None:
-            # Where the dataset ends without the missing trials is not known, so it ends with the last known one.
-            last = max([*there, *([] if wanted <= 0 else rows)], default=plan.trials.first)
-            for trial in writer.list_missing():
-                if (row := rows.get(trial)) and row["outcome"] == REFUSED:
-                    writer.refuse(trial, row["reason"])
-            writer.end_with(last)
-        for trial in writer.list_missing():
-            row = rows.get(trial)
-            writer.append_lost(trial, row["reason"] if row and row["outcome"] == LOST else _NO_EPISODE)
-        writer.finish(provenance=provenance)
-
-
-def _read_channels(directory: Path, plan: Plan) -> Channels | None:
-    """Read what is recorded where the robot is not installed, from the first recording that describes it; else None."""
-    for path in sorted(directory.glob(f"*{SHARD_SUFFIX}*")) if not is_available(plan.config) else ():
-        with suppress(DatasetError), open_mcap(path) as contents:
-            return Channels(plan.config, contents.read_robot_description())
-    return None
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
@@ -195,13 +126,7 @@ def _make_plan(
         lost_list = own_list and (TRIALS in damaged or not _has_own_list(directory, old))
         return replace(old, config=old.config.run_as(config)), old.trials.points if lost_list else None
     check_room(directory, count_before(given))
-    try:
-        drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
-    except PlanError as error:
-        if own_list:
-            longer = f"{command('up', 'CONFIG', '--resume', directory)} takes further rows of the list of CONFIG"
-            error.hint = error.hint or longer
-        raise
+    drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
     plan = _extend(directory, old, replace(drawn, config=config))
     return plan, read_listed_points(given, directory=sweep_directory)
 
@@ -246,15 +171,6 @@ def _has_contents(path: Path, contents: bytes) -> bool:
         return False
 
 
-def _announce_search(directory: Path, onlooker: Onlooker) -> None:
-    """Report the size of what an earlier collection has left, if looking through it takes long."""
-    if is_there(directory / METADATA):
-        return
-    size = sum(path.lstat().st_size for path in directory.glob(f"*{SHARD_SUFFIX}*"))
-    if size >= _MUCH_BYTES:
-        onlooker.say(f"{directory}: looks through {size / 1e6:.0f} MB of recordings first; whole episodes stay")
-
-
 def _find_damaged(directory: Path, onlooker: Onlooker) -> frozenset[str]:
     """Find the names of files of a finished dataset that are missing or damaged; none if it is not finished."""
     if not is_there(directory / METADATA):
@@ -262,11 +178,6 @@ def _find_damaged(directory: Path, onlooker: Onlooker) -> frozenset[str]:
     findings = find_damage(directory, in_full=True)
     for finding in findings:
         onlooker.warn(f"{directory}: {finding}")
-    if any(finding.file == SOURCES for finding in findings):
-        raise DatasetError(
-            f"{directory / SOURCES}: is missing or damaged, and nothing else says where the trials come from",
-            hint="derive the dataset again",
-        )
     return frozenset(finding.file for finding in findings)
 
 
@@ -296,24 +207,23 @@ def _read_stored_config(directory: Path) -> Config | None:
         path = config_path(directory)
         config = load(path)
         # Compare the whole text: one that a power cut has cut off may still be valid, with defaults for missing keys.
-        # A finished dataset of an earlier version has fewer keys, and counts as complete if its manifest says so.
-        complete = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
+        return config if path.read_text(encoding="utf-8") == dump_yaml(config) else None
     except (ConfigError, DatasetError, OSError):
         return None
-    return config if complete else None
 
 
 def _read_stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan | None:
+    """Read the plan; None if it is missing or damaged, and the configuration is there, from which it is drawn again."""
     try:
-        return Plan.read(directory / PLAN, stored or config)
-    except DatasetError as error:
-        if stored is not None and isinstance(error, ForeignPlanError) and not is_as_written(directory, CONFIG):
-            raise unfitting_plan(error) from error
+        plan = Plan.read(directory / PLAN, stored or config)
+    except ForeignPlanError:
+        raise
+    except DatasetError:
+        # Without the stored configuration, nothing tells whether the given one is that of the dataset.
         if stored is None:
-            # The configuration is missing, too, so nothing tells whether the given one is that of the dataset.
-            hint = f"{command('up', 'CONFIG', '--resume', directory)}, with the CONFIG that the dataset was begun with"
-            raise DatasetError(error.message, hint=hint) from error
+            raise
         return None
+    return None if find_wrong_trials(plan) else plan
 
 
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
@@ -326,9 +236,7 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
-        compare = command("dataset", "replay", directory, "--all", "--engine", config.sim.engine)
-        hint = f"{compare} tells by how much its throws differ" if "sim.engine" in changed else None
-        raise ConfigError(problems, expected=same, hint=hint)
+        raise ConfigError(problems, expected=same)
 
 
 def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
@@ -348,22 +256,14 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
         raise ConfigError(
             [Problem(f"{directory} has {len(old.trials)} already, got {count}", key="trials")],
             expected=f"{len(old.trials)} or more",
-            hint="throwcollect dataset sample takes some of them into a new dataset",
         )
     before, after = old.trials[:count], new.trials[:count]
-    are_same = np.array_equal(before.digests, after.digests)
-    if new.config.until is None:
-        # Otherwise, the collection checks most of the trials.
-        are_same = are_same and before.refused.keys() == after.refused.keys()
-    if new.config.sweep.file is not None and not (are_same and before.targets == after.targets):
+    are_same = np.array_equal(before.digests, after.digests) and before.targets == after.targets
+    # With `until`, the collection checks most of the trials.
+    if not are_same or (new.config.until is None and before.refused.keys() != after.refused.keys()):
+        drawn = "the list" if new.config.sweep.file is not None else f"the sampler {new.config.sweep.sampler}"
         raise ConfigError(
-            [Problem(f"the list begins with other trials or targets than {directory} has", key="sweep.file")],
-            expected="the same rows, and further ones below them",
-        )
-    if not are_same:
-        raise ConfigError(
-            [Problem(f"the sampler {new.config.sweep.sampler} draws other trials when there are more", key="trials")],
-            expected=f"{len(old.trials)}, as {directory} was begun with",
-            hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
+            [Problem(f"{drawn} begins with other trials or targets than {directory} has", key="sweep")],
+            expected="a list with further rows below, or a sampler that goes on where it ended: sobol, uniform",
         )
     return new

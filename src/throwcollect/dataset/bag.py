@@ -19,7 +19,7 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
-from throwcollect.config.yaml_nodes import line, reason
+from throwcollect.config.document import explain_yaml_error
 from throwcollect.dataset.directory import METADATA, PLAN, describe_other, has_files
 from throwcollect.dataset.lock import is_locked
 from throwcollect.episode.channels import Channel
@@ -115,14 +115,11 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
     """Read a YAML file such as `to_yaml` makes: one mapping, without anchors and tags."""
     try:
         document = _parse(read_text(path, most_bytes=_MOST_BYTES))
-    except RecursionError as error:
-        raise DatasetError("cannot be read: values are nested too deeply", path=path) from error
-    except YAMLError as error:
+    except (YAMLError, RecursionError, ValueError) as error:
         # The library's own text shows lines of the file, in a paragraph that looks like no other message.
-        place = "" if (at := line(error)) is None else f"line {at}"
-        raise DatasetError(f"cannot be read: {reason(error)}", path=path, place=place) from error
-    except ValueError as error:
-        raise DatasetError(f"cannot be read: {error}", path=path) from error
+        reason, line = explain_yaml_error(error)
+        place = "" if line is None else f"line {line}"
+        raise DatasetError(f"cannot be read: {reason}", path=path, place=place) from error
     return document if isinstance(document, dict) else {}
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, SOURCES, config_path, describe_other, has_files
+from throwcollect.dataset.directory import CONFIG, config_path, describe_other, has_files
 from throwcollect.dataset.manifest import is_begun, was_changed
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import is_there, refuse_pointers
 from throwcollect.wording import command
 
@@ -44,17 +44,8 @@ def reading_config(directory: Path, file: Path | None = None, overrides: Sequenc
             if file or all(problem.path is None for problem in error.problems):
                 raise
             refuse_damaged_config(directory, error)
-            hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
-            raise ConfigError(error.problems, hint=hint) from error
+            raise
         yield config
-
-
-def unfitting_plan(error: ForeignPlanError) -> ForeignPlanError:
-    """The error for a plan of another configuration than the one beside it, where nothing says which was changed."""
-    return ForeignPlanError(
-        f"{error.message} than {CONFIG}; one of the two was changed, and nothing says which",
-        hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
-    )
 
 
 def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
@@ -63,20 +54,15 @@ def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
     # Without a key, it is the file itself that is wrong.
     if not first.key or was_changed(directory, CONFIG):
         place = ": ".join(filter(None, [f"line {first.line}" if first.line else "", first.key]))
-        hint = _say_how_to_restore(directory)
-        raise DatasetError(first.message, path=directory / CONFIG, place=place, hint=hint) from error
+        raise DatasetError(first.message, path=directory / CONFIG, place=place, hint=_restore(directory)) from error
 
 
 def refuse_lost_config(directory: Path) -> None:
     """Refuse a directory that holds files of a dataset, but no configuration."""
     if has_files(directory) and not is_there(directory / CONFIG):
-        raise DatasetError("no such file", path=directory / CONFIG, hint=_say_how_to_restore(directory))
+        raise DatasetError("no such file", path=directory / CONFIG, hint=_restore(directory))
 
 
-def _say_how_to_restore(directory: Path) -> str:
+def _restore(directory: Path) -> str:
     """Say how to get the configuration of a dataset back; nothing else in the directory holds it."""
-    if (directory / SOURCES).exists():
-        return "derive the dataset again"
-    if (directory / PLAN).exists():
-        return f"{command('up', 'CONFIG', '--resume', directory)}, with the configuration that it was collected with"
-    return f"copy the configuration that it was collected with to {directory / CONFIG}"
+    return f"{command('up', 'CONFIG', '--resume', directory)}, with the configuration that it was collected with"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
@@ -33,7 +32,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         # A directory that the user made before is left in place if this fails.
         made = not directory.exists()
         directory.mkdir(parents=True, exist_ok=True)
-    except (OSError, RecursionError) as error:
+    except OSError as error:
         raise _make_unusable_error(directory, error) from error
     with hold_lock(directory, needed=False):
         _fill(directory, plan, listed, made=made)
@@ -92,8 +91,5 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
         undo.pop_all()
 
 
-def _make_unusable_error(directory: Path, error: OSError | RecursionError) -> ConfigError:
-    reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
-    if isinstance(error, FileExistsError) and directory.is_symlink():
-        reason = f"it is a link to {os.readlink(directory)}, which is not there"
-    return ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}")
+def _make_unusable_error(directory: Path, error: OSError) -> ConfigError:
+    return ConfigError(f"{directory}: cannot be used as directory of a dataset: {error.strerror}")

@@ -92,7 +92,7 @@ def _is_recording(path: Path) -> bool:
 
 
 def is_attempt(directory: Path) -> bool:
-    """Whether a directory belongs to an attempt at a slice, which no other process knows (see `slice_directory`)."""
+    """Whether a directory belongs to an attempt at a slice, which no other process knows (see `slices`)."""
     return ATTEMPT in directory.name
 
 

@@ -175,14 +175,6 @@ def is_begun(directory: Path) -> bool:
         return False
 
 
-def is_as_written(directory: Path, name: str) -> bool:
-    """Whether there is a manifest, and a file of the dataset is as the manifest says."""
-    try:
-        return entry_of_file(directory / name) in read_manifest(directory)
-    except DatasetError:
-        return False
-
-
 def was_changed(directory: Path, name: str) -> bool:
     """Whether there is a manifest, and a file of the dataset is not as the manifest says."""
     try:

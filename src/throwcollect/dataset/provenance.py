@@ -64,7 +64,7 @@ class Provenance:
         revision: Git revision of the sources that ran, with ``-dirty`` behind it if they were changed; None if they lie
             in no clone.
         image: Id of the image that ran; None without one.
-        robot_sha256: SHA-256 of the robot's description; None if not known, as in datasets of earlier versions.
+        robot_sha256: SHA-256 of the robot's description; None if not known.
     """
 
     finished: datetime

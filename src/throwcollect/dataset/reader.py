@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import check_whole_number, read_list, read_path
+from throwcollect.arguments import check_bounds
 from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
@@ -35,7 +35,7 @@ from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import find_range, find_trial
+from throwcollect.sweep.arrow_column import count_values, find_range, find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
 
@@ -82,7 +82,7 @@ class Dataset(Sequence[Throw]):
             DatasetError: If the directory holds no dataset, an unfinished one, or one whose tables are damaged.
             ConfigError: If its ``config.yaml`` is wrong.
         """
-        path = read_path("directory", directory)
+        path = Path(directory)
         try:
             bag = read_bag_metadata(path)
             if (found := _find_custom(bag, "throwcollect.format")) != FORMAT:
@@ -192,34 +192,21 @@ class Dataset(Sequence[Throw]):
         """Hash over all episodes in order of trials, as it was written.
 
         Raises:
-            DatasetError: If the metadata do not have it.
+            DatasetError: If the metadata do not have it, as those of an unfinished dataset.
         """
-        return self._read_custom("throwcollect.digest")
-
-    @property
-    def layout(self) -> str:
-        """Number of the format of its files, as it was written.
-
-        Raises:
-            DatasetError: If the metadata do not have it.
-        """
-        return self._read_custom("throwcollect.format")
+        digest = _find_custom(self._bag, "throwcollect.digest")
+        if not isinstance(digest, str):
+            raise DatasetError("throwcollect.digest is missing", path=self.directory / METADATA)
+        return digest
 
     @property
     def shards(self) -> tuple[str, ...]:
-        """Names of its recordings.
-
-        Raises:
-            DatasetError: If the metadata do not have them.
-        """
-        names = self._bag.get("relative_file_paths")
-        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise self._make_missing_error("relative_file_paths")
-        return tuple(names)
+        """Names of the recordings that its throws are in, in order."""
+        return tuple(sorted(count_values(self.throws["shard"].drop_null())))
 
     @property
     def topics(self) -> Mapping[str, int]:
-        """Number of messages of each topic.
+        """Number of messages of each topic in the whole dataset, as it was written.
 
         Raises:
             DatasetError: If the metadata do not have them.
@@ -228,17 +215,7 @@ class Dataset(Sequence[Throw]):
             counts = self._bag["topics_with_message_count"]
             return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in counts}
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise self._make_missing_error("topics_with_message_count") from error
-
-    def _make_missing_error(self, name: str) -> DatasetError:
-        return DatasetError(f"{name} is missing", path=self.directory / METADATA)
-
-    def _read_custom(self, name: str) -> str:
-        """Return what the product itself wrote into the metadata."""
-        value = _find_custom(self._bag, name)
-        if not isinstance(value, str):
-            raise self._make_missing_error(name)
-        return value
+            raise DatasetError("topics_with_message_count are missing", path=self.directory / METADATA) from error
 
     @property
     def recorded(self) -> Dataset:
@@ -314,13 +291,13 @@ class Dataset(Sequence[Throw]):
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
         if threads is not None:
-            check_whole_number("threads", threads, least=1)
+            check_bounds("threads", threads, least=1)
         trials, known = self.throws["trial"].to_pylist(), self.joints
-        chosen = known if joints is None else read_list("joints", joints, "names")
+        chosen = known if joints is None else tuple(joints)
         for joint in chosen:
             if joint not in known:
                 raise ConfigError(unknown_joint(joint, robot_of(self.config)))
-        wanted = read_list("columns", columns, "names")
+        wanted = tuple(columns)
         return read_trajectories(trials, self._stored, wanted, chosen, threads=threads)
 
     @property
@@ -362,7 +339,7 @@ def load(directory: StrPath) -> Dataset:
     Warns:
         UnfinishedDatasetWarning: If it is not finished.
     """
-    path = read_path("directory", directory)
+    path = Path(directory)
     # If the directory is no dataset at all, `open` says what is wrong.
     if is_there(path / METADATA) or not is_there(path / PLAN):
         return Dataset.open(path)

@@ -5,13 +5,13 @@ The directory of the new dataset must be new or empty.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from throwcollect.arguments import check_whole_number, is_whole, read_list, read_path, refuse_argument, show_value
+from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
 from throwcollect.derive.derivation import Derived, derive
@@ -28,11 +28,10 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
             directory cannot be used.
         DatasetError: If a dataset is damaged, or the new one cannot be written.
     """
-    listed = read_list("directories", directories, "directories", (str, os.PathLike))
-    if not listed:
+    if not directories:
         raise refuse_argument("directories", "got none", expected="at least one dataset")
-    sources = [Dataset.open(directory) for directory in listed]
-    return derive(sources, read_path("output", output), offered=sum(map(len, sources)))
+    sources = [Dataset.open(directory) for directory in directories]
+    return derive(sources, Path(output), offered=sum(map(len, sources)))
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
@@ -46,7 +45,7 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
     chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where").fill_null(False)))
     if not len(chosen.recorded):
         raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
-    return derive([chosen], read_path("output", output), offered=len(dataset))
+    return derive([chosen], Path(output), offered=len(dataset))
 
 
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
@@ -58,13 +57,12 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
         ConfigError: If the dataset has fewer episodes, a number is wrong, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    check_whole_number("seed", seed, least=0)
+    check_bounds("seed", seed, least=0)
     dataset = Dataset.open(directory)
     candidates = dataset.recorded
-    if not (is_whole(count) and 1 <= count <= len(candidates)):
+    if not 1 <= count <= len(candidates):
         bounds = f"from 1 to {len(candidates)}, the number of episodes of {directory}"
-        problem = f"should be {bounds}, got {show_value(count)}"
-        raise refuse_argument("count", problem)
+        raise refuse_argument("count", f"should be {bounds}, got {count}")
     places = np.sort(np.random.default_rng(seed).permutation(len(candidates))[:count])
     chosen = replace(candidates, throws=candidates.throws.take(places))
-    return derive([chosen], read_path("output", output), offered=len(dataset))
+    return derive([chosen], Path(output), offered=len(dataset))

@@ -14,13 +14,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import accumulate
-from typing import Any, cast
+from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.arguments import as_float, check_mapping, check_whole_number, read_list, read_path, refuse_argument
+from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.kinds import NAME_WORDS, Name
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import compute
@@ -94,11 +95,11 @@ def split(
         ConfigError: If fractions, cells or seed are wrong, a part gets no trial, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or a part cannot be written.
     """
-    check_whole_number("seed", seed, least=0)
+    check_bounds("seed", seed, least=0)
     dataset = Dataset.open(directory)
     members = assign(dataset, fractions=fractions, cells=cells, seed=seed)
     parts = {}
-    with new_directory(read_path("output", output)) as beside:
+    with new_directory(Path(output)) as beside:
         for name, cell_of in members.items():
             chosen = replace(
                 dataset, throws=dataset.throws.filter(pc.is_in(dataset.throws["trial"], pa.array(cell_of)))
@@ -139,10 +140,10 @@ def assign(
 def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
     """Find the cell of each row by expressions and widths; None for a row without a finite value on an axis."""
     columns = []
-    texts = read_list("cells", axes, "texts EXPRESSION=WIDTH")
+    texts = tuple(axes)
     if not texts:
         raise refuse_argument("cells", "the list is empty", expected="at least one axis, such as landing_x_m=0.05")
-    if tuple(texts) == SQUARES and "landing_x_m" not in throws.column_names:
+    if texts == SQUARES and "landing_x_m" not in throws.column_names:
         # Whoever left out the axes has not written this column.
         raise refuse_argument(
             "cells",
@@ -171,21 +172,13 @@ def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
     return next(name for name, end in zip(shares, accumulate(shares.values()), strict=True) if place < end)
 
 
-def _write_shares(shares: object) -> str:
-    """Write a mapping as users of commands write it; as fractions, because floats of 1/3 would not add up to 1."""
-    check_mapping("fractions", shares, "{'train': 0.8, 'test': 0.2}, or the text train=0.8,test=0.2")
-    texts = []
-    for name, share in cast(Mapping[str, object], shares).items():
-        number = as_float(share)
-        # What is no number is refused where the text is read.
-        texts.append(f"{name}={Fraction(number).limit_denominator(_FINEST) if math.isfinite(number) else share}")
-    return ",".join(texts)
-
-
 def _read_shares(given: str | Mapping[str, float]) -> dict[str, Fraction]:
-    text = given if isinstance(given, str) else _write_shares(given)
-    what = "a part and its share, such as train=0.8"
-    pairs = [_read_pair(item, "fractions", what) for item in text.split(",")]
+    if isinstance(given, str):
+        what = "a part and its share, such as train=0.8"
+        pairs = [_read_pair(item, "fractions", what) for item in given.split(",")]
+    else:
+        # As fractions, because floats of 1/3 would not add up to 1.
+        pairs = [(name, Fraction(share).limit_denominator(_FINEST)) for name, share in given.items()]
     shares = dict(pairs)
     problem = None
     if len(shares) < len(pairs):
@@ -202,7 +195,7 @@ def _read_shares(given: str | Mapping[str, float]) -> dict[str, Fraction]:
         except ValidationError:
             problem = f"{name!r} should be {NAME_WORDS}"
     if problem:
-        raise refuse_argument("fractions", f"{problem}, got {text!r}")
+        raise refuse_argument("fractions", f"{problem}, got {given!r}")
     return shares
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,13 +201,7 @@ class Engine(ABC):
     """One world with a robot, a ball and the ground.
 
     What follows from a state and commands does not depend, in any bit, on what happened in the world before.
-
-    Attributes:
-        can_be_forked: Whether a world computes the same bits in a process that was forked off the one that made it. A
-            world that needs threads, open files or devices does not.
     """
-
-    can_be_forked: ClassVar[bool] = False
 
     @abstractmethod
     def close(self) -> None:

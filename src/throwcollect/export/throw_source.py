@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from operator import index
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import is_whole, refuse_argument, show_value
+from throwcollect.arguments import refuse_argument
 from throwcollect.config.target_columns import TargetColumn
 from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
@@ -107,13 +108,9 @@ class ExportSource:
         """Open a dataset to export it, at a number of samples per second, or else at the recorded one."""
         dataset = Dataset.open(directory)
         recorded_hz = dataset.config.record.rate_hz
-        if rate_hz is not None and not (is_whole(rate_hz) and 1 <= rate_hz <= recorded_hz):
-            kind = "" if is_whole(rate_hz) else "a whole number, "
-            raise refuse_argument(
-                "rate_hz",
-                f"{show_value(rate_hz)} samples per second",
-                expected=f"{kind}1 to {recorded_hz}, at which {directory} was recorded",
-            )
+        if rate_hz is not None and not 1 <= index(rate_hz) <= recorded_hz:
+            expected = f"1 to {recorded_hz}, at which {directory} was recorded"
+            raise refuse_argument("rate_hz", f"{rate_hz} samples per second", expected=expected)
         if not len(dataset.recorded):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
         rate_hz = rate_hz or recorded_hz

@@ -4,20 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import (
-    as_float,
-    check_whole_number,
-    read_list,
-    read_path,
-    read_word,
-    refuse_argument,
-    show_value,
-)
+from throwcollect.arguments import check_bounds, read_word, refuse_argument
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.target_columns import LARGEST_TARGET
 from throwcollect.errors import ConfigError
@@ -152,8 +145,8 @@ class Model:
             WorkerError: If a process of a simulator ends.
         """
         for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
-            check_whole_number(name, number, least=1)
-        check_whole_number("seed", seed, least=0)
+            check_bounds(name, number, least=1)
+        check_bounds("seed", seed, least=0)
         _check_scatter(scatter)
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
@@ -254,24 +247,23 @@ class Model:
             DatasetError: If it cannot be written.
             MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
-        write_model(read_path("directory", directory), self.file, self.learned, self.trials, self.config)
+        write_model(Path(directory), self.file, self.learned, self.trials, self.config)
 
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points."""
         names = (*self.parameters, *self.given)
-        listed = read_list("points", points, "mappings, one for each throw", (Mapping,))
         rows = []
-        for number, point in enumerate(listed):
+        for number, point in enumerate(points):
             if wrong := sorted(set(point) ^ set(names), key=str):
                 state = "is missing" if wrong[0] in names else "is no key of this model"
                 if wrong[0] in (axis.key for axis in self.learned.axes_of(KeyRole.LATENT)):
                     state = "is a property of the world, which the model has learned; leave it out"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
-            rows.append([as_float(point[name]) for name in names])
+            rows.append([point[name] for name in names])
         values = np.array(rows, np.float64).reshape(-1, len(names))
         if not np.isfinite(values).all():
             number, column = (int(each[0]) for each in np.nonzero(~np.isfinite(values)))
-            value = show_value(listed[number][names[column]])
+            value = values[number, column]
             raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
         split = len(self.parameters)
         parameters = self.learned.scale(KeyRole.PARAMETER, values[:, :split])
@@ -307,8 +299,6 @@ def fit(
     from throwcollect.dataset.selection import find_rows
 
     chosen = read_word("kind", kind, Kind)
-    columns = read_list("targets", targets, "names")
-    keys, known = read_list("parameters", parameters, "keys"), read_list("given", given, "keys")
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
     throws = dataset
@@ -316,7 +306,7 @@ def fit(
         throws = dataset.select(find_rows(where, dataset.throws, "where"))
         if not len(throws):
             raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
-    found = fit_map(throws, kind=chosen, targets=columns, parameters=keys, context=known)
+    found = fit_map(throws, kind=chosen, targets=tuple(targets), parameters=tuple(parameters), context=tuple(given))
     return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
 
 
@@ -326,7 +316,7 @@ def load_model(directory: StrPath) -> Model:
     Raises:
         DatasetError: If there is none, or it is damaged.
     """
-    return Model(*read_model(read_path("directory", directory)))
+    return Model(*read_model(Path(directory)))
 
 
 def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
@@ -358,19 +348,16 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
 
 def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequence[str]) -> Array:
     """Read targets, or places where throws ended, shape ``(n, n_names)``."""
-    rows = []
-    for place in read_list(argument, given, f"{argument}, each with {', '.join(names)}", (Iterable,)):
-        numbers = read_list(argument, place, "numbers", (object,))
-        row = [as_float(number) for number in numbers]
+    rows = [list(map(float, place)) for place in given]
+    for row in rows:
         if len(row) != len(names) or not (np.abs(row) <= LARGEST_TARGET).all():
             wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
-            raise ConfigError(f"got {', '.join(map(show_value, numbers))}", expected=wanted)
-        rows.append(row)
+            raise refuse_argument(argument, f"got {row}", expected=wanted)
     return np.array(rows, np.float64).reshape(-1, len(names))
 
 
 def _check_scatter(scatter: float) -> None:
     """Refuse a number that is no standard deviation."""
-    if not 0.0 <= as_float(scatter) <= LARGEST_TARGET:
+    if not 0.0 <= scatter <= LARGEST_TARGET:
         expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"
-        raise refuse_argument("scatter", f"got {show_value(scatter)}", expected=expected)
+        raise refuse_argument("scatter", f"got {scatter}", expected=expected)

@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field, FiniteFloat, ValidationError
 
 from throwcollect.dataset.directory import has_files
-from throwcollect.dataset.miss_quantiles import find_median
+from throwcollect.dataset.misses import find_median
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text, suggest_path
 from throwcollect.learning.adapting import ROLES, Method

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from throwcollect.dataset.miss_quantiles import find_median, find_share90
+from throwcollect.dataset.misses import find_median, find_share90
 from throwcollect.learning.adapting import Method
 from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.units import format_distance, unit_of_name

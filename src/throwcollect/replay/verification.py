@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from throwcollect.arguments import check_whole_number, read_path
+from throwcollect.arguments import check_bounds
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import Dataset
@@ -43,13 +43,13 @@ def verify_dataset(
         MissingExtraError: If throws are to be simulated, and the extra ``collect`` is not installed.
         WorkerError: If the physics engine does not start.
     """
-    check_whole_number("processes", processes, least=1)
+    check_bounds("processes", processes, least=1)
     if replay is not None:
-        check_whole_number("replay", replay, least=0)
+        check_bounds("replay", replay, least=0)
         # If the dataset cannot be opened, `verify` below reports why.
         with suppress(DatasetError):
             require_simulating(Dataset.open(directory).config.sim.engine)
-    directory = read_path("directory", directory)
+    directory = Path(directory)
     findings = verify(directory, check_of=feasibility_check, processes=processes)
     if replay is not None:
         findings += _replay_findings(directory, replay)

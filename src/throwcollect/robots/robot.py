@@ -4,34 +4,15 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
 
-from pydantic import AfterValidator, Field
-
-from throwcollect.declared_types import check_type
 from throwcollect.errors import ConfigError
 from throwcollect.members import explain_failure
 from throwcollect.robots.urdf import Urdf, locate_mesh, read_urdf, read_xml
-
-
-def _refuse_repeated(controllers: Mapping[str, tuple[str, ...]]) -> Mapping[str, tuple[str, ...]]:
-    """Make sure that no joint has two controllers."""
-    counts = Counter(joint for joints in controllers.values() for joint in joints)
-    if repeated := [joint for joint, count in counts.items() if count > 1]:
-        raise ValueError(f"should name each joint once, not {repeated[0]} twice")
-    return controllers
-
-
-ControllerName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-"""Controllers are nodes of ROS, so their names are such as ROS allows for nodes."""
-NotNegative = Annotated[float, Field(ge=0)]
-Controllers = Annotated[Mapping[ControllerName, tuple[str, ...]], Field(min_length=1), AfterValidator(_refuse_repeated)]
 
 
 # Robots are keys of caches. With `eq`, a robot would be hashed by its fields, but mappings among them have no hash.
@@ -44,7 +25,8 @@ class Robot:
         title: Name of the robot in sentences, such as ``Talos``.
         kind: Words before the title where a text first mentions the robot, such as ``the humanoid robot``; empty if
             the title says enough.
-        controllers: Joint trajectory controller of each limb and its joints, in order.
+        controllers: Joint trajectory controller of each limb and its joints, in order; each joint has one. Their
+            names are such as ROS allows for nodes.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings this directory is not installed.
         urdf: Path of the URDF in that directory, or an absolute path.
@@ -66,7 +48,7 @@ class Robot:
 
     name: str
     title: str
-    controllers: Controllers
+    controllers: Mapping[str, tuple[str, ...]]
     share: Callable[[], Path]
     urdf: str
     srdf: str
@@ -77,9 +59,9 @@ class Robot:
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
     ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    goal_tolerance_rad: NotNegative = 0.0
-    goal_time_s: NotNegative = 0.0
-    stopped_velocity_radps: NotNegative = 0.01
+    goal_tolerance_rad: float = 0.0
+    goal_time_s: float = 0.0
+    stopped_velocity_radps: float = 0.01
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
@@ -115,8 +97,7 @@ class Robot:
             MemberError: If the robot comes from another package, and its function fails.
         """
         with explain_failure("robots", self.name, "find its files"):
-            check_type("the directory that its function share returns", directory := self.share(), Path)
-        return directory
+            return self.share()
 
     @property
     def urdf_path(self) -> Path:

@@ -261,7 +261,6 @@ def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: 
             order.output,
             overrides=order.overrides,
             processes=count_cores(),
-            ahead=True,
             onlooker=onlooker,
             run=run,
         )
@@ -272,7 +271,6 @@ def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: 
             order.output,
             record.started,
             processes=count_cores(),
-            ahead=True,
             origin=record.origin,
         )
         return prepare_run(records, request, onlooker, run=run)
@@ -291,7 +289,7 @@ def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onl
         run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations)
         # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
         choice.runtime.host(run.place, config, warn=onlooker.warn).close()
-        return PreparedRun(records, run, config, directory, onlooker=onlooker, runtime=choice.runtime)
+        return PreparedRun(records, run, config, directory, onlooker=onlooker)
 
 
 def _check_session(config: Config) -> None:

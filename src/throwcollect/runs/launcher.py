@@ -24,7 +24,7 @@ from throwcollect.runs.run_record import RunFailure, Summary
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
-from throwcollect.runtimes.runtime import Host, NodeState, Place, RunEvent, Runtime
+from throwcollect.runtimes.runtime import Host, NodeState, Place, RunEvent
 from throwcollect.wording import command
 
 _POLL_S = 0.05
@@ -37,13 +37,12 @@ def launch(
     *,
     onlooker: Onlooker,
     interruptions: Callable[[], int],
-    runtime: Runtime | None = None,
 ) -> Summary | None:
     """Launch a prepared run until its last trial has ended, or go on with a run whose launcher died.
 
     A run that collects no dataset goes on until the user stops it. This function writes the end of the run into its
-    record, and closes the run and the runtime. `runtime` is the one that has begun something for the run; None if none
-    has. `interruptions` tells how often the user has asked to stop: the first time, running trials are still finished.
+    record, and closes the run. `interruptions` tells how often the user has asked to stop: the first time, running
+    trials are still finished.
 
     Returns:
         The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
@@ -51,10 +50,9 @@ def launch(
 
     def host(place: Place) -> Host:
         run.record.middleware.joining.settle()
-        return (runtime or get_runtime(run.record.runtime)).host(place, config, warn=onlooker.warn)
+        return get_runtime(run.record.runtime).host(place, config, warn=onlooker.warn)
 
-    end = None if runtime is None else runtime.close
-    return launch_host(run, host, onlooker=onlooker, interruptions=interruptions, is_open=config.run.open, end=end)
+    return launch_host(run, host, onlooker=onlooker, interruptions=interruptions, is_open=config.run.open)
 
 
 def launch_host(
@@ -64,11 +62,10 @@ def launch_host(
     onlooker: Onlooker,
     interruptions: Callable[[], int],
     is_open: bool = False,
-    end: Callable[[], None] | None = None,
 ) -> Summary | None:
     """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
 
-    With `is_open`, anybody can join the run. `end` is called when the host is closed.
+    With `is_open`, anybody can join the run.
     """
     session = _Session(run, onlooker, interruptions)
     place = run.place
@@ -94,8 +91,6 @@ def launch_host(
         code, failure = Interrupted.exit_code, RunFailure("interrupted")
         raise
     finally:
-        if end is not None:
-            end()
         # Without a host, nobody has looked for containers of an earlier launcher, so `left` in the record still holds.
         left = run.record.left if host is None else not host.cleared
         if left:

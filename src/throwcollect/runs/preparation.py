@@ -10,7 +10,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.arguments import check_whole_number, read_path
+from throwcollect.arguments import check_bounds
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
@@ -22,12 +22,12 @@ from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import busy_error, find_left_in
-from throwcollect.runs.runtime_choice import RuntimeChoice, begin, choose
+from throwcollect.runs.runtime_choice import RuntimeChoice, choose
 from throwcollect.runtimes.ports import reserve_port
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
-    # This import takes long; it is made after the runtime has begun its work, so that both run at the same time.
+    # This import takes long, and errors in the configuration need none of it.
     from throwcollect.sweep.plan import Plan
 
 MANY_TRIALS = 1000
@@ -44,9 +44,7 @@ class RunRequest:
         started: Time of the request.
         plan: The plan of the dataset that the run continues; None for a new dataset.
         processes: Number of processes that may check the trials of a large plan.
-        ahead: Whether the runtime begins its work before there is a plan, for `PreparedRun.collect`.
         origin: The request of a client; None if a command or a program asks.
-        begun: The runtime that has begun its work; None if none has yet. See `runtime_choice.begin`.
         choice: The runtime; None if it is not chosen yet.
     """
 
@@ -56,9 +54,7 @@ class RunRequest:
     started: datetime
     plan: Plan | None = None
     processes: int = 1
-    ahead: bool = False
     origin: Origin | None = None
-    begun: RuntimeChoice | None = None
     choice: RuntimeChoice | None = None
 
 
@@ -68,7 +64,6 @@ def prepare(
     overrides: Sequence[str] = (),
     output: str | os.PathLike[str] | None = None,
     processes: int = 1,
-    ahead: bool = False,
     onlooker: Onlooker = SILENT,
 ) -> PreparedRun:
     """Prepare a collection into a new dataset.
@@ -79,19 +74,17 @@ def prepare(
         output: Directory of the dataset, new or empty; None names one after the configuration.
         processes: Number of processes that may check the trials of a large plan; if there are several, each imports the
             main program, as processes of `multiprocessing` do.
-        ahead: Whether processes that nodes need start while the plan is made, which saves time if `collect` follows;
-            they end with the run, or when the block of the prepared run is left.
         onlooker: Is told what goes on.
     """
-    check_whole_number("processes", processes, least=1)
+    check_bounds("processes", processes, least=1)
     started = datetime.now(timezone.utc)
-    file, named = read_path("config", config), None if output is None else read_path("output", output)
+    file, named = Path(config), None if output is None else Path(output)
     with load_locating_errors(file, overrides) as read:
         directory = named or _name_directory(read.name)
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
-        request = RunRequest(read, file.parent, directory, started, processes=processes, ahead=ahead)
+        request = RunRequest(read, file.parent, directory, started, processes=processes)
         return prepare_run(records, request, onlooker)
 
 
@@ -109,7 +102,6 @@ def resume(
     overrides: Sequence[str] = (),
     processes: int = 1,
     simulate: bool = True,
-    ahead: bool = False,
     onlooker: Onlooker = SILENT,
     run: OpenRun | None = None,
 ) -> PreparedRun | None:
@@ -122,7 +114,6 @@ def resume(
         processes: Number of processes that may check the trials of a larger plan, as for `prepare`.
         simulate: Whether missing trials are run; if not, the dataset is finished at once with the episodes that are
             whole, and all other trials are lost.
-        ahead: As for `prepare`.
         onlooker: Is told what goes on.
         run: The run, if it has a record already; None makes a new one.
 
@@ -130,12 +121,12 @@ def resume(
         The run; None if every trial has ended, so that nothing is left to do, or if nothing should be simulated.
     """
     started = datetime.now(timezone.utc)
-    directory = read_path("directory", directory)
-    file = None if config is None else read_path("config", config)
+    directory = Path(directory)
+    file = None if config is None else Path(config)
     with reading_config(directory, file, overrides) as read:
         sweep_directory = directory if file is None else file.parent
         if not simulate:
-            from throwcollect.coordinator.resume import finish_without_simulating
+            from throwcollect.coordinator.salvage import finish_without_simulating
 
             finish_without_simulating(read, directory, sweep_directory=sweep_directory, onlooker=onlooker)
             return None
@@ -149,7 +140,6 @@ def resume(
             directory,
             started,
             processes=processes,
-            ahead=ahead,
             origin=None if run is None else run.record.origin,
         )
         planned = _plan_again(request, onlooker)
@@ -160,41 +150,35 @@ def _plan_again(request: RunRequest, onlooker: Onlooker) -> RunRequest | None:
     """Make the plan of a dataset to continue, and choose the runtime; None if every trial has ended."""
     from throwcollect.coordinator.resume import has_all_trials, resume
 
-    with ExitStack() as undo:
+    def choose_runtime() -> None:
+        # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
+        nonlocal request
+        request = _choose_runtime(request, onlooker)
 
-        def choose_runtime() -> None:
-            # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
-            nonlocal request
-            request = _choose_runtime(request, undo, onlooker)
-
-        plan = resume(
-            request.config,
-            request.directory,
-            sweep_directory=request.sweep_directory,
-            processes=request.processes,
-            before_writing=choose_runtime,
-            onlooker=onlooker,
-        )
-        if has_all_trials(request.directory, plan):
-            onlooker.say(f"{request.directory}: every trial has ended, nothing is left to do")
-            return None
-        # From here on, `prepare_run` closes what the runtime has begun.
-        undo.pop_all()
+    plan = resume(
+        request.config,
+        request.directory,
+        sweep_directory=request.sweep_directory,
+        processes=request.processes,
+        before_writing=choose_runtime,
+        onlooker=onlooker,
+    )
+    if has_all_trials(request.directory, plan):
+        onlooker.say(f"{request.directory}: every trial has ended, nothing is left to do")
+        return None
     return replace(request, plan=plan)
 
 
-def _choose_runtime(request: RunRequest, undo: ExitStack, onlooker: Onlooker) -> RunRequest:
-    """Choose the runtime of a run that continues a dataset; `undo` gets what ends the work that the runtime begins."""
+def _choose_runtime(request: RunRequest, onlooker: Onlooker) -> RunRequest:
+    """Choose the runtime of a run that continues a dataset."""
     config = request.config
-    if (begun := begin(config) if request.ahead else None) is not None:
-        undo.callback(begun.runtime.close)
-    choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
+    choice = choose(config, say=onlooker.say, warn=onlooker.warn)
     if (volume := config.containers.volume) and choice.runtime.has_volumes:
         raise ConfigError(
             [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
             expected="a dataset in a directory",
         )
-    return replace(request, begun=begun, choice=choice)
+    return replace(request, choice=choice)
 
 
 def _take_over(
@@ -231,9 +215,6 @@ def prepare_run(
     """Prepare a run, a new one if `run` is None; if that fails, all files that this function made are removed."""
     config, plan = request.config, request.plan
     with ExitStack() as held, ExitStack() as undo:
-        begun = request.begun or (begin(config) if request.ahead else None)
-        if begun is not None:
-            undo.callback(begun.runtime.close)
         if run is None:
             run = records.new(config.name)
             undo.callback(run.forget)
@@ -244,7 +225,7 @@ def prepare_run(
         volume = config.containers.volume
         choice = request.choice
         if volume and choice is None:
-            choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
+            choice = choose(config, say=onlooker.say, warn=onlooker.warn)
         if choice is not None and not choice.runtime.has_volumes:
             volume = None
         directory = run.directory / "data" if volume else request.directory
@@ -258,7 +239,7 @@ def prepare_run(
         # A resumed dataset had its files before this run, so they are removed only if the plan is new.
         if request.plan is None:
             undo.callback(remove_plan, directory, made=is_new)
-        choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
+        choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn)
         record = _make_record(run, request, choice, directory, volume)
         # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
         choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
@@ -271,7 +252,6 @@ def prepare_run(
             config,
             directory,
             onlooker=onlooker,
-            runtime=choice.runtime,
             held=held.pop_all(),
             undo=undo.pop_all(),
         )

@@ -18,7 +18,7 @@ from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.run_record import RunRecord, Summary
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere
-from throwcollect.runtimes.runtime import Place, Runtime
+from throwcollect.runtimes.runtime import Place
 
 
 class PreparedRun:
@@ -30,7 +30,6 @@ class PreparedRun:
         directory: Directory of the dataset, as the user named it; None if the dataset is in a volume.
 
     Args:
-        runtime: The runtime, if it has begun something for the run; else None.
         held: Holds the lock of the directory until the launcher, which may be another process, holds it itself.
         undo: Removes the files that were made for the run, if it is not launched.
     """
@@ -43,7 +42,6 @@ class PreparedRun:
         directory: Path,
         *,
         onlooker: Onlooker,
-        runtime: Runtime | None = None,
         held: ExitStack | None = None,
         undo: ExitStack | None = None,
     ) -> None:
@@ -52,7 +50,6 @@ class PreparedRun:
         self._records = records
         self._run = run
         self._onlooker = onlooker
-        self._runtime = runtime
         self._held = held or ExitStack()
         self._undo = undo or ExitStack()
         self._fate: str | None = None
@@ -120,7 +117,6 @@ class PreparedRun:
                 self.config,
                 onlooker=self._onlooker,
                 interruptions=lambda: interruptions() + terminations(),
-                runtime=self._runtime,
             )
         # Runs without a dataset have no summary. Only `background` prepares those, and it does not use the result.
         return cast(Summary, summary)
@@ -133,9 +129,6 @@ class PreparedRun:
         from throwcollect.runs.launcher import start_launcher
 
         self._hand_over()
-        if self._runtime is not None:
-            # The launcher is another process, and cannot use the things that the runtime has begun in this one.
-            self._runtime.close()
         return start_launcher(self._records, self._run, interruptions=interruptions)
 
     def _hand_over(self) -> None:

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from throwcollect.arguments import read_path
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import StrPath
@@ -84,7 +83,7 @@ def id_of(records: Records, named: StrPath) -> str:
     If several ids begin alike, the user means the only run of them that lives. If none of them lives, or more than one,
     this raises an error, because choosing one would be a guess.
     """
-    directory, named = read_path("named", named), os.fspath(named)
+    directory, named = Path(named), os.fspath(named)
     # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
     if not named:
         raise ConfigError("the name of the run is empty", hint="throwcollect ps -a lists all")

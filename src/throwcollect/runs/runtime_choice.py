@@ -22,34 +22,17 @@ class RuntimeChoice:
     middleware: Middleware
 
 
-def begin(config: Config) -> RuntimeChoice | None:
-    """Let the runtime that the run will most likely have begin all work that needs no plan.
-
-    Returns:
-        The runtime, for `choose`, which the caller has to close in any case; None if no runtime seems to be available.
-    """
-    middleware = choose_middleware(config.run.ros)
-    for name in _list_candidates(config):
-        runtime = get_runtime(name)
-        if not runtime.is_absent():
-            runtime.begin(config, middleware)
-            return RuntimeChoice(name, runtime, middleware)
-    return None
-
-
-def choose(
-    config: Config, *, say: Callable[[str], None], warn: Callable[[str], None], begun: RuntimeChoice | None = None
-) -> RuntimeChoice:
+def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], None]) -> RuntimeChoice:
     """Choose the runtime that a configuration asks for, and make sure that it can be used.
 
     With ``auto``, nodes are containers if an engine for them is available. rclpy is used where it is installed. `say`
     gets a line for each step that takes long, such as pulling an image, and then the choice. `warn` gets a line for
-    everything that may be wrong, such as an image that was made from other sources. `begun` is what `begin` returned.
+    everything that may be wrong, such as an image that was made from other sources.
     """
     launcher = choose_middleware(config.run.ros)
 
     def prepare(name: str, note: str) -> RuntimeChoice:
-        runtime = begun.runtime if begun is not None and begun.name == name else get_runtime(name)
+        runtime = get_runtime(name)
         # A runtime imports the packages that only it needs when it is used.
         with explain_missing():
             middleware = runtime.prepare(config, launcher, say=say, warn=warn)

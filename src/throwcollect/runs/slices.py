@@ -16,7 +16,7 @@ from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import PLAN, config_path
-from throwcollect.dataset.slice_directory import (
+from throwcollect.dataset.slices import (
     find_attempts,
     find_finished,
     make_attempt,
@@ -80,7 +80,7 @@ def collect_slice(
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
-    request = RunRequest(config, directory, attempt, started, plan, ahead=True)
+    request = RunRequest(config, directory, attempt, started, plan)
     with ExitStack() as unpublished:
         if scratch is not None:
             unpublished.callback(_keep_recordings, attempt, earlier, directory, slice)

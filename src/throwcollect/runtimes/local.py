@@ -5,25 +5,25 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import subprocess
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
-from throwcollect.own_process import may_be_forked
+from throwcollect.interruption import die_with_parent
+from throwcollect.own_process import make_command
 from throwcollect.ros.connection import Connection
-from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.node_server import ForkedNode, NodeServer
 from throwcollect.runtimes.nodes import (
     ROUTER,
     NodeExit,
     NodeHost,
     NodeSpec,
     describe_end,
-    library_environment,
     node_environment,
     protocol_of,
 )
@@ -41,39 +41,23 @@ _KILLED_S = 5.0
 class LocalRuntime(Runtime):
     """Nodes as child processes of the launcher."""
 
-    def __init__(self) -> None:
-        self._server: NodeServer | None = None
-
-    def begin(self, config: Config, middleware: Middleware) -> None:
-        """Start to import the libraries of nodes; see `Runtime.begin`."""
-        self._server = _make_server(middleware)
-        # Genuine ROS 2 reads its settings from the environment when it is loaded. If this process has loaded it, nodes
-        # that are forked off this process would have the settings of this process.
-        self._server.begin(config, fork=may_be_forked() and middleware.backend == "embedded")
-
-    def close(self) -> None:
-        """See `Runtime.close`."""
-        if self._server is not None:
-            self._server.close()
-
     def in_words(self, config: Config) -> str:
         """See `Runtime.in_words`."""
         return "local processes"
 
     def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
         """Make the host of a run; see `Runtime.host`."""
-        return LocalNodes(place, config, server=self._server)
+        return LocalNodes(place, config)
 
 
 class LocalNodes(NodeHost):
     """Runs nodes as processes, each with a log file of its own; see `nodes.NodeHost`.
 
-    A `NodeServer` forks the nodes. They live in sessions of their own, so that Ctrl-C reaches only the launcher. The
-    kernel ends them when the launcher dies.
+    They live in sessions of their own, so that Ctrl-C reaches only the launcher. The kernel ends them when the launcher
+    dies.
 
     Args:
         elsewhere: Endpoint of a router on another machine; None if the router is one of the nodes.
-        server: The server that forks the nodes; its owner closes it. With None, this host makes and closes a server.
 
     Raises:
         ConfigError: If the router's port is taken.
@@ -81,9 +65,7 @@ class LocalNodes(NodeHost):
 
     cleared = True
 
-    def __init__(
-        self, place: Place, config: Config, *, elsewhere: str | None = None, server: NodeServer | None = None
-    ) -> None:
+    def __init__(self, place: Place, config: Config, *, elsewhere: str | None = None) -> None:
         self.place = place
         self.config = config
         self.data = str(place.directory)
@@ -99,10 +81,8 @@ class LocalNodes(NodeHost):
             self.listen = format_endpoint(protocol, host, port)
             self._endpoint = format_endpoint(protocol, reach_from_here(host), port)
         connection = Connection(self._endpoint, place.key, config.run.domain_id, place.middleware)
-        self._environment = node_environment(connection)
-        self._server = server or _make_server(place.middleware)
-        self._owns_server = server is None
-        self._processes: dict[str, ForkedNode] = {}
+        self._environment = {**os.environ, **node_environment(connection)}
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
@@ -123,8 +103,14 @@ class LocalNodes(NodeHost):
             self._reserved.close()
         try:
             with open(open_log(self.logs.path(node.name)), "ab") as log:
-                self._processes[node.name] = self._server.start(
-                    node.arguments, log=log, core=node.core, environment=self._environment
+                self._processes[node.name] = subprocess.Popen(
+                    [*make_command(), *node.arguments],
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env=self._environment,
+                    start_new_session=True,
+                    preexec_fn=partial(_begin, os.getpid(), node.core),  # noqa: PLW1509 - it calls nothing that takes a lock
                 )
         except OSError as error:
             raise WorkerError(f"{node.name}: cannot be started: {error}") from error
@@ -164,8 +150,10 @@ class LocalNodes(NodeHost):
             process = self._processes.pop(name, None)
             if process is None:
                 continue
-            if process.wait(max(0.0, deadline - time.monotonic())) is None:
-                process.send_signal(signal.SIGKILL)
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
                 process.wait(_KILLED_S)
 
     def close(self) -> None:
@@ -174,12 +162,13 @@ class LocalNodes(NodeHost):
             self._reserved.close()
         self.stop([name for name in self._processes if name != ROUTER])
         self.stop([ROUTER])
-        if self._owns_server:
-            self._server.close()
 
 
-def _make_server(middleware: Middleware) -> NodeServer:
-    return NodeServer({**os.environ, **library_environment(middleware)})
+def _begin(parent: int, core: int | None) -> None:
+    """Prepare a new process before it runs a node; `parent` is the process id of the launcher."""
+    die_with_parent(parent)
+    if core is not None:
+        os.sched_setaffinity(0, {core})
 
 
 def _is_stopped(pid: int) -> bool:

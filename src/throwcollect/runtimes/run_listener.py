@@ -9,11 +9,11 @@ from contextlib import ExitStack, contextmanager
 
 from throwcollect import ros
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.shown_topics import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.graph_names import make_own_name
 from throwcollect.ros.msg import String
+from throwcollect.ros.nodes.coordinator.showing import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.ros.router_endpoint import answers
 
 _SILENT_S = 8.0

@@ -208,18 +208,6 @@ class Runtime(ABC):
             WorkerError: If this machine does not have the runtime.
         """
 
-    def begin(self, config: Config, middleware: Middleware) -> None:
-        """Begin all work for a host that takes long and needs no plan; `middleware` is that of this process."""
-        return
-
-    def close(self) -> None:
-        """End what `begin` has begun."""
-        return
-
-    def is_absent(self) -> bool:
-        """Whether a quick look shows that this machine does not have the runtime."""
-        return False
-
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
     ) -> Middleware:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, ValidationError, model_validator
+from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, model_validator
 
 from throwcollect.config.containers import (
     ContainerOptions,
@@ -24,10 +24,8 @@ from throwcollect.config.containers import (
 from throwcollect.config.document import Document
 from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.loader import load
-from throwcollect.config.problems import findings
 from throwcollect.config.section import Section
-from throwcollect.config.shape import ValueShape
-from throwcollect.errors import ConfigError, NotFoundError, Problem
+from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.runs.run_record import Kind
 from throwcollect.wording import suggest
@@ -155,12 +153,7 @@ class Catalogue:
         if "components" not in document.values:
             config = load(path)
             return cls({config.name: Component(config.name, config.name, "collection", path.absolute(), 1)})
-        try:
-            sections = CatalogueFile.model_validate(document.values, strict=True).components
-        except ValidationError as error:
-            raise ConfigError([*document.problems, *_find_problems(error, document)]) from error
-        if document.problems:
-            raise ConfigError(document.problems)
+        sections = document.validate(CatalogueFile).components
         directory = path.absolute().parent
         return cls({name: _read_component(name, section, document, directory) for name, section in sections.items()})
 
@@ -188,11 +181,3 @@ def _read_component(name: str, section: ComponentSection, document: Document, di
         raise ConfigError([problem, *error.problems], hint=error.hint) from error
     kind: Kind = "collection" if section.session is None else "session"
     return Component(name, pretty_name, kind, config, section.max_instances)
-
-
-def _find_problems(error: ValidationError, document: Document) -> list[Problem]:
-    """Errors of a catalogue, with their lines."""
-    components = {"type": "object", "additionalProperties": ComponentSection.model_json_schema()}
-    shape = ValueShape({"type": "object", "properties": {"components": components}})
-    found = findings(error, document.values, shape=shape, page="docs/serve.md")
-    return [document.problem(each.location, each.sentence) for each in found]

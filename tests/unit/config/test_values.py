@@ -58,15 +58,11 @@ def test_with_values_accepts_numbers_of_numpy():
         ),
         ({f"task.trajectory.weights.arm_right_4_joint.{'9' * 5000}": 1}, r"unknown key; known: 0, 1 and 2$"),
         ({"task.duration_s.x": 1}, r"^task\.duration_s\.x: unknown key; no keys are expected here$"),
-        ({"ball.mass_kg": "1"}, r"^ball\.mass_kg: should be a number above 0 and up to 2 kg, got '1'$"),
-        ({"ball.mass_kg": -1}, r"^ball\.mass_kg: should be a number above 0 and up to 2 kg, got -1$"),
+        ({"ball.mass_kg": "1"}, r"^ball\.mass_kg: should be a valid number, got '1'$"),
+        ({"ball.mass_kg": -1}, r"^ball\.mass_kg: should be greater than 0, got -1$"),
         (
             {"task.trajectory.weights.arm_right_4_joint.1": float("nan")},
-            r"^task\.trajectory\.weights\.arm_right_4_joint\.1: should be a number in rad, got nan$",
-        ),
-        (
-            {"task.end.torso_1_joint": 90},
-            r"^task\.end\.torso_1_joint: .*; angles are in radians: 90 degrees are 1\.5708$",
+            r"^task\.trajectory\.weights\.arm_right_4_joint\.1: should be a finite number, got nan$",
         ),
         ({"record.rate_hz": 300}, r"^record\.rate_hz: should divide sim\.physics_hz, 500, got 300$"),
     ],
@@ -98,27 +94,8 @@ def test_keys_that_may_vary_between_trials_can_be_swept(key):
             "task.start.arm_right_3_joint",
             "cannot vary from trial to trial, as task.end does not name arm_right_3_joint",
         ),
-        ("task.end.arm_right_6_joint", "cannot vary from trial to trial, as task.end does not name arm_right_6_joint"),
-        ("task.start.head_1_joint", "cannot vary from trial to trial, as task.end does not name head_1_joint"),
-        ("task.end.arm_rigth_4_joint", "Talos has no joint 'arm_rigth_4_joint'; did you mean 'arm_right_4_joint'?"),
-        (
-            "robot.joint_offsets.arm_right_4_joint",
-            "cannot vary from trial to trial, as robot.joint_offsets does not name arm_right_4_joint; "
-            "give it a value there first, such as 0.0",
-        ),
-        (
-            "robot.joint_offsets.arm_right_6_joint",
-            "cannot vary from trial to trial, as task.end does not name arm_right_6_joint",
-        ),
-        (
-            "robot.joint_offsets.arm_rigth_4_joint",
-            "Talos has no joint 'arm_rigth_4_joint'; did you mean 'arm_right_4_joint'?",
-        ),
-        ("robot.posture.head_1_joint", "cannot vary from trial to trial"),
-        (
-            "task.trajectory.weights.torso_1_joint.0",
-            "cannot vary from trial to trial, as task.trajectory.weights does not name torso_1_joint",
-        ),
+        ("task.end.arm_rigth_4_joint", "task.end does not name arm_rigth_4_joint; did you mean 'arm_right_4_joint'?"),
+        ("robot.joint_offsets.arm_right_4_joint", "robot.joint_offsets does not name arm_right_4_joint; there is none"),
         (
             "task.trajectory.basis_functions",
             "cannot be swept, as it is a whole number; the values of a sweep have decimals",

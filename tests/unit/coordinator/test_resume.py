@@ -81,15 +81,6 @@ def test_resume_refuses_other_changed_keys_and_names_them_all(directory: Path, p
     assert contents(directory) == prepared
 
 
-def test_resume_with_another_engine_names_the_command_that_compares(tmp_path: Path) -> None:
-    directory = tmp_path / "data"
-    prepare(config_with(), directory, sweep_directory=tmp_path)
-    with pytest.raises(ConfigError, match=r"sim\.engine: .* was begun with 'bullet', got 'mujoco'") as caught:
-        resume(config_with(sim={"engine": "mujoco"}), directory, sweep_directory=tmp_path)
-    compare = f"throwcollect dataset replay {directory} --all --engine mujoco"
-    assert caught.value.hint == f"{compare} tells by how much its throws differ"
-
-
 def test_resume_with_more_trials_continues_the_plan(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     before = resume(config_with(), directory, sweep_directory=directory)
     after = resume(config_with(trials=6), directory, sweep_directory=directory)
@@ -109,7 +100,7 @@ def test_resume_with_more_trials_of_latin_hypercube_is_refused(tmp_path: Path) -
     sweep = {**SETTINGS["sweep"], "sampler": "latin_hypercube"}
     prepare(config_with(sweep=sweep), tmp_path / "data", sweep_directory=tmp_path)
     before = contents(tmp_path / "data")
-    with pytest.raises(ConfigError, match="the sampler latin_hypercube draws other trials when there are more"):
+    with pytest.raises(ConfigError, match="the sampler latin_hypercube begins with other trials"):
         resume(config_with(sweep=sweep, trials=5), tmp_path / "data", sweep_directory=tmp_path)
     assert contents(tmp_path / "data") == before
 
@@ -139,7 +130,7 @@ def test_a_missing_or_damaged_configuration_is_restored_if_it_fits_the_plan(
 def test_a_dataset_with_damaged_plan_and_configuration_is_refused(directory: Path) -> None:
     for path in directory.iterdir():
         path.write_bytes(b"")
-    with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: .*\n  try: throwcollect up CONFIG --resume"):
+    with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: "):
         resume(config_with(), directory, sweep_directory=directory)
 
 
@@ -251,7 +242,7 @@ def test_resume_takes_points_that_were_added_to_the_list(
     with (listed / "lists" / "points.csv").open("a") as file:
         file.write("1.25,0.06\n")
     own = load(listed / "data" / "config.yaml").model_copy(update={"trials": 4})
-    with pytest.raises(PlanError, match=r"at most 3, .*\n  try: throwcollect up CONFIG --resume \S+/data takes fur"):
+    with pytest.raises(PlanError, match="at most 3, "):
         resume(own, listed / "data", sweep_directory=listed / "data")
     plan = resume(Config.model_validate({**LISTED, **more}), listed / "data", sweep_directory=listed)
     assert len(plan.trials) == 4

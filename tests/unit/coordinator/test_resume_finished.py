@@ -13,7 +13,8 @@ from tests.unit.coordinator.listener import Listener
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.damage import find_stored, flip
 
-from throwcollect.coordinator.resume import finish_without_simulating, has_all_trials, resume
+from throwcollect.coordinator.resume import has_all_trials, resume
+from throwcollect.coordinator.salvage import finish_without_simulating
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
@@ -192,7 +193,7 @@ def test_finishing_without_simulating_takes_results_from_the_table(
     trials: Trials, dataset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (dataset / SHARD).unlink()
-    monkeypatch.setattr("throwcollect.coordinator.resume.judge_episode", lambda *_: pytest.fail("is judged again"))
+    monkeypatch.setattr("throwcollect.coordinator.salvage.judge_episode", lambda *_: pytest.fail("is judged again"))
     assert trials.finish(dataset).keys() == {2, 3}
 
 
@@ -230,7 +231,7 @@ def test_resume_refuses_a_dataset_whose_configuration_was_changed(trials: Trials
     (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
     before = contents(dataset)
     other = trials.plan.config.model_copy(update={"seed": 1})
-    with pytest.raises(DatasetError, match=r"one of the two was changed, and nothing says which"):
+    with pytest.raises(DatasetError, match="the plan belongs to another configuration"):
         resume(other, dataset, sweep_directory=dataset)
     assert contents(dataset) == before
 

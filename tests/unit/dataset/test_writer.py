@@ -166,7 +166,7 @@ def test_a_dataset_cannot_be_created_below_a_file(collection: Any, tmp_path: Pat
 def test_a_dataset_cannot_be_created_at_a_link_that_leads_nowhere(collection: Any, tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to("nowhere")
-    with pytest.raises(ConfigError, match=r"link: cannot be used as .*: it is a link to nowhere, which is not there"):
+    with pytest.raises(ConfigError, match="link: cannot be used as directory of a dataset"):
         create(link, collection.plan)
     assert list(tmp_path.iterdir()) == [link]
 

@@ -117,11 +117,12 @@ def test_merged_datasets_of_different_plans_follow_each_other_with_the_bytes_of_
         *ours.throws["digest"].to_pylist(),
         *theirs.throws["digest"].to_pylist(),
     ]
-    for number, (throw, source) in enumerate(zip(merged, [*ours, *theirs], strict=True)):
+    origins = [(source, throw) for source in (ours, theirs) for throw in source]
+    for number, (throw, (dataset, source)) in enumerate(zip(merged, origins, strict=True)):
         assert throw.trial == number
         assert np.array_equal(throw.ball.position, source.ball.position)
         assert throw.events.release.time_s == source.events.release.time_s
-        assert merged.episode(number).chunk == source.read_episode().chunk
+        assert merged.episode(number).chunk == dataset.episode(source.trial).chunk
     one, two = ours.trajectories(), theirs.trajectories()
     both = merged.trajectories()
     assert np.array_equal(both["time_s"], np.concatenate([one["time_s"], two["time_s"]]))
@@ -235,10 +236,7 @@ def test_filtering_an_episode_that_differs_from_its_digest_in_the_table_is_refus
         filter_trials(dataset, tmp_path / "some", where="trial == 0")
 
 
-def test_merge_refuses_a_single_path_and_an_empty_list(collected: Path, tmp_path: Path) -> None:
-    for one, kind in ((str(collected), "a text"), (collected, "no list")):
-        with pytest.raises(ConfigError, match=f"^directories: .* is {kind}\n  expected: a list of directories"):
-            merge(one, tmp_path / "new")
+def test_merge_refuses_an_empty_list(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^directories: got none\n  expected: at least one dataset"):
         merge([], tmp_path / "new")
     assert list(tmp_path.iterdir()) == []
@@ -247,7 +245,7 @@ def test_merge_refuses_a_single_path_and_an_empty_list(collected: Path, tmp_path
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda *paths: sample(*paths, count="2"), "count: should be from 1 to 7, .*, got '2'"),
+        (lambda *paths: sample(*paths, count=8), "count: should be from 1 to 7, .*, got 8"),
         (lambda *paths: sample(*paths, count=2, seed=-1), "seed: got -1\n  expected: 0 or more"),
     ],
 )

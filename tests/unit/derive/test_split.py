@@ -1,7 +1,6 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -141,44 +140,12 @@ def test_a_split_without_axes_of_cells_is_refused(some: Path, tmp_path: Path) ->
         split(some, tmp_path / "parts", fractions=HALVES, cells=[])
 
 
-def test_a_single_text_instead_of_a_list_of_cell_axes_is_refused(some: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"^cells: 'trial=1' is a text\n .*: \['trial=1'\]"):
-        split(some, tmp_path / "parts", fractions=HALVES, cells="trial=1")
-
-
-@pytest.mark.parametrize(("seed", "told"), [(-1, "-1"), (1.5, r"1\.5"), ("1", "'1'"), (None, "None")])
-def test_a_seed_that_is_no_whole_number_or_negative_is_refused(
-    some: Path, tmp_path: Path, seed: Any, told: str
-) -> None:
-    with pytest.raises(ConfigError, match=f"^seed: got {told}\n  expected: .*0 or more"):
-        split(some, tmp_path / "parts", fractions=HALVES, seed=seed)
-
-
 def test_shares_can_be_given_as_a_mapping(some: Path) -> None:
     assert train(some, seed=1, fractions={"train": 0.8, "test": 0.2}) == train(
         some, seed=1, fractions="train=0.8,test=0.2"
     )
     thirds = train(some, seed=1, fractions={"train": 1 / 3, "test": 2 / 3})
     assert thirds == train(some, seed=1, fractions="train=1/3,test=2/3")
-
-
-@pytest.mark.parametrize(
-    ("fractions", "message"),
-    [
-        (
-            0.5,
-            r"got 0\.5\n  expected: a mapping, such as {'train': 0\.8, 'test': 0\.2}, or the text train=0\.8,test=0\.2",
-        ),
-        ({"train": "most", "test": 0.2}, "should be a part and its share, such as train=0.8, got 'train=most'"),
-        ({"train": math.nan, "test": 0.2}, "should be a part and its share, such as train=0.8, got 'train=nan'"),
-        ({"train": 0.4, "test": 0.5}, r"should add up to 1, add up to 0\.9"),
-    ],
-)
-def test_a_split_by_a_wrong_mapping_of_shares_is_refused_with_a_reason(
-    some: Path, tmp_path: Path, fractions: object, message: str
-) -> None:
-    with pytest.raises(ConfigError, match=f"^fractions: {message}"):
-        split(some, tmp_path / "parts", fractions=fractions)
 
 
 def test_a_dataset_whose_trials_do_not_land_asks_for_axes() -> None:

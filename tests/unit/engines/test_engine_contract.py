@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -103,25 +100,6 @@ def test_the_ball_rests_in_the_tool_of_the_still_robot(engine: Engine) -> None:
     assert ball.linear_velocity == pytest.approx((0, 0, 0), abs=1e-4)
     engine.run(still(engine, 100), Observer())
     assert ball_of(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
-
-
-def test_a_forked_world_and_its_parent_simulate_the_same_throw(engine: Engine) -> None:
-    if not engine.can_be_forked:
-        pytest.skip("says that its worlds cannot be forked")
-    reader, writer = os.pipe()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        forked = os.fork()
-    if forked == 0:
-        try:
-            os.write(writer, hashlib.sha256(repr(watch_throw(engine)).encode()).digest())
-        finally:
-            os._exit(0)
-    os.close(writer)
-    with open(reader, "rb") as there:
-        found = there.read()
-    os.waitpid(forked, 0)
-    assert found == hashlib.sha256(repr(watch_throw(engine)).encode()).digest()
 
 
 def test_a_decimal_comma_of_the_process_changes_no_throw(name: str, use_decimal_comma: Callable[[], str]) -> None:

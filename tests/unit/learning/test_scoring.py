@@ -12,7 +12,7 @@ import pytest
 from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.miss_quantiles import find_median, find_share90
+from throwcollect.dataset.misses import find_median, find_share90
 from throwcollect.learning.adapting import Method
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.model_file import AdaptationEntry

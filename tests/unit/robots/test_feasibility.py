@@ -9,8 +9,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import joint_model
-from throwcollect.robots.dynamics import Dynamics
-from throwcollect.robots.feasibility import Feasibility
+from throwcollect.robots.feasibility import Dynamics, Feasibility
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS

@@ -13,12 +13,12 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.as_described import check_loaded
 from throwcollect.engines.engine import Engine, LoadedLink, Scene
 from throwcollect.errors import ConfigError
+from throwcollect.members import load_member
 from throwcollect.robots import description
 from throwcollect.robots.clearance import Clearance
 from throwcollect.robots.description import joint_model, physics_description
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
-from throwcollect.sim.checked_engine import make_engine
 from throwcollect.sim.scene import scene_of
 from throwcollect.tools.tool import tool_of
 
@@ -96,7 +96,7 @@ def load_everywhere(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(CONFIG, physics_description(CONFIG))
     Clearance(robot, joint_model(robot), tool_of(CONFIG))
     for name in ("bullet", "mujoco"):
-        engine = make_engine(name)
+        engine = load_member("engines", name)()
         try:
             engine.load(scene)
             check_loaded(engine, name, scene)
@@ -139,7 +139,7 @@ Changed.__abstractmethods__ = frozenset()  # type: ignore[attr-defined]
 
 @pytest.fixture(scope="module")
 def loaded() -> tuple[Engine, Scene]:
-    engine, scene = make_engine("mujoco"), scene_of(Config(), physics_description(Config()))
+    engine, scene = load_member("engines", "mujoco")(), scene_of(Config(), physics_description(Config()))
     engine.load(scene)
     return engine, scene
 

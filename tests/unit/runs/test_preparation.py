@@ -29,7 +29,7 @@ def test_prepare_refuses_wrong_arguments_before_it_makes_a_directory(tmp_path: P
     (tmp_path / "some.yaml").write_text("trials: 1\n")
     for wrong, message in (
         ({"processes": -3}, "processes: got -3\n  expected: 1 or more"),
-        ({"overrides": "trials=2"}, "overrides: 'trials=2' is a text"),
+        ({"overrides": "trials=2"}, "an override should be KEY=VALUE, got 't'"),
     ):
         with pytest.raises(ConfigError, match=f"^{message}"):
             prepare(tmp_path / "some.yaml", output=tmp_path / "new", **wrong)

@@ -12,9 +12,7 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.runs import runtime_choice
 from throwcollect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.runtimes.docker import image as docker_image
-from throwcollect.runtimes.docker.docker_runtime import DockerRuntime
 from throwcollect.runtimes.docker.image import default_tag
-from throwcollect.runtimes.node_server import NodeServer
 
 
 @pytest.fixture
@@ -169,25 +167,3 @@ def test_an_engine_on_another_machine_is_not_used(choose, monkeypatch: pytest.Mo
     with pytest.raises(WorkerError, match=problem) as caught:
         choose("docker")
     assert caught.value.hint == "run throwcollect on lab, or use processes: --runtime local"
-
-
-@pytest.mark.parametrize(
-    ("wanted", "no_docker", "name", "begun"),
-    [("local", False, "local", True), ("auto", True, "local", True), ("auto", False, "docker", False)],
-)
-def test_processes_are_begun_early_only_if_they_will_surely_be_needed(
-    wanted: str, no_docker: bool, name: str, begun: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begin = Mock()
-    monkeypatch.setattr(NodeServer, "begin", begin)
-    monkeypatch.setattr(DockerRuntime, "is_absent", lambda _: no_docker)
-    config = Config(run=RunConfig(runtime=wanted))
-    found = runtime_choice.begin(config)
-    assert found is not None
-    assert found.name == name
-    assert begin.called == begun
-    if begun:
-        chosen = runtime_choice.choose(
-            config.model_copy(update={"run": RunConfig(runtime="local")}), say=Mock(), warn=Mock(), begun=found
-        )
-        assert chosen.runtime is found.runtime

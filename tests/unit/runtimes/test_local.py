@@ -1,9 +1,11 @@
 import os
 import signal
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import psutil
@@ -13,10 +15,23 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.local import LocalNodes, LocalRuntime
+from throwcollect.runtimes import local
+from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
 from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.runtime import Place
+
+LAUNCHER = """
+import sys
+from pathlib import Path
+from tests.unit.runtimes.test_local import local, node, nodes
+
+local.make_command = lambda: [sys.executable, "-c", "import time; time.sleep(60)"]
+host = nodes(Path(sys.argv[1]))
+host.start(node("sleeps"))
+print(host.handle("node"), flush=True)
+sys.stdin.read()
+"""
 
 
 def place(directory: Path) -> Place:
@@ -31,44 +46,15 @@ def node(code: str, name: str = "node") -> NodeSpec:
     return NodeSpec(name, (code,), NodeRole.EXPENDABLE)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _scripts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Nodes are small scripts: the first argument is run instead of a command."""
-    directory = tmp_path_factory.mktemp("scripts")
-    (directory / "sitecustomize.py").write_text(
-        "import runpy, sys\nrunpy.run_module = lambda *_, **__: exec(sys.argv[1], {'sys': sys})\n"
-    )
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("PYTHONPATH", os.pathsep.join([str(directory), *sys.path]))
-        patched.setenv("ANSWER", "42")
-        yield
-
-
-@pytest.fixture(scope="module")
-def begun(_scripts: None) -> Iterator[LocalRuntime]:
-    """A runtime that has begun: its process, from which nodes are forked, takes a second to start."""
-    runtime = LocalRuntime()
-    runtime.begin(Config(), Middleware())
-    yield runtime
-    runtime.close()
-
-
 @pytest.fixture
-def runtime(begun: LocalRuntime, tmp_path: Path) -> Iterator[LocalNodes]:
-    """The host of a run of that runtime."""
-    local = begun.host(place(tmp_path), Config.model_validate({"run": {"domain_id": 7}}), warn=pytest.fail)
-    yield local
-    local.stop(local.running(), grace_s=0.0)
-    local.close()
-
-
-@pytest.fixture
-def alone(tmp_path: Path) -> Iterator[LocalNodes]:
-    """A host that starts its own process from which nodes are forked."""
-    local = nodes(tmp_path / "alone", domain_id=7)
-    yield local
-    local.stop(local.running(), grace_s=0.0)
-    local.close()
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalNodes]:
+    """The host of a run whose nodes are small scripts: the first argument is run instead of a command."""
+    monkeypatch.setattr(local, "make_command", lambda: [sys.executable, "-c", "import sys; exec(sys.argv[1])"])
+    monkeypatch.setenv("ANSWER", "42")
+    host = nodes(tmp_path, domain_id=7)
+    yield host
+    host.stop(host.running(), grace_s=0.0)
+    host.close()
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -84,15 +70,33 @@ def wait_for_end(runtime: LocalNodes) -> NodeExit:
     return found[0]
 
 
-def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime: LocalNodes, alone: LocalNodes) -> None:
+def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime: LocalNodes) -> None:
     words = "*range(50), os.environ['ANSWER'], os.environ['ROS_DOMAIN_ID']"
-    for host in (runtime, alone):
-        host.start(node(f"import os; print({words}, sep='\\n'); sys.exit(7)"))
-        assert host.running() == ("node",)
-        end = wait_for_end(host)
-        assert (end.name, end.code, end.reason) == ("node", 7, "exit code 7")
-        assert end.log.splitlines() == [*map(str, range(12, 50)), "42", "7"]
-        assert (host.exits(), host.running()) == ([], ())
+    runtime.start(node(f"import os; print({words}, sep='\\n'); sys.exit(7)"))
+    assert runtime.running() == ("node",)
+    end = wait_for_end(runtime)
+    assert (end.name, end.code, end.reason) == ("node", 7, "exit code 7")
+    assert end.log.splitlines() == [*map(str, range(12, 50)), "42", "7"]
+    assert (runtime.exits(), runtime.running()) == ([], ())
+
+
+def test_a_node_has_a_core_a_session_and_a_log_of_its_own(runtime: LocalNodes) -> None:
+    core = max(os.sched_getaffinity(0))
+    runtime.start(replace(node("import time; print('here', flush=True); time.sleep(60)"), core=core))
+    until(lambda: runtime.logs.tail("node") == "here")
+    process = psutil.Process(int(runtime.handle("node") or 0))
+    assert process.cpu_affinity() == [core]
+    assert os.getsid(process.pid) == process.pid
+    streams = [os.readlink(f"/proc/{process.pid}/fd/{number}") for number in range(3)]
+    assert streams == ["/dev/null", *[str(runtime.logs.path("node"))] * 2]
+
+
+def test_nodes_end_when_their_launcher_is_killed(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", LAUNCHER, str(tmp_path)], stdout=subprocess.PIPE) as launcher:
+        assert launcher.stdout is not None
+        process = psutil.Process(int(launcher.stdout.readline()))
+        launcher.kill()
+        process.wait(20)
 
 
 def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNodes) -> None:

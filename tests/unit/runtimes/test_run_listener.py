@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.shown_topics import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.ros import Context, Node, init, shutdown
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.msg import String
+from throwcollect.ros.nodes.coordinator.showing import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes import run_listener

@@ -1,6 +1,7 @@
 """The trial runner turns a leased trial into episode, result and conditions."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.control import ErrorCode, TrajectoryRefusal
 from throwcollect.dataset.judging import judge_episode
+from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
+from throwcollect.engines.engine import Observer, Steps
 from throwcollect.episode.episode_message import Delivery
-from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Simulation, StateCode
@@ -115,3 +118,46 @@ def test_after_a_leased_trial_the_setup_is_the_configuration_again(simulation: S
     runner.begin(3, VALUES)
     finish(runner, simulation)
     assert simulation.trial.setup == TrialSetup(-1, (), CONFIG)
+
+
+@pytest.fixture
+def foreign(monkeypatch: pytest.MonkeyPatch) -> Simulation:
+    """A simulation whose engine counts as one of another package."""
+    monkeypatch.setattr("throwcollect.members.is_own", lambda family, _: family != "engines")
+    monkeypatch.setattr("throwcollect.sim.world.load_member", lambda *_: BallisticEngine)
+    return Simulation(CONFIG)
+
+
+def test_a_trial_in_which_the_engine_fails_ends_with_an_error_and_the_next_one_begins(
+    foreign: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("boom")
+
+    runner = TrialRunner(foreign)
+    runner.begin(0, {})
+    with monkeypatch.context() as patch:
+        patch.setattr(BallisticEngine, "run", fail)
+        # The reset that drops the trial needs no step, as the start state is known.
+        runner.advance(watched=False)
+    assert not foreign.running
+    with pytest.raises(MemberError, match=r"the engine ballistic of .* cannot take steps: ValueError: boom"):
+        runner.hand_over()
+    assert runner.hand_over() is None
+    runner.begin(1, {})
+    assert finish(runner, foreign).episode.header.trial == 1
+
+
+def test_a_sample_of_a_wrong_step_is_an_error_of_the_engine(
+    foreign: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Late(BallisticEngine):
+        def run(self, steps: Steps, observer: Observer) -> int:
+            return super().run(replace(steps, first_sample=steps.first_sample + 1), observer)
+
+    runner = TrialRunner(foreign)
+    runner.begin(0, {})
+    monkeypatch.setattr(foreign.world.engine, "__class__", Late)
+    runner.advance(watched=False)
+    with pytest.raises(MemberError, match="sample 1 should be of step 2, not 3"):
+        runner.hand_over()

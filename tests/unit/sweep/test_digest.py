@@ -15,7 +15,10 @@ from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.throw.throw_config import UntilLanded
 
-WITHOUT_EFFECT = {"name", "trials", "until", "sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"}
+WITHOUT_EFFECT = {
+    *("name", "trials", "until", "sim.real_time_factor", "controllers.names"),
+    *("record.zstd_level", "record.trials_per_shard"),
+}
 POINTS = Points(("ball.mass_kg", "task.duration_s"), np.array([[0.1, 1.0], [0.2, 1.0]]))
 
 TARGET = TargetConfig.model_validate({"distance_m": {"min": 1, "max": 2, "bins": 4}})

@@ -10,8 +10,9 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.members import load_member, load_part, names_of
-from throwcollect.tasks.first_motion import find_first_motion
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result
+from throwcollect.robots.description import robot_of
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
+from throwcollect.tasks.starter import find_first_motion
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import unit_of_name
 
@@ -41,6 +42,7 @@ def make_task(section: type[TaskConfig]) -> Task:
 def test_a_task_has_the_common_outcomes_and_its_success(section: type[TaskConfig]) -> None:
     words = {each.value for each in make_task(section).outcomes}
     assert {LIMIT_VIOLATED, TRACKING_FAILED, LOST, fill(section).success} <= words
+    assert REFUSED not in words
 
 
 @of_every_task
@@ -81,9 +83,11 @@ def test_results_of_a_task_can_be_read_back_from_their_columns(section: type[Tas
 
 
 @of_every_task
-def test_the_motion_ends_where_the_configuration_says(section: type[TaskConfig]) -> None:
+def test_the_motion_moves_the_joints_of_the_configuration_from_time_0_to_its_end(section: type[TaskConfig]) -> None:
     task = make_task(section)
     trajectory = task.trajectory()
+    assert trajectory.joints == tuple(joint for joint in robot_of(task.config).joints if joint in task.config.task.end)
+    assert trajectory.times[0] == 0
     assert dict(zip(trajectory.joints, trajectory.positions[-1].tolist(), strict=True)) == task.config.task.end
 
 

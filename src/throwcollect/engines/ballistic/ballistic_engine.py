@@ -42,7 +42,6 @@ class BallisticEngine(Engine):
     - The ball never spins, and nothing touches the robot.
     """
 
-    can_be_forked = True
     _scene: Scene
     _physics: Physics
     _joints: Array

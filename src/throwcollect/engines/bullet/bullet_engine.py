@@ -44,7 +44,6 @@ class BulletEngine(Engine):
         WorkerError: If Bullet refuses to start another world in this process.
     """
 
-    can_be_forked = True
     _scenery: Scenery
     _ball: int
     _has_floor: bool

@@ -18,6 +18,7 @@ from throwcollect.engines.engine import (
     LoadedLink,
     Observer,
     Physics,
+    Quaternion,
     Sample,
     Scene,
     State,
@@ -25,7 +26,6 @@ from throwcollect.engines.engine import (
     ball_of,
 )
 from throwcollect.engines.mujoco.contact_targets import aim_contacts
-from throwcollect.engines.mujoco.rotations import turn, turn_back
 from throwcollect.engines.mujoco.scenery import (
     Surface,
     describe_links,
@@ -47,7 +47,6 @@ _PRESS = 3
 class MujocoEngine(Engine):
     """A MuJoCo world in this process."""
 
-    can_be_forked = True
     _scene: Scene
     _physics: Physics
     _surfaces: list[Surface]
@@ -185,7 +184,7 @@ class MujocoEngine(Engine):
         first = len(self._columns)
         x, y, z, w = ball.orientation_xyzw
         self._data.qpos[first : first + 7] = (*ball.position, w, x, y, z)
-        spin = turn_back(ball.orientation_xyzw, ball.angular_velocity)
+        spin = _turn_back(ball.orientation_xyzw, ball.angular_velocity)
         self._data.qvel[first : first + 6] = (*ball.linear_velocity, *spin)
 
     def _compute_contact_forces(self) -> None:
@@ -211,7 +210,7 @@ class MujocoEngine(Engine):
     def _sample(self) -> Sample:
         data = self._data
         row = self._pick(data.qpos.tolist() + data.qvel.tolist() + data.qfrc_applied.tolist())
-        return row[:_SPIN] + turn(row[_ORIENTATION], row[_SPIN:])
+        return row[:_SPIN] + _turn(row[_ORIENTATION], row[_SPIN:])
 
     def _apply_drag(self, drag_kgpm: float) -> None:
         first = len(self._columns)
@@ -233,3 +232,18 @@ def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int]) -> Callable
     places = [*joints, x, y, z, i, j, k, w, *range(velocities + ball, velocities + ball + 6)]
     pick: Callable[[list[float]], Sample] = itemgetter(*places)
     return pick
+
+
+def _turn(orientation_xyzw: Sequence[float], vector: Sequence[float]) -> Vector:
+    """Turn a vector from the frame of a body into world."""
+    x, y, z, w = orientation_xyzw
+    a, b, c = vector
+    # With t = 2 u x v for the vector part u and the real part w, the turned vector is v + w t + u x t.
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p)
+
+
+def _turn_back(orientation_xyzw: Quaternion, vector: Vector) -> Vector:
+    """Turn a vector from world into the frame of a body."""
+    x, y, z, w = orientation_xyzw
+    return _turn((-x, -y, -z, w), vector)

@@ -137,7 +137,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
     else:
         if target.height_m is not None:
             # The column has the heights of all trials, but only trials with landings matter here.
-            values["height_m"] = read_numbers(throws, column_of(LANDING_HEIGHT))[landings.trial]
+            values["height_m"] = read_numbers(throws, column_of(LANDING_HEIGHT))[landings.row]
         bins = target.dimensions
         values = {name: column for name, column in values.items() if name in bins}
         edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}

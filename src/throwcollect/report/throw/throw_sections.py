@@ -32,7 +32,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     landings = read_landings(throws, outcomes)
     planned = landings[outcomes.are(LANDED)[landings.row]]
     coverage = count_throws(planned, throws, target=dataset.config.sweep.target)
-    examples = [dataset[trial] for trial in choose_examples(dataset, planned, outcomes)]
+    examples = list(dataset.select(choose_examples(dataset, planned, outcomes)))
     return TaskReport(
         subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by {robot.introduction}",
         tiles=tuple(_show_key_numbers(planned, outcomes)),

@@ -194,7 +194,7 @@ def container_options(
         **options,
         "name": place.container(node),
         "labels": {**options.get("labels", {}), **place.labels(node)},
-        "environment": {**general["environment"], **environment, **chosen},
+        "environment": {**general["environment"], **chosen, **environment},
         "tmpfs": _with_tmpfs(general["tmpfs"], options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
         "mounts": [*mounts, *map(_bind, section.mounts)],

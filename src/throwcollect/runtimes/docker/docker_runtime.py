@@ -33,10 +33,6 @@ class DockerRuntime(Runtime):
     outlives_launcher = True
     has_volumes = True
 
-    def is_absent(self) -> bool:
-        """Whether the client is not installed, or the engine has no socket."""
-        return not is_installed("docker") or not has_socket()
-
     def in_words(self, config: Config) -> str:
         """See `Runtime.in_words`."""
         from throwcollect.runtimes.docker.container_options import image
@@ -89,7 +85,7 @@ class DockerRuntime(Runtime):
 
     def find_held(self) -> list[HeldRun]:
         """See `Runtime.find_held`; none if there is no client, or the engine does not answer quickly."""
-        if self.is_absent():
+        if not (is_installed("docker") and has_socket()):
             return []
         from throwcollect.runtimes.docker.docker_engine import connect
         from throwcollect.runtimes.docker.held_runs import find_held_runs

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from throwcollect.coordinator.simulation_client import EPISODE_TOPIC
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name
+from throwcollect.ros.nodes.coordinator.simulation_client import EPISODE_TOPIC
 from throwcollect.trial.lease import LEASES
 
 _GUARDED = {

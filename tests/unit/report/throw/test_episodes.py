@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.selection import filter_trials
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.throw.episodes import choose_examples, measure_residuals
 from throwcollect.report.throw.landings import read_landings
+from throwcollect.report.throw.throw_sections import report_throws
 
 
 def test_example_throws_have_an_episode_and_are_in_order_of_distance(collection: Any, tmp_path: Path) -> None:
@@ -41,3 +43,11 @@ def test_a_kick_in_a_flight_shows_in_its_residual(collection: Any, tmp_path: Pat
     found = measure_residuals(Dataset.open(collection.collect(tmp_path / "dataset", change=kick)))
     assert (found.distance_m > 1e-9).sum() == 1
     assert found.distance_m[3] == pytest.approx(1e-6, rel=1e-3)
+
+
+def test_the_report_on_a_derived_dataset_shows_throws_of_its_own_trials(collected: Path, tmp_path: Path) -> None:
+    filter_trials(collected, tmp_path / "some", where="trial in (4, 6)")
+    dataset = Dataset.open(tmp_path / "some")
+    report = report_throws(dataset, Outcomes.of(dataset["outcome"].tolist()))
+    (examples, _) = report.episodes
+    assert str(examples.blocks[1]).startswith(("Joints of trial 4: measured", "Joints of trial 6: measured"))

@@ -1,0 +1,144 @@
+"""`throwcollect ros topic`: lists topics, and prints their messages and rates."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections import deque
+from itertools import pairwise
+from typing import Annotated, Any
+
+import typer
+
+from throwcollect import ros
+from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_graph, require_name
+from throwcollect.cli.streams import has_reader
+from throwcollect.errors import ConfigError
+from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, full_name, is_hidden
+from throwcollect.wording import suggest
+
+topic_app = typer.Typer(help="Topics: list, echo, hz.", no_args_is_help=True)
+
+TopicArgument = Annotated[str, typer.Argument(metavar="TOPIC", help="Name of the topic.")]
+
+_DEPTH = 100
+"""Messages that wait for `hz` to count them."""
+_REPORT_NS = 10**9
+
+
+@topic_app.command("list")
+def list_topics(
+    types: Annotated[bool, typer.Option("-t", "--show-types", help="Show the types, too.")] = False,
+    hidden: Annotated[
+        bool, typer.Option("-a", "--all", help="Show what is hidden, too: names that begin with '_'.")
+    ] = False,
+    run: RunOption = None,
+) -> None:
+    """List the topics."""
+    with join_graph(run) as session:
+        for name, kinds in sorted(session.node.get_topic_names_and_types()):
+            if hidden or not is_hidden(name):
+                print(f"{name} [{', '.join(kinds)}]" if types else name)
+
+
+@topic_app.command("echo")
+def echo(
+    topic: TopicArgument,
+    kind: Annotated[
+        str | None,
+        typer.Argument(metavar="TYPE", help="Type, such as std_msgs/msg/String; needed if nobody publishes."),
+    ] = None,
+    once: Annotated[bool, typer.Option("--once", help="End after the first message.")] = False,
+    field: Annotated[
+        str | None, typer.Option("--field", metavar="FIELD", help="Print this field alone, such as pose.pose.position.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("-f", "--full-length", help="Print texts and arrays of more than 128 elements in full.")
+    ] = False,
+    run: RunOption = None,
+) -> None:
+    """Print the messages of a topic as YAML."""
+    from throwcollect.cli.ros.yaml_values import shorten, yaml_text
+    from throwcollect.ros.message_values import plain
+
+    with join_graph(run) as session:
+        name, message_type = _find_message_type(session, topic, kind)
+        path = field.split(".") if field else []
+        _check_field(message_type, path)
+        printed = False
+
+        def show(message: Any) -> None:
+            nonlocal printed
+            # Further messages may have arrived before the command gets to its end.
+            if once and printed:
+                return
+            printed = True
+            for part in path:
+                message = getattr(message, part)
+            value = plain(message)
+            print(yaml_text(value if full else shorten(value)), end="---\n", flush=True)
+
+        qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
+        session.node.create_subscription(message_type, name, show, qos)
+        session.spin_until(lambda: (once and printed) or not has_reader())
+
+
+@topic_app.command("hz")
+def show_rate(
+    topic: TopicArgument,
+    window: Annotated[
+        int, typer.Option("-w", "--window", min=2, metavar="N", help="Number of messages that are averaged.")
+    ] = 10_000,
+    run: RunOption = None,
+) -> None:
+    """Print how often messages arrive."""
+    with join_graph(run) as session:
+        name, message_type = _find_message_type(session, topic, None)
+        # A gap lies between two arrivals, so one arrival more is kept.
+        arrivals: deque[int] = deque(maxlen=window + 1)
+        # A subscription that asks for less than the publisher offers is served; the other way round, nothing arrives.
+        qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
+        session.node.create_subscription(
+            message_type, name, lambda _: arrivals.append(time.monotonic_ns()), qos, raw=True
+        )
+        reported = time.monotonic_ns()
+        while has_reader():
+            report = reported + _REPORT_NS
+            session.spin_until(lambda until=report: time.monotonic_ns() >= until)  # type: ignore[misc]
+            if len(arrivals) > 1 and arrivals[-1] > reported:
+                print(_describe_rate(arrivals), flush=True)
+            reported = report
+
+
+def _describe_rate(arrivals: deque[int]) -> str:
+    gaps = [(after - before) * 1e-9 for before, after in pairwise(arrivals)]
+    mean = statistics.fmean(gaps)
+    rate = 1.0 / mean if mean else 0.0
+    return (
+        f"average rate: {rate:.3f}\n\tmin: {min(gaps):.3f}s max: {max(gaps):.3f}s "
+        f"std dev: {statistics.pstdev(gaps):.5f}s window: {len(gaps)}"
+    )
+
+
+def _find_message_type(session: GraphSession, topic: str, kind: str | None) -> tuple[str, Any]:
+    """Find the absolute name of a topic and the class of its messages."""
+    name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
+    kinds = topics.get(name, [])
+    if kind is None:
+        require_name("topic", name, (each for each in topics if not is_hidden(each) or each == name))
+        if len(kinds) > 1:
+            raise ConfigError(f"{name} has {len(kinds)} types", expected=f"one of {', '.join(kinds)}")
+        (kind,) = kinds
+    message_type = find_interface("msg", kind)
+    if kinds and (full := full_name("msg", kind)) not in kinds:
+        raise ConfigError(f"{name} is no {full}", expected=", ".join(kinds))
+    return name, message_type
+
+
+def _check_field(message_type: Any, path: list[str]) -> None:
+    value = message_type()
+    for part in path:
+        fields = value.get_fields_and_field_types() if hasattr(value, "get_fields_and_field_types") else {}
+        if part not in fields:
+            raise ConfigError(f"--field {'.'.join(path)}: no field {part!r}{suggest(part, fields)}")
+        value = getattr(value, part)

@@ -1,0 +1,144 @@
+"""The FollowJointTrajectory action of one controller."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import Any
+
+from throwcollect.control import ControllerState, GoalResult, GoalStatus
+from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node
+from throwcollect.ros.action import FollowJointTrajectory
+from throwcollect.ros.nodes.controller.messages import feedback_message, read_goal
+from throwcollect.sim.simulation import Simulation
+
+_RESULT_TIMEOUT_S = 10
+"""How long clients can ask for a result, in simulated time; rcl has the same default."""
+
+
+@dataclass
+class _Goal:
+    """A goal that the controller has taken; the action server gives its handle later."""
+
+    result: Future
+    handle: Any = None
+    feedback: list[Any] = field(default_factory=list)
+    """Messages that cannot be sent before the handle is there."""
+
+
+class ControllerAction:
+    """Takes goals for a controller, and sends feedback and results.
+
+    Args:
+        node: The controller's node.
+        simulation: The simulation.
+        controller: Name of the controller in the simulation.
+        aborts_refused: Whether goals that cannot be executed are accepted and then aborted with the reason, instead of
+            being rejected.
+    """
+
+    def __init__(self, node: Node, simulation: Simulation, controller: str, *, aborts_refused: bool) -> None:
+        self._node = node
+        self._simulation = simulation
+        self._controller = controller
+        self._aborts_refused = aborts_refused
+        self._count = 0
+        self._published_ns = 0
+        self._goals: dict[Hashable, _Goal] = {}
+        """The goals whose results have not been sent, by their ids in the simulation, the oldest first."""
+        name = f"{node.get_name()}/follow_joint_trajectory"
+        self._feedback_topic = f"{name}/_action/feedback"
+        self._server = ActionServer(
+            node,
+            FollowJointTrajectory,
+            name,
+            execute_callback=self._execute,
+            goal_callback=self._consider,
+            handle_accepted_callback=self._accept,
+            cancel_callback=self._cancel,
+            result_timeout=_RESULT_TIMEOUT_S,
+        )
+
+    def finish(self, result: GoalResult) -> None:
+        """Send the result of a goal to the client that waits for it."""
+        if (goal := self._goals.get(result.goal_id)) is not None:
+            goal.result.set_result(result)
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether feedback has subscribers."""
+        return self._node.count_subscribers(self._feedback_topic) > 0
+
+    @property
+    def watched(self) -> bool:
+        """Whether a goal has been taken and feedback has subscribers."""
+        return bool(self._goals) and self.has_subscribers
+
+    @property
+    def owes_feedback(self) -> bool:
+        """Whether feedback has subscribers, and enough simulated time has passed since the last message."""
+        passed_ns = self._simulation.now_ns - self._published_ns
+        # After a reset, the clock may show less than the time of the last message; feedback is due then, too.
+        return passed_ns != 0 and not 0 < passed_ns < self._simulation.feedback_ns and self.watched
+
+    def publish_feedback(self, state: ControllerState) -> None:
+        """Send feedback on all goals."""
+        passed_ns = self._simulation.now_ns - self._published_ns
+        # Note when the feedback was due, which may be in the middle of a stretch, so that delays do not add up.
+        self._published_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
+        feedback = feedback_message(state)
+        for goal in self._goals.values():
+            # A goal that has ended gets no more feedback, even if it ended in the middle of the last stretch.
+            if goal.result.done():
+                continue
+            if goal.handle is None:
+                goal.feedback.append(feedback)
+            else:
+                goal.handle.publish_feedback(feedback)
+
+    def _consider(self, request: FollowJointTrajectory.Goal) -> GoalResponse:
+        # The controller takes the goal here, because only the controller can tell whether the goal is acceptable. The
+        # handles come in the same order, but perhaps after the next goal was taken, or after this goal has ended.
+        refusal = self._simulation.submit(self._controller, self._count + 1, read_goal(request))
+        if refusal is not None and not self._aborts_refused:
+            return GoalResponse.REJECT
+        self._count += 1
+        # Send no feedback until simulated time has passed since the goal was accepted.
+        self._published_ns = self._simulation.now_ns
+        self._goals[self._count] = _Goal(Future())
+        if refusal is not None:
+            self.finish(GoalResult(self._count, GoalStatus.ABORTED, refusal.error_code, refusal.text))
+        return GoalResponse.ACCEPT
+
+    def _accept(self, handle: Any) -> None:
+        goal = next(goal for goal in self._goals.values() if goal.handle is None)
+        goal.handle = handle
+        for feedback in goal.feedback:
+            handle.publish_feedback(feedback)
+        handle.execute()
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        # The client gets the result of the cancelled goal when its execution goes on, after this answer.
+        key = self._find_key(handle)
+        cancelled = key is not None and self._simulation.cancel(self._controller, key)
+        return CancelResponse.ACCEPT if cancelled else CancelResponse.REJECT
+
+    async def _execute(self, handle: Any) -> FollowJointTrajectory.Result:
+        key = self._find_key(handle)
+        result: GoalResult = await self._goals[key].result
+        del self._goals[key]
+        if result.status == GoalStatus.SUCCEEDED:
+            handle.succeed()
+        elif result.status == GoalStatus.CANCELED:
+            handle.canceled()
+        else:
+            handle.abort()
+        return FollowJointTrajectory.Result(error_code=int(result.error_code), error_string=result.error_string)
+
+    def _find_key(self, handle: Any) -> Hashable | None:
+        uuid = _read_uuid(handle)
+        return next((key for key, goal in self._goals.items() if goal.handle and _read_uuid(goal.handle) == uuid), None)
+
+
+def _read_uuid(handle: Any) -> bytes:
+    return bytes(bytearray(handle.goal_id.uuid))

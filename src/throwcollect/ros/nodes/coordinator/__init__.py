@@ -1,0 +1,1 @@
+"""The node of the coordinator, with its process and its topics."""

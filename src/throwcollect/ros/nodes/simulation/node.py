@@ -1,0 +1,363 @@
+"""The ROS 2 node of one simulation, with the interfaces that clients of the real robot, or of a simulator, expect."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from throwcollect.config.key import Effect
+from throwcollect.config.schema import FASTEST, SLOWEST, Config
+from throwcollect.config.sweep import MOST_TRIALS
+from throwcollect.config.values import leaves, sweepable_keys, with_values
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.episode_message import pack
+from throwcollect.episode.record import Samples
+from throwcollect.episode.topics import Recording, Topic
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.appearance import check_appearance
+from throwcollect.ros import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    Node,
+    Parameter,
+    ParameterDescriptor,
+    Publisher,
+    QoSProfile,
+    Time,
+    get_message,
+    graph_changes,
+)
+from throwcollect.ros.msg import SetParametersResult, String, UInt8MultiArray
+from throwcollect.ros.nodes import descriptors
+from throwcollect.ros.nodes.controller.node import ControllerManager, ControllerNode
+from throwcollect.ros.nodes.own_time import make_own_time
+from throwcollect.ros.nodes.simulation.control import SimulationControl
+from throwcollect.ros.nodes.simulation.leases import LeaseQueue
+from throwcollect.ros.nodes.simulation.stepping import Stepping
+from throwcollect.run_key import Signer
+from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
+from throwcollect.sim.simulation import Simulation, StateCode
+from throwcollect.sim.trial_runner import TrialRunner
+from throwcollect.trial.lease import LEASES, Lease, leases_from_json
+from throwcollect.units import NS_PER_S
+
+_CLOCK = "rosgraph_msgs/msg/Clock"
+Clock: Any = get_message(_CLOCK)
+
+_EPISODE = "episode"
+NUMBER, CONTROLLERS = "trial.number", "trial.controllers"
+"""Parameters that set up a trial by hand."""
+_NO_CONTROLLERS = [""]
+"""Value of the parameter for no controllers; a list with nothing in it would not tell the type of its elements."""
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_SAMPLED = QoSProfile(depth=100)
+_WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+"""For episodes: none is dropped, and each reaches every subscriber, however slow."""
+
+_IDLE_S = 0.1
+"""Longest wait for messages. Signals take effect after the wait: their handlers must not disturb a busy executor."""
+
+_REPEAT_S = 0.02
+"""Real time between two messages on a topic of samples while time stands still; joint states of the robot have it."""
+
+_FACTOR = "sim.real_time_factor"
+DESCRIPTION = "robot_description"
+"""Name of the parameter by which clients change what viewers draw; robot_state_publisher of ROS has the same name."""
+_NOT_RECORDED = (_FACTOR, DESCRIPTION)
+"""Parameters that change nothing that is recorded, so clients may set them during a trial.
+
+A real-time factor so low that the coordinator would think that the simulation hangs is refused during a trial."""
+_NO_LIMIT = 0.0
+_FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
+_HIDDEN = (Effect.PLAN, Effect.RUN)
+"""Effects of keys that the node does not show as parameters, because they do not concern a simulation."""
+
+
+class SimulationNode(Node):
+    """Serves one simulation, with all names in one namespace, by default ``/<name>``.
+
+    Raises:
+        ConfigError: If another simulation has this namespace.
+    """
+
+    def __init__(self, name: str, simulation: Simulation, *, namespace: str | None = None) -> None:
+        super().__init__(name, namespace=namespace or f"/{name}")
+        self._require_own_namespace()
+        self._simulation = simulation
+        config = simulation.config
+        make_own_time(self)
+        self._runner = TrialRunner(simulation)
+        self._description = self._runner.channels.robot
+        self._publish_latched(self._runner.channels)
+        self._declare_description()
+        self._declare_parameters(config)
+        self._leases = LeaseQueue(self._runner)
+        self._live = [
+            (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
+            for topic in Channels(_record_all_topics(config), self._description).recorded.values()
+        ]
+        self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
+        self._manager = ControllerManager(self, simulation)
+        self._listened: list[tuple[Topic, Publisher]] = []
+        self._subscribed: list[ControllerNode] = []
+        self._noticed_changes = -1
+        self._published_at = 0.0
+        self._published_ns = -1
+        self._signer = Signer.of_environment()
+        self._restoring = False
+        self._requested: tuple[Lease, ...] = ()
+        SimulationControl(self, simulation)
+        self._stepping = Stepping(self, simulation)
+        # This publisher comes last: a coordinator that sees it takes the whole simulation for ready.
+        self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
+
+    @property
+    def other_nodes(self) -> tuple[Node, ...]:
+        """The other nodes of the simulation: one for each controller, and the controller manager."""
+        return (*self._controllers.values(), self._manager)
+
+    @property
+    def patience_s(self) -> float:
+        """How long the process may wait for messages while time stands still [s]."""
+        return _REPEAT_S if self._listened and self._rests else _IDLE_S
+
+    @property
+    def quitting(self) -> bool:
+        """Whether a client has asked the simulation to quit."""
+        return self._simulation.state == StateCode.QUITTING
+
+    @property
+    def watched(self) -> bool:
+        """Whether samples, states or feedback have subscribers."""
+        self._notice_listeners()
+        return bool(self._listened) or any(controller.watched for controller in self._subscribed)
+
+    def advance(self) -> None:
+        """Run for a stretch of time; see `TrialRunner.advance`."""
+        self._runner.advance(watched=self.watched)
+
+    def follow_up(self) -> None:
+        """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
+        simulation = self._simulation
+        now = Time(nanoseconds=simulation.now_ns)
+        for node in (self, *self.other_nodes):
+            node.get_clock().set_ros_time_override(now)
+        for name, result in simulation.pop_results():
+            self._controllers[name].action.finish(result)
+        self._notice_listeners()
+        self._publish_samples()
+        for controller in self._subscribed:
+            controller.publish_state()
+        if (handed := self._leases.hand_over()) is not None:
+            # The next trial begins before the episode is sent, so that no client can reach a controller in between.
+            self._begin_next()
+            self._episodes.publish(pack(handed, self._signer))
+        self._stepping.follow_up()
+
+    def _require_own_namespace(self) -> None:
+        """Refuse the namespace of another simulation, because clients could not tell the two apart."""
+        others = {info.node_name for info in self.get_publishers_info_by_topic(_EPISODE)} - {self.get_name()}
+        if others:
+            # The names are read before the node is destroyed, because in rclpy it has none afterwards.
+            name, namespace = self.get_name(), self.get_namespace()
+            self.destroy_node()
+            raise ConfigError(
+                f"namespace {namespace}: the simulation {min(others)} lives there",
+                expected=f"one simulation in a namespace, such as --namespace /{name}, the default",
+            )
+
+    def _publish_samples(self) -> None:
+        if not self._listened:
+            return
+        samples: Samples = self._simulation.fresh_samples()
+        if not len(samples) and self._repeats():
+            samples = self._simulation.last_sample()
+        if len(samples):
+            self._published_at = time.monotonic()
+        recording = Recording(samples, {})
+        columns = [(publisher, topic.encode(recording)) for topic, publisher in self._listened]
+        for index in range(len(samples)):
+            for publisher, messages in columns:
+                publisher.publish(messages[index].tobytes())
+        self._publish_steps(samples)
+
+    def _repeats(self) -> bool:
+        """Say whether to publish the last sample once more, as robots go on to publish their state while they rest."""
+        return self._rests and time.monotonic() - self._published_at >= _REPEAT_S
+
+    @property
+    def _rests(self) -> bool:
+        """Whether time stands still for lack of work; never during a trial, of which each sample is published once."""
+        simulation = self._simulation
+        return simulation.state == StateCode.PLAYING and not simulation.running and simulation.trial.begun.number < 0
+
+    def _publish_steps(self, samples: Samples) -> None:
+        """Publish the time after the steps of a paused simulation, because they may end between two samples."""
+        simulation = self._simulation
+        self._published_ns = int(samples.stamps_ns[-1]) if len(samples) else self._published_ns
+        if simulation.state != StateCode.PAUSED or simulation.now_ns == self._published_ns:
+            return
+        self._published_ns = simulation.now_ns
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(simulation.now_ns, NS_PER_S)
+        for topic, publisher in self._listened:
+            if topic.type_name == _CLOCK:
+                publisher.publish(message)
+
+    def _notice_listeners(self) -> None:
+        """Find out which topics have subscribers, if the graph has changed since the last time."""
+        changes = graph_changes(self)
+        if changes == self._noticed_changes:
+            return
+        self._noticed_changes = changes
+        self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
+        self._subscribed = [controller for controller in self._controllers.values() if controller.has_subscribers]
+        self._simulation.watch(controller.controller for controller in self._subscribed if controller.wants_states)
+
+    def _publish_latched(self, channels: Channels) -> None:
+        self._latched = []
+        for channel, message in channels.encode_latched_messages(0).items():
+            publisher = self.create_publisher(get_message(channel.type_name), channel.topic.lstrip("/"), _LATCHED)
+            publisher.publish(message)
+            self._latched.append(publisher)
+
+    def _declare_description(self) -> None:
+        """Declare the parameter by which a client gives viewers another description to draw."""
+        about = "URDF that viewers draw; only what is seen may differ from that of the configuration."
+        self.declare_parameter(DESCRIPTION, self._description, ParameterDescriptor(description=about))
+        (self._described,) = (topic for topic in self._latched if topic.topic_name.endswith(DESCRIPTION))
+
+        def show(parameters: list[Parameter]) -> None:
+            for parameter in parameters:
+                if parameter.name == DESCRIPTION:
+                    self._described.publish(String(data=parameter.value))
+
+        self.add_post_set_parameters_callback(show)
+
+    def _declare_parameters(self, config: Config) -> None:
+        physics = set(sweepable_keys(config, Effect.PHYSICS))
+        shown = {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.effect not in _HIDDEN}
+        self._physics = {key: float(value) for key, value in shown.items() if key in physics}
+        numbers = [descriptors.integer_range(NO_TRIAL, MOST_TRIALS - 1)]
+        about_number = "Number of the trial that the next reset begins, from 0; -1 for none, which also ends a lease."
+        self.declare_parameter(NUMBER, NO_TRIAL, ParameterDescriptor(description=about_number, integer_range=numbers))
+        about_controllers = "Controllers that must have a goal before the clock of a trial runs; with none, any goal."
+        self.declare_parameter(CONTROLLERS, _NO_CONTROLLERS, ParameterDescriptor(description=about_controllers))
+        about_leases = "Trials that a coordinator wants, in JSON with its signatures, instead of those before."
+        self.declare_parameter(LEASES, "", ParameterDescriptor(description=about_leases))
+        factor = config.sim.real_time_factor or _NO_LIMIT
+        about_factor = descriptors.of_key(_FACTOR, factor)
+        about_factor.additional_constraints = _FACTORS
+        about_factor.floating_point_range = [descriptors.floating_range(_NO_LIMIT, FASTEST)]
+        self.declare_parameter(_FACTOR, factor, about_factor)
+        for key, value in self._physics.items():
+            self.declare_parameter(key, value, descriptors.of_key(key, value))
+        for key, value in shown.items():
+            if isinstance(value, str | int | float) and not self.has_parameter(key):
+                self.declare_parameter(key, value, descriptors.of_key(key, value, read_only=True))
+        self.add_on_set_parameters_callback(self._set_up)
+        self.add_post_set_parameters_callback(self._take_leases)
+
+    def _set_up(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Check parameters and take them over; leases begin their trials at once, others take effect with a reset."""
+        values = {parameter.name: parameter.value for parameter in parameters}
+        try:
+            self._check_factor(values.get(_FACTOR, _NO_LIMIT))
+            if DESCRIPTION in values:
+                check_appearance(self._description, values[DESCRIPTION])
+            if values.get(LEASES):
+                # Trials begin only in `_take_leases`, because a callback that is called after this one may still refuse
+                # the parameters.
+                self._requested = self._read_leases(values)
+            elif not self._restoring:
+                self._prepare(values)
+        except (ConfigError, DatasetError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        if _FACTOR in values:
+            self._simulation.real_time_factor = values[_FACTOR] or None
+        return SetParametersResult(successful=True)
+
+    def _read_leases(self, values: Mapping[str, Any]) -> tuple[Lease, ...]:
+        """Read and check the leases that a coordinator sends."""
+        if len(values) > 1:
+            raise ConfigError(f"{LEASES}: is set alone, not with {next(name for name in values if name != LEASES)}")
+        leases = leases_from_json(values[LEASES])
+        for lease in leases:
+            if lease.simulation != self.get_namespace() or not lease.is_signed(self._signer):
+                raise ConfigError(f"{LEASES}: is not signed for {self.get_namespace()} with the key of this run")
+        return leases
+
+    def _take_leases(self, parameters: list[Parameter]) -> None:
+        """Begin the trials that a coordinator has asked for, and undo what clients have set."""
+        if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
+            return
+        self._leases.replace(self._requested)
+        self._restore_parameters()
+        self._begin_next()
+
+    def _begin_next(self) -> None:
+        while (refusal := self._leases.begin_next()) is not None:
+            self._episodes.publish(pack(refusal, self._signer))
+
+    def _prepare(self, values: Mapping[str, Any]) -> None:
+        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease."""
+        trial = self._simulation.trial
+        changed = [name for name in values if name not in _NOT_RECORDED]
+        if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
+            self._leases.clear()
+            trial.set_up_nothing()
+        elif trial.leased and changed:
+            raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
+        number, controllers = self._check_trial(values)
+        config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
+        if changed:
+            trial.setup = TrialSetup(number, controllers, config)
+
+    def _check_trial(self, values: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
+        setup = self._simulation.trial.setup
+        number = int(values.get(NUMBER, setup.number))
+        controllers = tuple(filter(None, values.get(CONTROLLERS, setup.controllers)))
+        if number >= MOST_TRIALS:
+            raise ConfigError(f"{NUMBER}: should be below {MOST_TRIALS}, got {number}")
+        if unknown := [name for name in controllers if name not in self._simulation.limbs]:
+            raise ConfigError(f"no controller {unknown[0]!r}")
+        return number, controllers
+
+    def _check_factor(self, factor: float) -> None:
+        if factor != _NO_LIMIT and not SLOWEST <= factor <= FASTEST:
+            raise ConfigError(f"{_FACTOR}: should be {_FACTORS}, got {factor}")
+        trial = self._simulation.trial
+        if trial.leased and self._hangs(factor):
+            slowest = self._simulation.config.sim.slowest_factor
+            expected = f"{slowest:g} or more, or 0 for no limit, as {trial.lease_in_words}"
+            raise ConfigError(f"{_FACTOR}: should be {expected}, got {factor:g}")
+
+    def _hangs(self, factor: float) -> bool:
+        """Say whether the factor is so low that a coordinator would think that the simulation hangs."""
+        return _NO_LIMIT < factor < self._simulation.config.sim.slowest_factor
+
+    def _restore_parameters(self) -> None:
+        """Undo what clients have changed of the parameters; of the real-time factor, only slow motion is undone."""
+        for controller in self._controllers.values():
+            controller.parameter_server.restore()
+        configured = {NUMBER: NO_TRIAL, CONTROLLERS: _NO_CONTROLLERS, **self._physics}
+        stray = {key: value for key, value in configured.items() if self._get_value(key) != value}
+        if self._hangs(self._get_value(_FACTOR)):
+            stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
+        if stray:
+            # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these parameters.
+            self._restoring = True
+            try:
+                self.set_parameters([Parameter(key, value=value) for key, value in stray.items()])
+            finally:
+                self._restoring = False
+
+    def _get_value(self, key: str) -> Any:
+        return self.get_parameter(key).value
+
+
+def _record_all_topics(config: Config) -> Config:
+    """Change the configuration so that all topics that have a message for every sample are recorded."""
+    record = config.record.model_copy(update={"topics": ["joint_states", "ball/odometry", "tf", "clock"]})
+    return config.model_copy(update={"record": record})

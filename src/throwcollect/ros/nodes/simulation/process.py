@@ -1,0 +1,51 @@
+"""The process of one simulation."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+from throwcollect import ros
+from throwcollect.config.loader import load
+from throwcollect.errors import ConfigError
+from throwcollect.heartbeat import Heartbeat, ready_line
+from throwcollect.ros.nodes.simulation.node import SimulationNode
+from throwcollect.ros.self_check import begin_to_serve
+from throwcollect.sim.simulation import Simulation
+
+
+def run(config: Path, *, name: str, namespace: str | None = None) -> None:
+    """Serve one simulation until SIGTERM, SIGINT or SIGHUP, or until a client sets its state to quitting.
+
+    While a trial runs, the process reads messages between two stretches; otherwise it sleeps until a message arrives.
+
+    Args:
+        config: YAML file of the collection.
+        name: Name of the node.
+        namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
+    """
+    simulation = Simulation(load(config))
+    if namespace is None and simulation.config.run.root_namespace:
+        namespace = "/"
+    ros.init()
+    try:
+        node = SimulationNode(name, simulation, namespace=namespace)
+    except ros.NameValidationException as error:
+        raise ConfigError(str(error)) from error
+    nodes = (node, *node.other_nodes)
+    executor, stopped = begin_to_serve(*nodes)
+    heartbeat = Heartbeat()
+    print(ready_line(name), flush=True)
+    try:
+        while not stopped() and not node.quitting:
+            heartbeat.beat()
+            # Messages come first, so that a cancel or a reset has its effect before time goes on.
+            ros.spin_some(executor, timeout_sec=0.0 if simulation.running else node.patience_s)
+            if simulation.running:
+                node.advance()
+            node.follow_up()
+        node.get_logger().info(f"ends: {signal.Signals(stopped()).name if stopped() else 'a client asked for it'}")
+    finally:
+        for served in reversed(nodes):
+            served.destroy_node()
+        ros.shutdown()
