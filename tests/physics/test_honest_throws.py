@@ -11,8 +11,8 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import draw_plan
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.episode.channels import Channels
-from throwcollect.replay.replayer import Replayer
 from throwcollect.robots.description import full_description
+from throwcollect.sim.simulator import Simulator
 
 ALL_TOPICS = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 GENTLE = {"task.duration_s": 2.0, "task.end.arm_right_4_joint": -1.6}
@@ -65,8 +65,8 @@ def test_the_episode_check_finds_no_problem_in_an_honest_throw(name: str, tmp_pa
     config = Config.model_validate({**SETTINGS[name], "sweep": {"sampler": "list", "file": "points.csv"}})
     plan = draw_plan(config, directory=tmp_path)
     channels = Channels(config, full_description(config))
-    check, replayer = EpisodeCheck(plan, {}), Replayer(config)
+    check, simulator = EpisodeCheck(plan, {}), Simulator(config)
     run = [trial.number for trial in plan.trials if trial.refused is None]
     assert run
     for trial in run:
-        assert list(check.find_content_problems(replayer.run(plan.trials[trial]), channels)) == [], trial
+        assert list(check.find_content_problems(simulator.run(plan.trials[trial]).episode, channels)) == [], trial

@@ -31,7 +31,7 @@ _NO_ROOM = "failed to map segment from shared object"
 """End of the message of an `ImportError` if a library does not fit into the memory."""
 _NO_TEMPORARY_DIRECTORY = "No usable temporary directory found"
 """Beginning of the message of Python's `tempfile`."""
-_PROCESSES_OF_RUNS = ("launch", "begin", "router", "sim", "coordinator", "simulate")
+_PROCESSES_OF_RUNS = ("launch", "begin", "router", "sim", "coordinator")
 """Commands that a run starts."""
 _STRAY_NUMBER = re.compile(r"(option: -|\(-?)[.\d][\d. -]*\)?$")
 """End of typer's messages on a number that belongs to no option or argument."""

@@ -11,8 +11,6 @@ import io
 import os
 import select
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal, TextIO
 
 from throwcollect.errors import OutputError
@@ -95,33 +93,11 @@ def has_reader() -> bool:
 
 
 def only_log() -> None:
-    """Ignore lost output, because it is only the log of a node."""
+    """Prepare for output that is only the log of a node: it is UTF-8, as the launcher reads it, and may be lost."""
     _set_kind("log")
-    write_utf_8()
-
-
-def write_utf_8() -> None:
-    """Write UTF-8 whatever encoding the user wants, because other processes of the run read the output."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(encoding="utf-8", errors=_ERRORS)
-
-
-@contextmanager
-def keep_output() -> Iterator[int]:
-    """Keep standard output for what the block writes into the descriptor that this yields.
-
-    Everything else that is printed meanwhile, even by libraries of other languages, goes to standard error.
-    """
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        yield kept
-    finally:
-        sys.stdout.flush()
-        os.dup2(kept, 1)
-        os.close(kept)
 
 
 def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import dataclass
+from pathlib import Path
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.directory import CARD, CONFIG, TRIALS

@@ -31,8 +31,7 @@ def verify_dataset(
         directory: Its directory.
         replay: How many throws, chosen by the seed of the dataset, to simulate again and to compare bit for bit; None
             for none.
-        processes: How many processes may check the recordings of a large dataset; if there are several, each imports
-            the main program, as processes of `multiprocessing` do.
+        processes: How many processes may check the recordings of a large dataset.
 
     Returns:
         The problems, file by file; empty if there are none.

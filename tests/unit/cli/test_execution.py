@@ -103,7 +103,7 @@ def test_a_current_directory_that_is_removed_during_a_command_is_named(
     assert (ended.value.code, capsys.readouterr().err) == (2, GONE)
 
 
-@pytest.mark.parametrize(("command", "code"), [("simulate", 0), ("sim", 0), ("up", 2)])
+@pytest.mark.parametrize(("command", "code"), [("sim", 0), ("up", 2)])
 def test_only_processes_of_a_run_start_in_a_directory_that_is_gone(
     command: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

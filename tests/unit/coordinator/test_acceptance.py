@@ -8,7 +8,7 @@ from tests.unit.sweep.own_plan import make_plan
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.episode.episode_message import Delivery
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.plan import Plan
 
 CONFIG = Config.model_validate(
@@ -19,9 +19,9 @@ PLAN: Plan = make_plan(CONFIG)
 
 @pytest.fixture(scope="module")
 def delivery() -> Iterator[Delivery]:
-    replayer = Replayer(CONFIG)
-    yield replayer.delivery(PLAN.trials[1])
-    replayer.close()
+    simulator = Simulator(CONFIG)
+    yield simulator.run(PLAN.trials[1])
+    simulator.close()
 
 
 @pytest.fixture(scope="module")

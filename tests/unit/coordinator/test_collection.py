@@ -15,7 +15,7 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.episode.episode_message import Delivery
 from throwcollect.errors import LossError
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.plan import Plan
 
 PLAN: Plan = make_plan(
@@ -42,9 +42,9 @@ def collection(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Tria
 
 @pytest.fixture(scope="module")
 def deliveries() -> list[Delivery]:
-    replayer = Replayer(PLAN.config)
-    found = [replayer.delivery(trial) for trial in PLAN.trials]
-    replayer.close()
+    simulator = Simulator(PLAN.config)
+    found = [simulator.run(trial) for trial in PLAN.trials]
+    simulator.close()
     return found
 
 

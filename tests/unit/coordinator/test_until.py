@@ -15,7 +15,7 @@ from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.verify import verify
 from throwcollect.episode.episode_message import Delivery
 from throwcollect.errors import LossError
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 
 LANDED = 12
 CONFIG = Config.model_validate(
@@ -41,12 +41,12 @@ Deliver = Callable[[int], Delivery]
 @pytest.fixture(scope="module")
 def deliver(tmp_path_factory: pytest.TempPathFactory) -> Deliver:
     plan = prepare(CONFIG, tmp_path_factory.mktemp("plan") / "data", sweep_directory=Path())
-    replayer = Replayer(CONFIG)
+    simulator = Simulator(CONFIG)
     made: dict[int, Delivery] = {}
 
     def deliver(trial: int) -> Delivery:
         if trial not in made:
-            made[trial] = replayer.delivery(plan.trial(trial))
+            made[trial] = simulator.run(plan.trial(trial))
         return made[trial]
 
     return deliver
