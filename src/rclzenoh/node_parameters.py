@@ -54,11 +54,6 @@ class NodeParameters:
         """Declare a parameter with a default value, or only with a type.
 
         Without a descriptor, the parameter keeps the type that it is declared with.
-
-        Raises:
-            ParameterAlreadyDeclaredException: If it is declared already.
-            InvalidParameterValueException: If the value is out of range or refused by a callback.
-            ValueError: If the parameter has neither type nor value, and not ``dynamic_typing``.
         """
         if name in self._parameters:
             raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
@@ -81,12 +76,7 @@ class NodeParameters:
         return name in self._parameters
 
     def get_parameter(self, name: str) -> Parameter:
-        """A parameter with its value.
-
-        Raises:
-            ParameterNotDeclaredException: If it is not declared.
-            ParameterUninitializedException: If it has a type but no value yet.
-        """
+        """A parameter with its value."""
         descriptor = self.describe_parameter(name)
         parameter = self._parameters[name]
         if parameter.type_ is ParameterKind.NOT_SET and not descriptor.dynamic_typing:
@@ -101,30 +91,18 @@ class NodeParameters:
         return Parameter(name) if alternative_value is None else alternative_value
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
-        """Descriptor of a parameter.
-
-        Raises:
-            ParameterNotDeclaredException: If it is not declared.
-        """
+        """Descriptor of a parameter."""
         if name not in self._descriptors:
             known = ", ".join(sorted(self._descriptors))
             raise ParameterNotDeclaredException(f"parameter {name!r} is not declared", expected=f"one of {known}")
         return self._descriptors[name]
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
-        """Set parameters one after the other; returns a result for each.
-
-        Raises:
-            ParameterNotDeclaredException: If one is not declared; those before it are set.
-        """
+        """Set parameters one after the other, up to the first that is not declared; returns a result for each."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
-        """Set parameters all at once, or none of them; the result says why not.
-
-        Raises:
-            ParameterNotDeclaredException: If one is not declared.
-        """
+        """Set parameters all at once, or none of them; the result says why not."""
         for parameter in parameter_list:
             self.describe_parameter(parameter.name)
         return self._set(list(parameter_list), None)
@@ -160,11 +138,7 @@ class NodeParameters:
         return ListParametersResult(names=names, prefixes=list(nested))
 
     def _set(self, parameters: list[Parameter], declared: dict[str, ParameterDescriptor] | None) -> SetParametersResult:
-        """Set parameters, if descriptors and callbacks agree; ``declared`` has the descriptors of new ones.
-
-        Raises:
-            TypeError: If a callback returns anything but a `SetParametersResult`.
-        """
+        """Set parameters, if descriptors and callbacks agree; ``declared`` has the descriptors of new ones."""
         descriptors = self._descriptors if declared is None else declared
         for parameter in parameters:
             result = check(parameter, descriptors[parameter.name], is_declared=declared is None)
@@ -173,8 +147,6 @@ class NodeParameters:
         # All parameters are set or none: nothing is stored before descriptors and callbacks have accepted each of them.
         for callback in list(self._on_set):
             result = callback(parameters)
-            if not isinstance(result, SetParametersResult):
-                raise TypeError(f"a callback for parameters must return SetParametersResult, got {result!r:.80}")
             if not result.successful:
                 return result
         event = ParameterEvent()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from rclzenoh.duration import S_TO_NS, Duration, Infinite
 from rclzenoh.keys import read_natural
+from rclzenoh.time import S_TO_NS, Duration, Infinite
 
 
 class HistoryPolicy(IntEnum):

@@ -126,11 +126,7 @@ class Task(Future):
         self.mailbox.submit(self)
 
     def run(self) -> bool:
-        """Carry on until the task ends or awaits something; returns whether there was anything to do.
-
-        Raises:
-            BaseException: If the function or coroutine does; the exception is the task's outcome, too.
-        """
+        """Carry on until the task ends or awaits something; returns whether there was anything to do."""
         if self.done() or self.cancelled():
             return False
         try:

@@ -8,7 +8,6 @@
     │   ├── NotFoundError            exit 2   the request names something that does not exist
     │   └── ConflictError            exit 2   the request does not fit the state of the thing that it names
     ├── MissingExtraError            exit 2   a package that an extra brings is not installed (`throwcollect.extras`)
-    ├── MissingLibraryError          exit 2   the system lacks a library that such a package loads (likewise)
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
     ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
@@ -103,22 +102,16 @@ class ConfigError(ThrowcollectError):
 
     Args:
         problems: All problems that were found, at least one; or a single problem as a sentence.
-        more: Number of further problems, which the message only counts.
     """
 
     exit_code = 2
 
     def __init__(
-        self,
-        problems: str | Sequence[Problem],
-        *,
-        expected: str | None = None,
-        hint: str | None = None,
-        more: int = 0,
+        self, problems: str | Sequence[Problem], *, expected: str | None = None, hint: str | None = None
     ) -> None:
         self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)
         lines = list(map(str, self.problems[:_MOST_PROBLEMS]))
-        if unlisted := len(self.problems) - len(lines) + more:
+        if unlisted := len(self.problems) - len(lines):
             lines.append(f"and {unlisted} more")
         super().__init__("\n".join(lines), expected=expected, hint=hint)
 

@@ -1,9 +1,9 @@
 """Writes files that appear whole or not at all, opens them only where they seem to lie, and says what is wrong.
 
-A dataset may come from anybody, so a name in its directory may be a symbolic link to any file of the user, a pipe that
-blocks the process that opens it, or a second name of a file elsewhere. Nothing here follows such a name: a file is
-read, written or cut only if it is a regular file in the very directory in which it is looked for. The user chooses that
-directory, so its own path may go through links.
+A dataset may come from anybody, so a name in its directory may be a symbolic link to any file of the user, or a pipe
+that blocks the process that opens it. Nothing here follows such a name: a file is read, written or cut only if it is a
+regular file in the very directory in which it is looked for. The user chooses that directory, so its own path may go
+through links.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import errno
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from throwcollect.errors import ConfigError, DatasetError
@@ -25,29 +25,18 @@ StrPath = str | os.PathLike[str]
 _POINTER = b"version https://git-lfs"
 _POINTER_BYTES = 1000
 """Git LFS takes no longer file for a pointer."""
-_BEGINNINGS = {
-    _POINTER: "a Git LFS pointer, in whose place `git lfs pull` puts the file",
-    b"\xff\xfe": "UTF-16",
-    b"\xfe\xff": "UTF-16",
-    b"PK\x03\x04": "a ZIP archive, as those of spreadsheets are",
-    b"PAR1": "Parquet",
-}
 _MOVE_HERE = "put the file itself, or a copy of it, in that place; or remove it"
 _HINTS = {
     errno.ENOSPC: "free space on that disk",
     errno.EDQUOT: "free space within your quota",
-    errno.EFBIG: "raise the limit on file sizes (ulimit -f), or lower record.trials_per_shard",
     errno.EACCES: "check who may write there",
     errno.EROFS: "choose a directory that can be written",
     errno.ELOOP: _MOVE_HERE,
     errno.ENXIO: _MOVE_HERE,
-    errno.EMLINK: _MOVE_HERE,
 }
 _REASONS = {
     errno.ELOOP: "a symbolic link leads elsewhere",
     errno.ENXIO: "not a file",
-    errno.EMLINK: "it has another name (hard link), under which it would change, too",
-    errno.ENOTEMPTY: "another process has filled it meanwhile",
 }
 """What these error numbers mean here; the system's own texts are about other cases."""
 
@@ -80,16 +69,6 @@ def suggest_path(path: Path) -> str:
     return did_you_mean([str(path.with_name(each)) for each in near])
 
 
-def recognise(path: Path) -> str:
-    """Say what a file is that should be text, by the bytes that it begins with; empty if it may be text."""
-    with path.open("rb") as file:
-        head = file.read(_POINTER_BYTES)
-    for beginning, kind in _BEGINNINGS.items():
-        if head.startswith(beginning):
-            return kind
-    return "bytes that are no text" if b"\0" in head else ""
-
-
 def refuse_pointers(directory: Path) -> None:
     """Refuse a directory in which Git LFS has put pointers in the place of files."""
     try:
@@ -107,18 +86,14 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = N
 
     Args:
         path: The file; only its name if `folder` is given.
-        flags: As for `os.open`. A file that is opened for writing must have no other name.
+        flags: As for `os.open`.
         folder: Descriptor of the file's directory; None if the directory is in `path`.
     """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666, dir_fd=folder)
     # The open file is examined, because its name may stand for another file by now.
-    status = os.fstat(descriptor)
-    wrong = 0 if stat.S_ISREG(status.st_mode) else errno.ENXIO
-    if flags & os.O_ACCMODE != os.O_RDONLY and status.st_nlink > 1:
-        wrong = errno.EMLINK
-    if wrong:
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise OSError(wrong, _REASONS[wrong], str(path))
+        raise OSError(errno.ENXIO, _REASONS[errno.ENXIO], str(path))
     return descriptor
 
 
@@ -166,28 +141,15 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     new.unlink(missing_ok=True)
     # O_EXCL fails if somebody has put a file or a link there since the removal.
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, mode)
-    own = os.fstat(descriptor)
-
-    def is_own() -> bool:
-        """Say whether the file is this block's, and not that of another process that has begun to write it, too."""
-        with suppress(OSError):
-            return os.path.samestat(own, new.lstat())
-        return False
-
     try:
         try:
             yield descriptor
         finally:
             os.close(descriptor)
-        if not is_own():
-            # Without a number, so that this text is told, and not the system's own.
-            raise OSError("another process writes it, too")
         os.replace(new, path)
     # No half-written file shall stay, not even after Ctrl-C, which is no `Exception`.
     except BaseException:
-        if is_own():
-            with suppress(OSError):
-                new.unlink()
+        new.unlink(missing_ok=True)
         raise
 
 
@@ -222,15 +184,7 @@ def new_directory(path: Path) -> Iterator[Path]:
         if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
             problem = "is a symbolic link" if path.is_symlink() else "exists"
             raise ConfigError(f"{path}: {problem}", expected="a directory that is new or empty")
-        taken = path.stat() if path.exists() else None
-        if taken is not None and (path.is_mount() or os.path.samestat(taken, os.stat("."))):
-            # Neither can be replaced, and without this check, that would show only when everything is written.
-            raise ConfigError(
-                f"{path}: cannot be replaced, as it is the working directory or a mount point",
-                expected="another directory",
-            )
-        if not path.parent.exists():
-            path.parent.mkdir(parents=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         # The hidden directory is on the same file system, so one rename can give it its name.
         with make_own_directory(f".{path.name}.unfinished-", path.parent) as hidden:
             # One further down, as whoever writes a dataset locks its directory, and the hidden one is locked already.
@@ -242,11 +196,6 @@ def new_directory(path: Path) -> Iterator[Path]:
                 if error.path is None or not error.path.is_relative_to(beside):
                     raise
                 raise error.locate(path / error.path.relative_to(beside)) from error
-            if taken is not None:
-                # Whoever made the directory in its place has decided who may enter.
-                with suppress(PermissionError):
-                    os.chown(beside, -1, taken.st_gid)
-                beside.chmod(stat.S_IMODE(taken.st_mode))
             os.rename(beside, path)
     except OSError as error:
         raise unwritable(path, error) from error

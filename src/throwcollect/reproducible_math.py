@@ -31,11 +31,6 @@ def exp(values: Array) -> Array:
     return _map_each(math.exp, values)
 
 
-def log(values: Array) -> Array:
-    """Compute the natural logarithm of each value."""
-    return _map_each(math.log, values)
-
-
 def power(bases: Array, exponent: float) -> Array:
     """Raise each base to the power of one exponent."""
     return _map_each(math.pow, bases, repeat(exponent))

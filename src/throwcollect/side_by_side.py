@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 _THROWS_A_START = 20
 """Number of throws that a process simulates in about the time that it takes to start."""
 
-_SAFE_PATH = "PYTHONSAFEPATH"
 _launch = threading.Lock()
 """Held while processes are started, because that changes what belongs to the whole process for a moment."""
 
@@ -149,24 +148,18 @@ def working_side_by_side(
 
 @contextmanager
 def _launching() -> Iterator[None]:
-    """Let processes that start in the block import neither the user's program nor modules of its working directory.
+    """Let processes that start in the block not import the user's program, which may do its work when it is imported.
 
-    The program may do its work when it is imported, and files in the working directory, perhaps somebody else's
-    dataset, may have the names of Python's own modules. Python before 3.11 has no way to prevent the latter. Only this
-    process shall see Ctrl-C and then end the others, so these start with the signal blocked.
+    Only this process shall see Ctrl-C and then end the others, so these start with the signal blocked.
     """
     with _launch:
-        program, before = sys.modules["__main__"], os.environ.get(_SAFE_PATH)
+        program = sys.modules["__main__"]
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         sys.modules["__main__"] = ModuleType("__main__")
-        os.environ[_SAFE_PATH] = "1"
         try:
             yield
         finally:
             sys.modules["__main__"] = program
-            del os.environ[_SAFE_PATH]
-            if before is not None:
-                os.environ[_SAFE_PATH] = before
             signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
 
 

@@ -14,7 +14,7 @@ from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
-from throwcollect.config.target_columns import LARGEST_TARGET
+from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode

@@ -9,7 +9,6 @@ import tempfile
 from pathlib import Path
 
 from throwcollect.errors import ConfigError
-from throwcollect.wording import is_text
 
 STATE_VARIABLE = "THROWCOLLECT_STATE"
 """Environment variable that names the directory."""
@@ -21,19 +20,7 @@ def state_directory() -> Path:
     By default it lies in the directory for temporary files, because ``XDG_RUNTIME_DIR`` vanishes at the last logout.
     """
     named = os.environ.get(STATE_VARIABLE)
-    try:
-        path = Path(named).absolute() if named else Path(tempfile.gettempdir()) / f"throwcollect-{os.getuid()}"
-    except FileNotFoundError as error:
-        raise ConfigError(
-            "runs cannot be remembered: no directory for temporary files can be written",
-            hint=f"name a directory in {STATE_VARIABLE}",
-        ) from error
-    if not is_text(str(path)):
-        # The key of a run lies there, and Zenoh takes only text as the path to a key.
-        raise ConfigError(
-            f"{path}: runs cannot be remembered there: should be UTF-8 text",
-            hint=f"name another directory in {STATE_VARIABLE}",
-        )
+    path = Path(named).absolute() if named else Path(tempfile.gettempdir()) / f"throwcollect-{os.getuid()}"
     try:
         path.mkdir(mode=0o700, parents=bool(named), exist_ok=True)
         # A link is followed only if the user has named it: in /tmp, another user may have put one there.

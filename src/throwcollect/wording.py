@@ -90,12 +90,3 @@ def _printable_line(line: str) -> str:
         return line
     # `ascii` writes the escape between two quotes.
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in line)
-
-
-def is_text(text: str) -> bool:
-    """Say whether a name from the system can be written as UTF-8; the name of a file may hold any bytes."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True

@@ -1,7 +1,6 @@
 import pytest
 
 from rclzenoh import qos
-from rclzenoh.duration import Duration, Infinite
 from rclzenoh.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -11,6 +10,7 @@ from rclzenoh.qos import (
     decode,
     encode,
 )
+from rclzenoh.time import Duration, Infinite
 
 _SYSTEM_DEFAULT = QoSProfile(
     depth=0,

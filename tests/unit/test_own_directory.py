@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import stat
 import subprocess
@@ -75,17 +74,3 @@ def test_links_files_and_other_directories_are_not_removed(place: Path) -> None:
     with make_own_directory(PREFIX):
         pass
     assert sorted(place.rglob("*")) == before
-
-
-def test_an_own_directory_can_be_made_on_a_file_system_without_locks(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(_: int, __: int) -> None:
-        raise OSError(37, os.strerror(37))
-
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    (place / f"{PREFIX}other").mkdir()
-    grow_old(place / f"{PREFIX}other")
-    with make_own_directory(PREFIX) as path:
-        assert path.is_dir()
-    assert [each.name for each in place.iterdir()] == [f"{PREFIX}other"]

@@ -131,7 +131,9 @@ def test_processes_import_no_module_from_the_working_directory(tmp_path: Path) -
         (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the working directory was run')\n")
     program = (
         "import operator\n"
+        "from throwcollect.own_process import prepare_environment\n"
         "from throwcollect.side_by_side import work_side_by_side\n"
+        "prepare_environment()\n"
         "print(*work_side_by_side(range(4), operator.methodcaller, ('bit_length',), processes=2, doing='counts'))\n"
     )
     words = [sys.executable, "-P", "-c", program]

@@ -37,21 +37,6 @@ def test_a_named_state_directory_that_others_can_write_is_refused(state: Path, p
             state_directory()
 
 
-@pytest.mark.parametrize("is_named", [True, False])
-def test_a_state_directory_whose_path_is_not_utf_8_is_refused(
-    is_named: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    latin_1 = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9")
-    os.mkdir(latin_1)
-    monkeypatch.setattr("tempfile.tempdir", latin_1)
-    monkeypatch.delenv(STATE_VARIABLE, raising=False)
-    if is_named:
-        monkeypatch.setenv(STATE_VARIABLE, latin_1)
-    with pytest.raises(ConfigError, match="should be UTF-8 text"):
-        state_directory()
-    assert not os.listdir(latin_1)
-
-
 def test_a_link_that_is_named_as_state_directory_is_followed(state: Path, tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     state.symlink_to(tmp_path / "elsewhere")

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.wording import command, format_count, is_text, join_names, printable, suggest
+from throwcollect.wording import command, format_count, join_names, printable, suggest
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "0 trials"), (1, "1 trial"), (2, "2 trials")])
@@ -59,8 +59,3 @@ def test_no_module_writes_a_recommended_command_by_hand() -> None:
 def test_a_printed_message_is_escaped_for_terminals_and_shortened() -> None:
     assert printable("no run 'a\x1b[2J\udcff'\n  try: x") == "no run 'a\\x1b[2J\\udcff'\n  try: x"
     assert printable("a" + 5000 * "b" + "c") == "a" + 499 * "b" + " [...] " + 499 * "b" + "c"
-
-
-def test_is_text_rejects_a_name_that_cannot_be_encoded() -> None:
-    assert is_text("größe")
-    assert not is_text("a\udcff")

@@ -104,9 +104,6 @@ class ActionClient:
             feedback_callback: Called with each feedback message, which has ``goal_id`` and ``feedback``, until the
                 result has been received.
             goal_uuid: Identifier of the goal; None for a random one.
-
-        Raises:
-            TypeError: If the goal is of another type.
         """
         if not isinstance(goal, self._action_type.Goal):
             raise TypeError(f"expected {self._action_type.TYPE}.Goal, got {type(goal).__name__}")

@@ -14,7 +14,7 @@ import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import print_json, tell
-from throwcollect.cli.streams import ensure_written, only_log
+from throwcollect.cli.streams import ensure_written
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
@@ -219,7 +219,6 @@ def launch(run: str, lock: LockOption) -> None:
     """Launch a prepared run; `up -d` starts this command."""
     from throwcollect.runs.launcher import launch_inherited
 
-    only_log()
     with display(quiet=True) as shown, count_interruptions() as interruptions:
         launch_inherited(run, lock, onlooker=shown, interruptions=interruptions)
 
@@ -228,7 +227,6 @@ def begin(run: str, lock: LockOption) -> None:
     """Prepare and launch a run that another process has begun; that process writes the order to standard input."""
     from throwcollect.runs.background import carry_out
 
-    only_log()
     order = sys.stdin.buffer.read()
     with display(quiet=True) as shown, count_interruptions() as interruptions:
         carry_out(run, lock, order, onlooker=shown, interruptions=interruptions)

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument
-from throwcollect.cli.streams import only_log
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import LossError
 
@@ -30,7 +29,6 @@ def router(
     """Run the router that all nodes connect to."""
     from throwcollect.ros.router import serve
 
-    only_log()
     serve(listen, key)
 
 
@@ -50,7 +48,6 @@ def sim(
     from throwcollect.ros.nodes.simulation.process import run
     from throwcollect.runtimes.nodes import simulation_name_of
 
-    only_log()
     run(config, name=name or simulation_name_of(gethostname()), namespace=namespace)
 
 
@@ -64,7 +61,6 @@ def coordinator(
     """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
     from throwcollect.ros.nodes.coordinator.process import run
 
-    only_log()
     if config is None:
         run(directory)
         return

@@ -12,7 +12,7 @@ import typer
 
 from throwcollect.cli.options import JsonOption, RunOption
 from throwcollect.cli.printing import align, print_json, tell
-from throwcollect.cli.streams import end_with_reader, has_reader
+from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.interruption import count_interruptions
@@ -109,7 +109,6 @@ def logs(
     run: RunOption = None,
 ) -> None:
     """Print what the nodes of a run print, or the tasks of one on a cluster."""
-    end_with_reader()
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import print_logs
 
@@ -123,7 +122,6 @@ def logs(
 
 def events(run: RunOption = None, json: JsonOption = False) -> None:
     """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
-    end_with_reader()
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import print_events
 

@@ -9,7 +9,6 @@ import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import format_number, print_json, print_json_list, print_result, tell
-from throwcollect.cli.streams import end_with_reader
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
@@ -73,7 +72,6 @@ def plan(
     from throwcollect.config.loader import load_locating_errors
     from throwcollect.coordinator.prepare import count_trials, draw_plan, prepare
 
-    end_with_reader()
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
         shown = display(quiet=json, bar=False)
         if output is None:

@@ -18,7 +18,7 @@ from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.problems import Location, find_problems, join_key, quote, read_index, split_key
 from throwcollect.config.section import Section
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.files import recognise, suggest_path
+from throwcollect.files import suggest_path
 from throwcollect.wording import command
 
 AnySection = TypeVar("AnySection", bound=Section)
@@ -191,8 +191,6 @@ def _read_text(path: Path) -> str:
             # To read a pipe or a device may block for ever.
             got = "a directory" if stat.S_ISDIR(kind) else "a pipe or a device"
             raise ConfigError([Problem(f"should be a YAML file, got {got}", path=path)])
-        if other := recognise(path):
-            raise ConfigError([Problem(f"should be YAML in UTF-8, got {other}", path=path)])
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
         if len(data) > _MOST_BYTES:

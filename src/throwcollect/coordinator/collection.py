@@ -18,9 +18,8 @@ from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.coordinator.prefix import Prefix
 from throwcollect.coordinator.prepare import count_first, feasibility_check
-from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.progress import Progress, TrialRate
 from throwcollect.coordinator.replay_check import ReplayCheck
-from throwcollect.coordinator.trial_rate import TrialRate
 from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.dataset.writer import DatasetWriter

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.config.target_columns import is_target
+from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of
 from throwcollect.dataset.motion import Ball, Joints
 from throwcollect.dataset.named_array import unknown_name

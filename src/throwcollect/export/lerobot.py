@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from throwcollect.config.target_columns import TargetColumn
+from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.export.exporter import Exporter

@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target_columns import is_target
+from throwcollect.config.task_config import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG, TRIALS

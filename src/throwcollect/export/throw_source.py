@@ -12,7 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.arguments import refuse_argument
-from throwcollect.config.target_columns import TargetColumn
+from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples

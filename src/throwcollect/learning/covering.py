@@ -29,7 +29,9 @@ into the same cell differ more; with more, a cell is found to be in reach more o
 _NEIGHBOURS = 8
 """Number of trials near a throw that show whether it is likely to fail."""
 _RISK = 0.5
-"""Largest share of these that may have failed."""
+"""Largest share of these that may have failed, ..."""
+_RISKY = 2
+"""... but for so many throws at each cell in a round."""
 _GROWTH = 3
 """Most throws that a cell may have at the end of a round, in multiples of those that have landed in it before."""
 _PATIENCE = 20
@@ -60,7 +62,7 @@ class Grid:
     def measure(self, columns: Mapping[str, Array]) -> Array:
         """Find the places of landings from the columns of a table of throws, shape ``(n, n_names)``."""
         numbers = {
-            "distance_m": np.hypot(columns["landing_x_m"], columns["landing_y_m"]),
+            "distance_m": np.sqrt(columns["landing_x_m"] ** 2 + columns["landing_y_m"] ** 2),
             "hit_angle_rad": columns["hit_angle_rad"],
             "height_m": columns.get(LANDING_HEIGHT, np.empty(0)),
         }
@@ -96,7 +98,8 @@ class Grid:
 def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, number: int) -> Points:
     """Choose throws that should land in the cells of `sweep.target` in which few throws of all datasets have landed.
 
-    The keys of the task that have a range are chosen by aiming; the other keys are drawn from their ranges.
+    Aiming chooses the keys of the task that have a range, and the height of the landing plane unless the cells have
+    heights; the other keys are drawn from their ranges.
 
     Args:
         config: The configuration, with `sweep.target` and the parameters of the first dataset.
@@ -110,7 +113,7 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
     if config.sweep.target is None:
         raise ConfigError("sweep.target is missing", expected="the cells that throws should land in")
     parameters, grid = config.sweep.parameters, Grid(config.sweep.target)
-    axes = _list_axes(parameters)
+    axes = _list_axes(config)
     values = np.concatenate([np.column_stack([each.throws[axis.key] for axis in axes]) for each in datasets])
     outcomes = np.concatenate([each.throws["outcome"].to_numpy() for each in datasets])
     landed = outcomes == config.task.success
@@ -135,13 +138,15 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
     return Points(tuple(parameters), found[:, [keys.index(key) for key in parameters]])
 
 
-def _list_axes(parameters: Mapping[str, Parameter]) -> tuple[Axis, ...]:
-    """List what aiming chooses, and then what is drawn."""
+def _list_axes(config: Config) -> tuple[Axis, ...]:
+    """List what aiming chooses, and then what is drawn or given with a target."""
     axes = []
-    for key, parameter in parameters.items():
+    given = config.sweep.target is not None and config.sweep.target.height_m is not None
+    for key, parameter in config.sweep.parameters.items():
         bounds = (parameter.min, parameter.max) if isinstance(parameter, Range) else parameter.values
         low, high = min(bounds), max(bounds)
-        aimed = key.startswith("task.") and isinstance(parameter, Range) and low < high
+        may_be_aimed = key.startswith("task.") or (key == LANDING_HEIGHT and not given)
+        aimed = may_be_aimed and isinstance(parameter, Range) and low < high
         role = KeyRole.PARAMETER if aimed else KeyRole.CONTEXT
         # An axis has a width, even if its key has one value.
         axes.append(Axis(key, role, low, high if low < high else low + 1.0, low))
@@ -204,9 +209,11 @@ def _aim(
         starts = randomness.permutation(len(learned.values))[:_STARTS]
         aims = aim(_start_from(learned, starts), goals, learned.scale(KeyRole.CONTEXT, context))
         values = np.hstack([learned.unscale(KeyRole.PARAMETER, aims.parameters), context])
-        hits = (grid.find_cells(aims.predicted) == cells) & tried.find_promising(values)
-        for cell, hit, row in zip(cells.tolist(), hits.tolist(), values, strict=True):
-            # The first throw at an empty cell goes as near to it as it can, so that the edge of the region moves on.
+        predicted, safe = grid.find_cells(aims.predicted) == cells, tried.find_promising(values)
+        for cell, inside, sure, row in zip(cells.tolist(), predicted.tolist(), safe.tolist(), values, strict=True):
+            # At the edge of what is in reach, many throws have failed; some risk shows where the edge is.
+            hit = inside and (sure or planned[cell] < landed[cell] + _RISKY)
+            # The first throw at an empty cell goes as near to it as it can, so that the edge moves on.
             if hit or not (planned[cell] or missed[cell]):
                 found.append(row)
             planned[cell] += hit

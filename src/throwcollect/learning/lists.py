@@ -41,12 +41,10 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
     def choose(header: tuple[str, ...], line: int) -> list[str]:
         return _find_columns(header, names, aliases or {}, place=f"{path}:{line or 1}")
 
-    _, values, lines, problems = read_csv(path, choose)
-    if problems:
-        raise ConfigError(problems)
-    if not len(lines):
+    _, values, lines = read_csv(path, choose)
+    if not lines:
         raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
-    rows = zip(lines.tolist(), values.tolist(), strict=True)
+    rows = zip(lines, values.tolist(), strict=True)
     return [Row(f"{path}:{line}", dict(zip(names, row, strict=True))) for line, row in rows]
 
 

@@ -9,9 +9,8 @@ from typing import TypeVar
 
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
-from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
-from throwcollect.extras import require
+from throwcollect.extras import require, require_engine
 from throwcollect.progress_log import log_progress
 from throwcollect.replay.comparison import Comparison, compare
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
-from functools import lru_cache
-from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from throwcollect.config.loader import load
-from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
@@ -21,7 +17,7 @@ from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import Kind, Planning
 from throwcollect.runtimes.nodes import is_simulation
 from throwcollect.runtimes.runtime import NodeState
-from throwcollect.serve.catalogue import Catalogue, Component
+from throwcollect.serve.catalogue import Catalogue
 from throwcollect.serve.resumption import can_be_resumed
 
 _MOST_OVER = 100
@@ -41,7 +37,6 @@ class ComponentState:
         kind: Whether its instances collect datasets, have simulations for clients alone, or are containers.
         max_instances: How many instances may live at once.
         instances: Ids of those that live.
-        targets: Keys that a request may set in ``sweep.target``, to have throws come down somewhere; none if it cannot.
     """
 
     name: str
@@ -49,7 +44,6 @@ class ComponentState:
     kind: Kind
     max_instances: int
     instances: list[str]
-    targets: list[str]
 
 
 @dataclass(frozen=True)
@@ -139,7 +133,6 @@ class Lookout:
                 each.kind,
                 each.max_instances,
                 [instance.id for instance in living if instance.component == each.name],
-                _find_targets(each),
             )
             for each in self._catalogue.components.values()
         ]
@@ -179,27 +172,6 @@ class Lookout:
             for each in instances
         ]
         return sorted(instances, key=lambda each: each.started, reverse=True)
-
-
-def _find_targets(component: Component) -> list[str]:
-    """Keys of landing targets that a collection of a component can be spread over."""
-    if component.kind != "collection" or not isinstance(component.source, Path):
-        return []
-    try:
-        return _read_targets(component.source, component.source.stat().st_mtime_ns)
-    except (ConfigError, OSError):
-        # A client that starts an instance gets the error then.
-        return []
-
-
-@lru_cache(maxsize=64)
-def _read_targets(path: Path, _changed_ns: int) -> list[str]:
-    config = load(path)
-    sweep = config.sweep
-    if not config.task.throws or sweep.sampler != "sobol" or not sweep.parameters:
-        return []
-    unless_swept = () if LANDING_HEIGHT in sweep.parameters else ("height_m",)
-    return [key for key in TargetConfig.model_fields if key not in unless_swept]
 
 
 def describe(run: Run) -> InstanceState:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target_columns import LARGEST_TARGET, is_target
+from throwcollect.config.task_config import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.files import recognise, suggest_path
+from throwcollect.files import suggest_path
 from throwcollect.sweep.csv_file import MOST_PROBLEMS, read_csv
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.points import Points, Targets
@@ -24,14 +23,8 @@ from throwcollect.sweep.points import Points, Targets
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
 """Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
 
-
-@dataclass(frozen=True)
-class _Rows:
-    """The rows that hold only numbers, the line or row number of each of them, and the problems of all other rows."""
-
-    points: Points
-    numbers: NDArray[np.intp]
-    problems: list[Problem]
+_Read = tuple[tuple[str, ...], NDArray[np.float64], Sequence[int]]
+"""Columns, numbers with NaN where there is none, and the line or the number of each row."""
 
 
 def read_points(path: Path, config: Config, *, key: str = "sweep.file") -> Points:
@@ -52,13 +45,14 @@ def read_points(path: Path, config: Config, *, key: str = "sweep.file") -> Point
             raise ConfigError([Problem(f"there is no file {path}{suggest_path(path)}", key)])
     except OSError as error:
         raise ConfigError([Problem(f"cannot be read: {error.strerror}", key, path)]) from error
-    rows = readers[path.suffix](path, config)
-    problems = [*rows.problems, *_find_value_problems(rows, path, config), *_find_target_problems(rows, path, config)]
+    names, values, rows = readers[path.suffix](path, config)
+    if not len(rows):
+        raise ConfigError([Problem("the file has no rows", path=path)])
+    points = _make_points(names, values, config)
+    problems = [*_find_value_problems(points, rows, path, config), *_find_target_problems(points, rows, path, config)]
     if problems:
         raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:MOST_PROBLEMS])
-    if not len(rows.numbers):
-        raise ConfigError([Problem("the file has no rows", path=path)])
-    return rows.points
+    return points
 
 
 def encode_points(points: Points) -> bytes:
@@ -82,49 +76,30 @@ def _make_points(names: tuple[str, ...], values: NDArray[np.float64], config: Co
     return Points(tuple(names[column] for column in keys), values[:, keys], aims)
 
 
-def _read_csv(path: Path, config: Config) -> _Rows:
+def _read_csv(path: Path, config: Config) -> _Read:
     check = partial(_check_columns, path=path, config=config)
-    names, values, lines, problems = read_csv(path, check, may_be_empty=is_target)
-    return _Rows(_make_points(names, values, config), lines, problems)
+    return read_csv(path, check, may_be_empty=is_target)
 
 
-def _read_parquet(path: Path, config: Config) -> _Rows:
+def _read_parquet(path: Path, config: Config) -> _Read:
+    """Read the columns, their numbers with NaN for null, and the numbers of the rows."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         table: Any = pq.ParquetFile(path).read()
     except (pa.ArrowException, OSError) as error:
-        raise ConfigError([Problem(f"cannot be read as Parquet: {recognise(path) or error}", path=path)]) from error
+        raise ConfigError([Problem(f"cannot be read as Parquet: {error}", path=path)]) from error
     table = table.drop_columns([name for name in table.column_names if _UNNAMED_INDEX.fullmatch(name)])
     _check_columns(tuple(table.column_names), None, path=path, config=config)
-    problems: list[Problem] = []
-    columns: dict[str, Any] = {}
-    good = np.ones(len(table), dtype=bool)
-    for field in table.schema:
-        column = table[field.name]
-        if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
-            problems.append(Problem(f"should be a column of numbers, got {field.type}", field.name, path))
-            # Without this column, no row has a whole target. Reporting that of each row would repeat this problem.
-            good &= not is_target(field.name)
-            continue
-        valid = column.is_valid().to_numpy()
-        columns[field.name] = column.to_numpy()
-        if is_target(field.name):
-            wrong = np.flatnonzero(valid & ~np.isfinite(columns[field.name])).tolist()
-            numbers = [(row + 1, columns[field.name][row]) for row in wrong[:MOST_PROBLEMS]]
-            problems += [
-                _of_row("should be a number, or null for no target, got " + str(value), field.name, path, row)
-                for row, value in numbers
-            ]
-            good[wrong] = False
-            continue
-        if nulls := column.null_count:
-            problems.append(Problem(f"should have a number in each row, got {nulls} nulls", field.name, path))
-        good &= valid
-    values = np.array([column[good] for column in columns.values()], dtype=np.float64)
-    points = _make_points(tuple(columns), values.reshape(len(columns), np.count_nonzero(good)).T, config)
-    return _Rows(points, np.flatnonzero(good) + 1, problems)
+    if wrong := [
+        each for each in table.schema if not (pa.types.is_floating(each.type) or pa.types.is_integer(each.type))
+    ]:
+        raise ConfigError(
+            [Problem(f"should be a column of numbers, got {each.type}", each.name, path) for each in wrong]
+        )
+    values = np.column_stack([column.to_numpy().astype(np.float64) for column in table.columns])
+    return tuple(table.column_names), values, range(1, len(table) + 1)
 
 
 def _check_columns(names: tuple[str, ...], line: int | None, *, path: Path, config: Config) -> tuple[str, ...]:
@@ -145,15 +120,14 @@ def _check_columns(names: tuple[str, ...], line: int | None, *, path: Path, conf
     return names
 
 
-def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
+def _find_target_problems(points: Points, rows: Sequence[int], path: Path, config: Config) -> Iterator[Problem]:
     """Find rows with incomplete targets, and with targets that no robot reaches."""
-    if (targets := rows.points.targets) is None or not len(rows.numbers):
+    if (targets := points.targets) is None:
         return
     far = np.argwhere(np.abs(targets.values) > LARGEST_TARGET)
     for row, column in far[:MOST_PROBLEMS].tolist():
         sentence = f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}"
-        value = targets.values[row, column]
-        yield _of_row(f"{sentence}, got {value}", targets.names[column], path, int(rows.numbers[row]))
+        yield _of_row(f"{sentence}, got {targets.values[row, column]}", targets.names[column], path, rows[row])
     there = ~np.isnan(targets.values)
     # Few combinations of targets occur, so each combination is checked once, however many rows have it.
     for pattern in np.unique(there, axis=0):
@@ -161,7 +135,7 @@ def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[P
         wrong = config.task.find_wrong_targets(names)
         for row in np.flatnonzero((there == pattern).all(axis=1))[:MOST_PROBLEMS] if wrong else ():
             for name, sentence in wrong.items():
-                yield _of_row(sentence, name, path, int(rows.numbers[row]))
+                yield _of_row(sentence, name, path, rows[row])
 
 
 def _of_row(sentence: str, key: str, path: Path, number: int) -> Problem:
@@ -171,15 +145,13 @@ def _of_row(sentence: str, key: str, path: Path, number: int) -> Problem:
     return Problem(f"row {number}: {sentence}", key, path)
 
 
-def _find_value_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
-    if not len(rows.numbers):
-        return
-    for key, column in zip(rows.points.keys, rows.points.values.T, strict=True):
+def _find_value_problems(points: Points, rows: Sequence[int], path: Path, config: Config) -> Iterator[Problem]:
+    for key, column in zip(points.keys, points.values.T, strict=True):
         # The allowed values of a key are an interval, so if the least and the largest value are allowed, all are.
         if not _find_refusals(config, key, np.array([column.min(), column.max()])):
             continue
         for row, sentence in _find_refusals(config, key, column):
-            yield _of_row(sentence, key, path, int(rows.numbers[row]))
+            yield _of_row(sentence, key, path, rows[row])
 
 
 def _find_refusals(config: Config, key: str, column: NDArray[np.float64]) -> list[tuple[int, str]]:

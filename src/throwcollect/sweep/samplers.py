@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config, Parameter, Range, Values
 from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.errors import PlanError, Problem
-from throwcollect.reproducible_math import exp, log
+from throwcollect.reproducible_math import exp
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.sobol import MOST_DIMENSIONS, draw_sobol
@@ -97,20 +97,6 @@ def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float6
     else:
         spread = parameter.min + unit * (parameter.max - parameter.min)
     return np.clip(spread, parameter.min, parameter.max)
-
-
-def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Map values to places from 0 to 1, the inverse of `spread`; a value of a set is in the middle of its share."""
-    if isinstance(parameter, Values):
-        nearest = np.argmin(np.abs(np.subtract.outer(values, parameter.values)), axis=1)
-        return np.asarray((nearest + 0.5) / len(parameter.values))
-    low, high = parameter.min, parameter.max
-    if parameter.scale == "log":
-        values, low, high = log(values), math.log(low), math.log(high)
-    # Neighbouring numbers can have the same logarithm.
-    if low == high:
-        return np.zeros(len(values))
-    return np.clip((values - low) / (high - low), 0, 1)
 
 
 def _draw_grid(parameters: dict[str, Parameter], trials: int | None) -> Points:

@@ -46,7 +46,7 @@ def test_the_page_on_commands_has_every_command_with_its_options() -> None:
         if path not in told:
             wrong.append(f"{' '.join(path)}: is missing")
             continue
-        # Options in the line of a group, such as `ros topic|node ... [--run RUN]`, belong to all commands of the group.
+        # Options in the line of a group, such as `ros topic|param ... [--run RUN]`, belong to all its commands.
         named = set().union(*(told.get(path[:length], ()) for length in range(1, len(path) + 1)))
         options = [each.opts for each in found.params if each.param_type_name == "option" and each.name != "help"]
         known = {name for names in options for name in names}

@@ -17,7 +17,7 @@ from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import filter_trials
-from throwcollect.errors import DatasetError, ThrowcollectError
+from throwcollect.errors import ThrowcollectError
 
 BEGUN = "quick_00001.mcap.part"
 UNFINISHED = (
@@ -152,16 +152,6 @@ def test_verify_and_resume_do_not_wait_for_a_pipe_in_the_place_of_a_file(
     using.start()
     using.join(timeout=30)
     assert finished
-
-
-def test_a_file_with_a_second_hard_link_is_not_changed(source: Collection, sound: Path, tmp_path: Path) -> None:
-    directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
-    shutil.move(directory / "quick_00001.mcap", tmp_path / "mine")
-    os.link(tmp_path / "mine", directory / BEGUN)
-    before = (tmp_path / "mine").read_bytes()
-    with pytest.raises(DatasetError, match=r"quick_00001\.mcap\.part: cannot be written: it has another name"):
-        go_on(directory, source)
-    assert (tmp_path / "mine").read_bytes() == before
 
 
 def test_a_dataset_can_be_resumed_through_a_link_to_its_directory(

@@ -12,7 +12,6 @@ const { inOrder, lives, steps, watchable } = await load("state.js");
 const { readChanges } = await load("controls.js");
 const { coarsen } = await load("coarse.js");
 const { placeApart } = await load("places.js");
-const { coverPlace } = await load("target.js");
 const { describeModel } = await load("model_map.js");
 const { describe, median, tabulate } = await load("model_words.js");
 const { Rosbridge } = await load("rosbridge.js");
@@ -95,16 +94,6 @@ test("simulations are sorted by their numbers", () => {
 test("changed keys are read line by line, and a bad line is named", () => {
   assert.deepEqual(readChanges("trials: 50\n\nname = mine\nsim.real_time_factor: 1.5"), { trials: 50, name: "mine", "sim.real_time_factor": 1.5 });
   assert.throws(() => readChanges("trials: 5\nwhat"), /line 2: .*'what'/);
-});
-
-test("a collection around a place lands around its distance, and at its height", () => {
-  const distance = { min: 1.4, max: 1.6, bins: 4 };
-  assert.deepEqual(coverPlace([0.9, -1.2, 0.4], ["distance_m"]), { "sweep.target.distance_m": distance, "scene.landing_height_m": 0.4 });
-  const height = { min: 0.35, max: 0.45, bins: 1 };
-  assert.deepEqual(coverPlace([0.9, -1.2, 0.4], ["distance_m", "height_m"]), { "sweep.target.distance_m": distance, "sweep.target.height_m": height });
-  assert.deepEqual(coverPlace([0.03, 0.04, -0.01], ["distance_m"]), {
-    "sweep.target.distance_m": { min: 0, max: 0.15, bins: 4 }, "scene.landing_height_m": 0,
-  });
 });
 
 test("a topic is advertised once for each connection, and a refusal is reported", () => {

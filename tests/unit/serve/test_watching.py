@@ -26,7 +26,7 @@ class World:
         self.looks += 1
         if self.error is not None:
             raise self.error
-        return WholeState([ComponentState("a", "A", "session", 1, [str(self.instances)], [])], [])
+        return WholeState([ComponentState("a", "A", "session", 1, [str(self.instances)])], [])
 
 
 @pytest.fixture(autouse=True)

@@ -86,13 +86,8 @@ def test_the_row_numbers_of_pandas_are_not_taken_for_a_key(tmp_path):
             ],
         ),
         (
-            HEADER + "0.1\n0.1,1,1\n0.1 1\n0.1,1,\n",
-            [
-                "list.csv:2: should have 2 values, got 1",
-                "list.csv:3: should have 2 values, got 3",
-                "list.csv:4: should have 2 values, got 1",
-                "list.csv:5: should have 2 values, got 3",
-            ],
+            HEADER + "0.1\n0.1,1,1\n",
+            ["list.csv:2: should have 2 values, got 1", "list.csv:3: should have 2 values, got 3"],
         ),
         (
             HEADER + "0.1,1\n\n3,1\n0.1,0\n-1,1\n",
@@ -100,15 +95,6 @@ def test_the_row_numbers_of_pandas_are_not_taken_for_a_key(tmp_path):
                 "list.csv:4: ball.mass_kg: should be less than or equal to 2, got 3.0",
                 "list.csv:5: task.duration_s: should be greater than or equal to 0.1, got 0.0",
                 "list.csv:6: ball.mass_kg: should be greater than 0, got -1.0",
-            ],
-        ),
-        (
-            HEADER + "3,1\n0.1,x\n0.1\n0.1,0\n0.1,1\n",
-            [
-                "list.csv:2: ball.mass_kg: should be less than or equal to 2, got 3.0",
-                "list.csv:3: task.duration_s: should be a number, got 'x'",
-                "list.csv:4: should have 2 values, got 1",
-                "list.csv:5: task.duration_s: should be greater than or equal to 0.1, got 0.0",
             ],
         ),
     ],
@@ -126,22 +112,9 @@ def test_problems_of_a_long_file_are_not_listed_in_full(csv):
     ("columns", "messages"),
     [
         ({"ball.mass_kg": ["0.1"]}, ["list.parquet: ball.mass_kg: should be a column of numbers, got string"]),
-        ({"ball.mass_kg": [0.1, None]}, ["list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls"]),
         (
-            {
-                "ball.mass_kg": [0.1, None, 0.1],
-                "task.duration_s": [1.0, 1.0, float("nan")],
-                "ball.friction": ["1", "1", "1"],
-            },
-            [
-                "list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls",
-                "list.parquet: ball.friction: should be a column of numbers, got string",
-                "list.parquet: task.duration_s: row 3: should be a finite number, got nan",
-            ],
-        ),
-        (
-            {"ball.mass_kg": pa.array([None], pa.float64())},
-            ["list.parquet: ball.mass_kg: should have a number in each row, got 1 nulls"],
+            {"ball.mass_kg": [0.1, None]},
+            ["list.parquet: ball.mass_kg: row 2: should be a finite number, got nan"],
         ),
         ({"ball.mass_kg": pa.array([], pa.float64())}, ["list.parquet: the file has no rows"]),
         ({"ball.mas_kg": [0.1]}, ["list.parquet: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
@@ -176,46 +149,6 @@ def test_a_file_that_is_no_table_is_a_problem(tmp_path):
 
 
 TARGETED = "task.duration_s,target_y_m,target_x_m\n"
-
-
-@pytest.mark.parametrize(
-    ("content", "kind"),
-    [
-        ("task.duration_s;ball.mass_kg\n1,1;0,04\n", "semicolons"),
-        ("task.duration_s\tball.mass_kg\n1,1\t0,04\n", "tabs"),
-        ("task.duration_s ball.mass_kg\n1.1 0.04\n", "blanks"),
-        ("sep=;\ntask.duration_s;ball.mass_kg\n1,1;0,04\n", "a line that only Excel reads"),
-        ("# task.duration_s,ball.mass_kg\n1.1,0.04\n", "a comment sign"),
-        ("1.1,0.04\n1.2,0.04\n", "numbers"),
-        ('[{"task.duration_s": 1.1, "ball.mass_kg": 0.04}]\n', "JSON"),
-        (
-            ",task.duration_s,ball.mass_kg\n0,1.1,0.04\n",
-            "a column without a name, as the index of pandas has (to_csv(..., index=False) leaves it out)",
-        ),
-        ("task.duration_s,ball.mass_kg,\n1.1,0.04,\n", "a comma at the end"),
-    ],
-)
-def test_a_csv_file_of_another_kind_is_one_problem_of_its_first_line(csv, content, kind):
-    assert problems(csv(content)) == [
-        f"list.csv:1: the first line should hold the names of the columns, separated by commas, got {kind}"
-    ]
-
-
-@pytest.mark.parametrize(
-    ("content", "kind"),
-    [
-        (f"{HEADER}1,1\n".encode("utf-16"), "UTF-16"),
-        (b"PK\x03\x04\x14\x00", "a ZIP archive, as those of spreadsheets are"),
-        (b"PAR1\x15\x04", "Parquet"),
-        (
-            b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n",
-            "a Git LFS pointer, in whose place `git lfs pull` puts the file",
-        ),
-        (b"ball.mass_kg\n\x00", "bytes that are no text"),
-    ],
-)
-def test_a_file_that_is_no_csv_is_named_by_what_it_is(csv, content, kind):
-    assert problems(csv(content)) == [f"list.csv: should be CSV in UTF-8, got {kind}"]
 
 
 def test_blanks_behind_commas_and_lines_of_blanks_do_not_count(csv):
@@ -264,13 +197,18 @@ def test_targets_survive_the_way_through_a_parquet_file(csv, tmp_path):
             ["list.csv:1: target_x_m: the column is here twice"],
         ),
         (
-            TARGETED + "1,-0.2,1.4\n1,-0.2,\n1,nan,1.4\n1,far,inf\n1,,1.4\n",
+            TARGETED + "1,-0.2,1.4\n1,-0.2,\n1,,1.4\n",
             [
                 "list.csv:3: target_x_m: is missing beside target_y_m",
-                "list.csv:4: target_y_m: should be a number, or empty for no target, got 'nan'",
-                "list.csv:5: target_y_m: should be a number, or empty for no target, got 'far'",
-                "list.csv:5: target_x_m: should be a number, or empty for no target, got 'inf'",
-                "list.csv:6: target_y_m: is missing beside target_x_m",
+                "list.csv:4: target_y_m: is missing beside target_x_m",
+            ],
+        ),
+        (
+            TARGETED + "1,nan,1.4\n1,far,inf\n",
+            [
+                "list.csv:2: target_y_m: should be a number, got 'nan'",
+                "list.csv:3: target_y_m: should be a number, got 'far'",
+                "list.csv:3: target_x_m: should be a number, got 'inf'",
             ],
         ),
         (
@@ -286,12 +224,11 @@ def test_problems_of_targets_in_a_csv_file_name_their_lines(csv, content, messag
 def test_problems_of_targets_in_a_parquet_file_name_their_rows(parquet):
     columns = {
         "task.duration_s": [1.0, 1.0, 1.0, 1.0],
-        "target_x_m": [1.4, None, float("nan"), float("inf")],
+        "target_x_m": [1.4, None, 1.4, float("inf")],
         "target_y_m": [-0.2, -0.2, -0.2, -0.2],
     }
     assert problems(parquet(columns)) == [
-        "list.parquet: target_x_m: row 3: should be a number, or null for no target, got nan",
-        "list.parquet: target_x_m: row 4: should be a number, or null for no target, got inf",
+        "list.parquet: target_x_m: row 4: should be a number from -1e+06 to 1e+06, got inf",
         "list.parquet: target_x_m: row 2: is missing beside target_y_m",
     ]
     text = parquet({"task.duration_s": [1.0], "target_x_m": ["1.4"], "target_y_m": [-0.2]})

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
 from throwcollect.errors import PlanError
-from throwcollect.sweep.samplers import UNIT_SAMPLERS, draw_points, places, spread
+from throwcollect.sweep.samplers import UNIT_SAMPLERS, draw_points, spread
 
 HERE = Path()
 NAMES = sorted(UNIT_SAMPLERS)
@@ -164,21 +164,6 @@ def test_drawing_points_imports_neither_scipy_nor_pyarrow():
         "sys.exit(any(name in sys.modules for name in ('scipy', 'pyarrow', 'throwcollect.robots')))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-@settings(deadline=None, max_examples=50)
-@given(parameters, st.floats(0, 1, exclude_max=True))
-@example(Range(min=1e-6, max=1.0000000000000002e-6, scale="log"), 0.0)
-def test_places_is_the_inverse_of_spread(parameter, place):
-    found = places(parameter, spread(parameter, np.array([place])))[0]
-    if isinstance(parameter, Values):
-        # Equal values of a set cannot be told apart.
-        values = parameter.values
-        assert values[int(found * len(values))] == values[int(place * len(values))]
-    elif parameter.max > parameter.min * (1 + 1e-6):
-        assert found == pytest.approx(place, abs=1e-8)
-    else:
-        assert 0 <= found <= 1
 
 
 def test_until_without_trials_draws_ten_times_as_many_points_as_should_land():

@@ -9,9 +9,8 @@ import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.printing import print_result
-from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
-from throwcollect.extras import MissingExtraError, install_command, require
+from throwcollect.extras import MissingExtraError, install_command, require, require_engine
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
 

@@ -1,4 +1,4 @@
-"""`throwcollect ros`: commands that look into the ROS graph as `ros2` does, for machines without ROS 2."""
+"""`throwcollect ros`: what `ros2` is needed for at a run, for machines without ROS 2."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ import shlex
 import typer
 
 from throwcollect.cli.options import RunOption
-from throwcollect.cli.ros.calls import action_app, service_app
-from throwcollect.cli.ros.graph_topics import topic_app
-from throwcollect.cli.ros.nodes import node_app, param_app
+from throwcollect.cli.ros.goals import action_app
+from throwcollect.cli.ros.parameters import param_app
+from throwcollect.cli.ros.topics import topic_app
 from throwcollect.files import write_secret
 
 ros_app = typer.Typer(help="Look into the ROS graph, as the command `ros2` does.", no_args_is_help=True)
 ros_app.add_typer(topic_app, name="topic")
-ros_app.add_typer(node_app, name="node")
-ros_app.add_typer(service_app, name="service")
 ros_app.add_typer(action_app, name="action")
 ros_app.add_typer(param_app, name="param")
 

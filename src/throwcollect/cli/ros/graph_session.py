@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.ros.graph_names import is_hidden, make_own_name
+from throwcollect.ros.graph_names import make_own_name
 from throwcollect.wording import suggest
 
 _WAIT_S = 0.2
@@ -69,6 +71,30 @@ class GraphSession:
         ros.shutdown()
 
 
+def _settle_middleware(run: str | None) -> str | None:
+    """Make this process use the middleware of the run; without a run, the environment decides.
+
+    This has to happen before the process takes any name from `throwcollect.ros`.
+    """
+    if run is not None:
+        from throwcollect.cli.ros.joined_run import find_run_and_connection
+
+        find_run_and_connection(run)[1].middleware.settle()
+    return run
+
+
+RunOption = Annotated[
+    str | None,
+    typer.Option(
+        "--run",
+        metavar="RUN",
+        callback=_settle_middleware,
+        help="Join this run: its id, the beginning of that, or the dataset's directory. By default, the router that "
+        "ZENOH_CONFIG_OVERRIDE names, or the one at tcp/localhost:7447.",
+    ),
+]
+
+
 @contextmanager
 def join_graph(run: str | None) -> Iterator[GraphSession]:
     """Join the graph of a run, or without a run, the graph of the router that the environment names."""
@@ -112,10 +138,3 @@ def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") ->
         return
     owner = f" of {of}" if of else ""
     raise ConfigError(f"no {what} {name}{owner}{suggest(name, existing)}")
-
-
-def print_names(names_and_types: Iterable[tuple[str, list[str]]], *, types: bool, hidden: bool) -> None:
-    """Print names, one a line; `types` adds their types, and `hidden` the hidden names."""
-    for name, kinds in names_and_types:
-        if hidden or not is_hidden(name):
-            print(f"{name} [{', '.join(kinds)}]" if types else name)

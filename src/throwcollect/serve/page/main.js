@@ -80,7 +80,7 @@ class Page {
     this.watching.described = (simulation, urdf) => this.plots.bind(simulation, urdf);
     const watch = (id) => this.#watch(id);
     this.models = new Models({ connection, map, changed: () => this.#showBoxes() });
-    this.target = new Target({ connection, view, map, live: this.live, watch, aim: (place) => this.models.aimAt(place) });
+    this.target = new Target({ view, map, live: this.live, aim: (place) => this.models.aimAt(place) });
     this.room = new Room({ view, map, target: this.target, plots: this.plots, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
     this.controls = new Controls(connection, watch);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
@@ -122,7 +122,6 @@ class Page {
   #put(state) {
     this.#instances = state.instances;
     this.controls.put(state);
-    this.target.put(state);
     const ids = watchable(state.instances, [this.watching.id, this.#named]);
     const wanted = ids.includes(this.#named) ? this.#named : get("watched").value;
     this.#named = null;

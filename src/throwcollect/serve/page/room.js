@@ -95,7 +95,6 @@ export class Room {
     view.enterRoom();
     view.world.visible = false;
     this.info = new InfoBoard([
-      { text: "Collect at target", isOffered: () => this.target.canBeCovered, act: () => this.target.cover() },
       { text: "Place again", isOffered: () => true, act: () => this.#placeAgain() },
       { text: "Leave", isOffered: () => true, act: () => session.end() },
     ]);

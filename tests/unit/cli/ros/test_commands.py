@@ -33,7 +33,7 @@ from rclzenoh.api import (
     QoSProfile,
     SingleThreadedExecutor,
 )
-from rclzenoh.interfaces import get_action, get_message, get_service, type_hash
+from rclzenoh.interfaces import get_action, get_message
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.cli.main import main
 from throwcollect.interruption import stop_signals
@@ -46,13 +46,12 @@ from throwcollect.runs.run_record import RunRecord
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
-SetBool: Any = get_service("std_srvs/srv/SetBool")
 FJT: Any = get_action("control_msgs/action/FollowJointTrajectory")
 FOLLOW = "/robot/follow"
 
 
 class Robot(Node):
-    """Has a latched topic, a topic that ticks, a service, an action and parameters."""
+    """Has a latched topic, a topic that ticks, an action and parameters."""
 
     def __init__(self, context: Context) -> None:
         super().__init__("driver", namespace="/robot", context=context)
@@ -61,19 +60,10 @@ class Robot(Node):
         self.description.publish(String(data="x" * 200))
         self.states = self.create_publisher(JointState, "states", 10)
         self.create_timer(0.02, lambda: self.states.publish(JointState(name=["a"], position=[1.5])))
-        self.create_service(SetBool, "switch", self.switch)
-        self.create_service(SetBool, "slow", self.wait)
         self.declare_parameter("limit", 3, ParameterDescriptor(integer_range=[IntegerRange(from_value=0, to_value=9)]))
         self.declare_parameter("names", ["a", "b"])
         ActionServer(self, FJT, "follow", self.execute, goal_callback=self.consider, cancel_callback=self.cancel)
         self.ends = Future()
-
-    def switch(self, request: Any, response: Any) -> Any:
-        response.success, response.message = request.data, "switched"
-        return response
-
-    async def wait(self, _request: Any, _response: Any) -> Any:
-        return await Future()
 
     def consider(self, goal: Any) -> GoalResponse:
         self.ends = Future()
@@ -152,36 +142,11 @@ def start(*arguments: str) -> subprocess.Popen[str]:
     )
 
 
-def test_lists_of_nodes_topics_services_and_actions_leave_out_hidden_names(say: Callable[..., Said]) -> None:
-    assert say("node", "list") == (0, "/robot/driver\n", "")
-    assert say("action", "list", "-t") == (0, f"{FOLLOW} [{FJT.TYPE}]\n", "")
+def test_the_list_of_topics_leaves_out_hidden_names(say: Callable[..., Said]) -> None:
     topics = say("topic", "list", "-t").out.splitlines()
     assert "/robot/states [sensor_msgs/msg/JointState]" in topics
     assert not any("_action" in topic for topic in topics)
     assert f"{FOLLOW}/_action/status" in say("topic", "list", "-a").out.splitlines()
-    services = say("service", "list").out.splitlines()
-    assert "/robot/switch" in services
-    assert all(service.startswith("/robot/") for service in services)
-
-
-def test_node_info_lists_topics_services_and_actions_of_the_node(say: Callable[..., Said]) -> None:
-    lines = say("node", "info", "robot/driver").out.splitlines()
-    assert lines[0] == "/robot/driver"
-    sections = [line.strip(" :") for line in lines if line.startswith("  ") and not line.startswith("    ")]
-    assert sections == [
-        "Subscribers", "Publishers", "Service Servers", "Service Clients", "Action Servers", "Action Clients",
-    ]  # fmt: skip
-    assert "    /robot/states: sensor_msgs/msg/JointState" in lines
-    assert lines[lines.index("  Action Servers:") + 1] == f"    {FOLLOW}: {FJT.TYPE}"
-
-
-def test_topic_info_shows_the_type_and_the_publishers(say: Callable[..., Said]) -> None:
-    assert say("topic", "info", "robot/states").out == (
-        "Type: sensor_msgs/msg/JointState\nPublisher count: 1\nSubscription count: 0\n"
-    )
-    lines = say("topic", "info", "-v", "/robot/description").out.splitlines()
-    assert f"Topic type hash: {type_hash(String.TYPE)}" in lines
-    assert "  Durability: TRANSIENT_LOCAL" in lines
 
 
 def test_topic_echo_shows_a_latched_message_and_shortens_it_unless_asked_for_all(
@@ -206,20 +171,7 @@ def test_topic_echo_prints_a_message_or_one_of_its_fields_as_yaml(say: Callable[
     assert say("topic", "echo", "/robot/states", "--once", "--field", "position").out == "- 1.5\n---\n"
 
 
-def test_service_call_takes_its_values_as_yaml(say: Callable[..., Said]) -> None:
-    said = say("service", "call", "/robot/switch", "std_srvs/SetBool", "{data: true}")
-    assert said.code == 0
-    assert said.out == (
-        "requester: making request: std_srvs.srv.SetBool_Request(data=True)\n\n"
-        "response:\nstd_srvs.srv.SetBool_Response(success=True, message='switched')\n\n"
-    )
-    assert "success=False" in say("service", "call", "/robot/switch", "std_srvs/srv/SetBool").out
-
-
-def test_parameters_are_listed_read_and_set(say: Callable[..., Said]) -> None:
-    own = ["  limit", "  names", "  use_sim_time"]
-    assert say("param", "list", "/robot/driver").out.splitlines() == own
-    assert say("param", "list").out.splitlines() == ["/robot/driver:", *own]
+def test_parameters_are_read_and_set(say: Callable[..., Said]) -> None:
     assert say("param", "get", "robot/driver", "names").out == "String values are: ['a', 'b']\n"
     assert say("param", "set", "/robot/driver", "names", "[c]") == (0, "Set parameter successful\n", "")
     assert say("param", "get", "/robot/driver", "names").out == "String values are: ['c']\n"
@@ -255,10 +207,9 @@ def test_an_aborted_goal_ends_with_exit_code_1_and_a_rejected_goal_with_2(say: C
         ("topic echo //x", "'//x' is no name in ROS"),
         ("topic echo /robot/states std_msgs/Sting", "unknown interface 'std_msgs/msg/Sting'"),
         ("topic echo /robot/states --field header.stamp.x", "no field 'x'; known: sec and nanosec"),
-        ("node info /robot/drive", "no node /robot/drive; did you mean '/robot/driver'?"),
-        ("service call /robot/switch std_srvs/srv/Trigger", "/robot/switch is no std_srvs/srv/Trigger"),
-        ("service call /robot/switch std_srvs/srv/SetBool {dat:", "VALUES: not YAML"),
-        ("service call /robot/switch std_srvs/srv/SetBool {data:\\ 1}", "data: should be boolean, got 1"),
+        (f"action send {FOLLOW} {FJT.TYPE} {{trajectory:", "GOAL: not YAML"),
+        (f"action send {FOLLOW} {FJT.TYPE} {{trajectory:\\ 1}}", "trajectory: should be fields with values, got 1"),
+        ("param get /robot/drive limit", "no node /robot/drive; did you mean '/robot/driver'?"),
         (f"action send /robot/x {FJT.TYPE} {{}}", f"no action /robot/x; did you mean '{FOLLOW}'?"),
         ("param get /robot/driver limits", "no parameter limits of /robot/driver; did you mean 'limit'?"),
         ("param set /robot/driver limits 1", "parameter 'limits' is not declared"),
@@ -284,7 +235,7 @@ def test_without_a_router_commands_say_that_there_is_no_session(
 ) -> None:
     monkeypatch.setattr("rclzenoh.context._PATIENCE_S", 0.1)
     monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:9"]')
-    said = say("node", "list")
+    said = say("topic", "list")
     assert said.code == 2
     assert "no Zenoh session" in said.err
     assert "--run RUN" in said.err
@@ -323,15 +274,15 @@ def test_commands_join_a_run_by_its_name_or_directory(
     )
     assert say("env") == (0, line, "")
     for named in (run.run, "thr", str(tmp_path / "data")):
-        assert say("node", "list", "--run", named) == (0, "/robot/driver\n", "")
+        assert "/robot/states" in say("topic", "list", "--run", named).out.splitlines()
         assert say("env", "--run", named) == (0, line, "")
     rejected = say("action", "send", FOLLOW, FJT.TYPE, "{}", "--run", run.run)
     assert f"the log of the node says why: throwcollect ros topic echo -f /rosout --run {run.run}\n" in rejected.err
     run.update(endpoint=None)
-    for command in (("node", "list"), ("env",)):
+    for command in (("topic", "list"), ("env",)):
         assert say(*command, "--run", run.run).code == 3
     run.close()
-    assert "its launcher died" in say("node", "list", "--run", run.run).err
+    assert "its launcher died" in say("topic", "list", "--run", run.run).err
 
 
 def test_env_for_a_run_on_fast_dds_writes_a_profile_that_only_its_owner_can_read(

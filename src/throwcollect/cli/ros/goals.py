@@ -1,4 +1,4 @@
-"""`throwcollect ros service` and `action`: list services and actions, call one, and wait for its answer."""
+"""`throwcollect ros action send`: sends a goal, and waits for its result."""
 
 from __future__ import annotations
 
@@ -7,60 +7,15 @@ from typing import Annotated, Any
 import typer
 
 from throwcollect import ros
-from throwcollect.cli.ros.graph_session import GraphSession, join_graph, print_names, require_name
-from throwcollect.cli.ros.ros_options import HiddenOption, RunOption, TypesOption
+from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_graph, require_name
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.ros.graph_names import absolute_name, find_interface
 from throwcollect.wording import command
 
-service_app = typer.Typer(help="Services: list, call.", no_args_is_help=True)
-action_app = typer.Typer(help="Actions: list, send.", no_args_is_help=True)
-
-
-@service_app.command("list")
-def list_services(types: TypesOption = False, hidden: HiddenOption = False, run: RunOption = None) -> None:
-    """List the services."""
-    with join_graph(run) as session:
-        own = f"/{session.node.get_name()}/"
-        services = [each for each in sorted(session.node.get_service_names_and_types()) if not each[0].startswith(own)]
-        print_names(services, types=types, hidden=hidden)
-
-
-@service_app.command("call")
-def call_service(
-    service: Annotated[str, typer.Argument(metavar="SERVICE", help="Name of the service.")],
-    kind: Annotated[str, typer.Argument(metavar="TYPE", help="Type, such as std_srvs/srv/Trigger.")],
-    values: Annotated[str, typer.Argument(metavar="VALUES", help="Fields of the request in YAML.")] = "{}",
-    run: RunOption = None,
-) -> None:
-    """Call a service and print its response."""
-    from throwcollect.cli.ros.yaml_values import parse
-    from throwcollect.ros.message_values import fill
-
-    service_type = find_interface("srv", kind)
-    request = service_type.Request()
-    fill(request, parse(values, "VALUES"))
-    with join_graph(run) as session:
-        name = absolute_name(service)
-        services = dict(session.node.get_service_names_and_types())
-        require_name("service", name, services)
-        client = session.node.create_client(service_type, name)
-        if not client.service_is_ready():
-            raise ConfigError(f"{name} is no {kind}", expected=", ".join(services[name]))
-        print(f"requester: making request: {request!r}\n", flush=True)
-        response = session.answer(client.call_async(request), alive=client.service_is_ready, who=name)
-        print(f"response:\n{response!r}\n")
-
+action_app = typer.Typer(help="Actions: send.", no_args_is_help=True)
 
 _STATUSES = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
 """Names of the numbers of action_msgs/msg/GoalStatus."""
-
-
-@action_app.command("list")
-def list_actions(types: TypesOption = False, run: RunOption = None) -> None:
-    """List the actions."""
-    with join_graph(run) as session:
-        print_names(sorted(ros.get_action_names_and_types(session.node)), types=types, hidden=False)
 
 
 @action_app.command("send_goal", hidden=True)

@@ -1,4 +1,4 @@
-"""`throwcollect ros topic`: lists topics, and shows their publishers, messages and rates."""
+"""`throwcollect ros topic`: lists topics, and prints their messages and rates."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from typing import Annotated, Any
 import typer
 
 from throwcollect import ros
-from throwcollect.cli.ros.graph_session import GraphSession, join_graph, print_names, require_name
-from throwcollect.cli.ros.ros_options import HiddenOption, RunOption, TopicArgument, TypesOption
-from throwcollect.cli.streams import end_with_reader, has_reader
+from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_graph, require_name
+from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, full_name, is_hidden
 from throwcollect.wording import suggest
 
-topic_app = typer.Typer(help="Topics: list, echo, hz, info.", no_args_is_help=True)
+topic_app = typer.Typer(help="Topics: list, echo, hz.", no_args_is_help=True)
+
+TopicArgument = Annotated[str, typer.Argument(metavar="TOPIC", help="Name of the topic.")]
 
 _DEPTH = 100
 """Messages that wait for `hz` to count them."""
@@ -26,34 +27,18 @@ _REPORT_NS = 10**9
 
 
 @topic_app.command("list")
-def list_topics(types: TypesOption = False, hidden: HiddenOption = False, run: RunOption = None) -> None:
-    """List the topics."""
-    with join_graph(run) as session:
-        print_names(sorted(session.node.get_topic_names_and_types()), types=types, hidden=hidden)
-
-
-@topic_app.command("info")
-def show_topic(
-    topic: TopicArgument,
-    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show every publisher and subscription.")] = False,
+def list_topics(
+    types: Annotated[bool, typer.Option("-t", "--show-types", help="Show the types, too.")] = False,
+    hidden: Annotated[
+        bool, typer.Option("-a", "--all", help="Show what is hidden, too: names that begin with '_'.")
+    ] = False,
     run: RunOption = None,
 ) -> None:
-    """Print the type of a topic and who publishes and subscribes to it."""
+    """List the topics."""
     with join_graph(run) as session:
-        name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
-        require_name("topic", name, topics)
-        kinds = topics[name]
-        end = "\n\n" if verbose else "\n"
-        print(f"Type: {kinds[0] if len(kinds) == 1 else kinds}", end=end)
-        node = session.node
-        for what, infos in (
-            ("Publisher", node.get_publishers_info_by_topic(name)),
-            ("Subscription", node.get_subscriptions_info_by_topic(name)),
-        ):
-            print(f"{what} count: {len(infos)}", end=end)
-            if verbose:
-                for info in infos:
-                    print(info, end=end)
+        for name, kinds in sorted(session.node.get_topic_names_and_types()):
+            if hidden or not is_hidden(name):
+                print(f"{name} [{', '.join(kinds)}]" if types else name)
 
 
 @topic_app.command("echo")
@@ -76,7 +61,6 @@ def echo(
     from throwcollect.cli.ros.yaml_values import shorten, yaml_text
     from throwcollect.ros.message_values import plain
 
-    end_with_reader()
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic, kind)
         path = field.split(".") if field else []
@@ -108,7 +92,6 @@ def show_rate(
     run: RunOption = None,
 ) -> None:
     """Print how often messages arrive."""
-    end_with_reader()
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic, None)
         # A gap lies between two arrivals, so one arrival more is kept.

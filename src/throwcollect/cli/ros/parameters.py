@@ -1,59 +1,20 @@
-"""`throwcollect ros node` and `param`: list nodes, show what a node has, and read and set its parameters."""
+"""`throwcollect ros param`: reads and sets a parameter of a node."""
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated, Any
 
 import typer
 
 from throwcollect import ros
-from throwcollect.cli.ros.graph_session import GraphSession, join_graph, require_name
-from throwcollect.cli.ros.ros_options import HiddenOption, NodeArgument, ParameterArgument, RunOption
+from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_graph, require_name
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.ros.graph_names import absolute_name, is_hidden
+from throwcollect.ros.graph_names import absolute_name
 
-node_app = typer.Typer(help="Nodes: list, info.", no_args_is_help=True)
-param_app = typer.Typer(help="Parameters: list, get, set.", no_args_is_help=True)
+param_app = typer.Typer(help="Parameters: get, set.", no_args_is_help=True)
 
-
-@node_app.command("list")
-def list_nodes(hidden: HiddenOption = False, run: RunOption = None) -> None:
-    """List the nodes."""
-    with join_graph(run) as session:
-        names = [name for name in session.node_names() if hidden or not is_hidden(name)]
-        if len(set(names)) < len(names):
-            print("warning: several nodes have the same name", file=sys.stderr)
-        for name in names:
-            print(name)
-
-
-@node_app.command("info")
-def show_node(node: NodeArgument, hidden: HiddenOption = False, run: RunOption = None) -> None:
-    """Print what a node publishes, subscribes to, offers and uses."""
-    with join_graph(run) as session:
-        full_name = absolute_name(node)
-        names = session.node_names()
-        require_name("node", full_name, names)
-        if (count := names.count(full_name)) > 1:
-            print(f"warning: {count} nodes are named {full_name}; this is what they have together", file=sys.stderr)
-        namespace, _, short = full_name.rpartition("/")
-        owner = (short, namespace or "/")
-        ours = session.node
-        print(full_name)
-        for what, names_and_types in (
-            ("Subscribers", ours.get_subscriber_names_and_types_by_node(*owner)),
-            ("Publishers", ours.get_publisher_names_and_types_by_node(*owner)),
-            ("Service Servers", ours.get_service_names_and_types_by_node(*owner)),
-            ("Service Clients", ours.get_client_names_and_types_by_node(*owner)),
-            ("Action Servers", ros.get_action_server_names_and_types_by_node(ours, *owner)),
-            ("Action Clients", ros.get_action_client_names_and_types_by_node(ours, *owner)),
-        ):
-            print(f"  {what}:")
-            for owned, types in sorted(names_and_types):
-                if hidden or not is_hidden(owned):
-                    print(f"    {owned}: {', '.join(types)}")
-
+NodeArgument = Annotated[str, typer.Argument(metavar="NODE", help="Name of the node, with its namespace.")]
+ParameterArgument = Annotated[str, typer.Argument(metavar="NAME", help="Name of the parameter.")]
 
 _WHOLE = range(-(2**63), 2**63)
 """Whole numbers that a parameter can hold."""
@@ -71,27 +32,6 @@ _FIELDS = {
     9: ("String values are:", "string_array_value"),
 }
 """Label and field of each number of rcl_interfaces/msg/ParameterType, with the labels of `ros2 param get`."""
-
-
-@param_app.command("list")
-def list_parameters(
-    node: Annotated[str | None, typer.Argument(metavar="NODE", help="Name of the node; all nodes if none.")] = None,
-    run: RunOption = None,
-) -> None:
-    """List the parameters of a node, or of all nodes."""
-    with join_graph(run) as session:
-        if node is not None:
-            name = _find_node(session, node)
-            _print_sorted(_ask(session, name, "ListParameters").result.names)
-            return
-        for name in sorted({each for each in session.node_names() if not is_hidden(each)}):
-            try:
-                names = _ask(session, name, "ListParameters").result.names
-            except WorkerError as error:
-                print(error, file=sys.stderr)
-                continue
-            print(f"{name}:")
-            _print_sorted(names)
 
 
 @param_app.command("get")
@@ -159,8 +99,3 @@ def _ask(session: GraphSession, node: str, service: str, **fields: Any) -> Any:
     response = session.answer(future, alive=client.service_is_ready, who=node)
     session.node.destroy_client(client)
     return response
-
-
-def _print_sorted(names: list[str]) -> None:
-    for name in sorted(names):
-        print(f"  {name}")
