@@ -159,7 +159,7 @@ def fingerprints(directory: Path) -> dict[str, str]:
     return {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(directory.iterdir())
-        if path.is_file() and path.name not in ("README.md", "provenance.json")
+        if path.is_file() and path.name not in ("README.md", "datapackage.json", "provenance.json")
     }
 
 

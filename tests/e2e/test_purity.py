@@ -37,7 +37,6 @@ def test_a_collection_has_all_files_and_verify_finds_nothing_wrong(reference: Pa
         "throws.parquet",
         "config.yaml",
         "small_00000.mcap",
-        "datapackage.json",
     }
     assert set(fingerprints(reference)) == promised
 

@@ -24,7 +24,7 @@ from throwcollect import compute_statistics, filter_dataset
 ROOT = Path(__file__).parents[2]
 KNOWN = ("3.13", "3.12", "3.10")
 OWN = f"{sys.version_info.major}.{sys.version_info.minor}"
-OF_THE_MOMENT = ("README.md", "provenance.json")
+OF_THE_MOMENT = ("README.md", "datapackage.json", "provenance.json")
 """Files that say when and where a dataset was made."""
 QUICKSTART = str(ROOT / "configs" / "quickstart.yaml")
 

@@ -89,7 +89,7 @@ def digest(directory: Path) -> str:
     for episode in log_progress(dataset.episodes(), len(recorded), "episode", "checked"):
         trial, expected = next(stated)
         try:
-            episode.check_records()
+            episode.chunk.check_records()
         except DatasetError as error:
             raise error.locate(directory, f"trial {trial}") from error
         if episode.digest != expected:

@@ -1,7 +1,8 @@
 """The manifest ``datapackage.json``: size and hash of every file that a dataset promises.
 
 It is a Frictionless Data Package (https://specs.frictionlessdata.io/data-package/), so other tools can check it, too.
-It follows from the files alone and its text is canonical: equal files give equal bytes.
+It follows from the files alone and its text is canonical: equal files give equal bytes. Two collections of one dataset
+differ in `README.md` and `provenance.json`, so their manifests differ in two hashes, and their digest is the same.
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ from throwcollect.wording import command
 
 _PROFILE = "data-package"
 _HASH = "sha256:"
-_PROMISED = frozenset({CONFIG, METADATA, PLAN, SOURCES, THROWS, TRIALS})
-_NAME = re.compile(r"[a-z0-9][a-z0-9_.-]*")
+DESCRIBING = (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE)
+"""Files beside the recordings and ``metadata.yaml`` that a dataset may have."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 """A file name without directories, so that no manifest can name a file outside of the dataset."""
 _MOST_BYTES = 100_000_000
 _BLOCK = 1 << 20
@@ -125,9 +127,11 @@ class RunningHash:
 def list_promised_names(directory: Path) -> list[str]:
     """List the names of the files in a directory that a manifest has to cover, in order.
 
-    The data card and the logs are not among them, as they tell how, where and when the dataset was collected.
+    The logs are not among them, as simulations and later commands still write into them.
     """
-    return sorted(name for name in os.listdir(directory) if name in _PROMISED or name.endswith(SHARD_SUFFIX))
+    known = {METADATA, *DESCRIBING}
+    names = os.listdir(directory)
+    return sorted(name for name in names if name in known or SHARD_SUFFIX in name or name.endswith(".new"))
 
 
 def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
@@ -205,10 +209,9 @@ def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Findin
 def find_damage(directory: Path, *, in_full: bool) -> list[Finding]:
     """Find the files of a finished dataset that are missing, or not as its manifest says; see `find_changed_files`."""
     try:
-        damage = list(find_changed_files(directory, read_manifest(directory), in_full=in_full))
+        return list(find_changed_files(directory, read_manifest(directory), in_full=in_full))
     except DatasetError as error:
         return [Finding.of(MANIFEST, error)]
-    return damage + [Finding(name, "", "is missing") for name in (CARD, PROVENANCE) if not is_there(directory / name)]
 
 
 def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:

@@ -1,7 +1,7 @@
 """One MCAP file of a dataset, written record by record.
 
 The file starts with all schemas and channels and a chunk with the latched messages. Each episode is one uninterrupted
-run of records: its chunks, each with its message indexes, and a Metadata record named `EPISODE` that says what it is.
+run of records: its chunk, the message indexes, and a Metadata record named `EPISODE` that says what it is.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import itertools
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,8 +29,6 @@ from throwcollect.episode.episode_message import Episode
 MAGIC = b"\x89MCAP0\r\n"
 EPISODE = "throwcollect.episode"
 """Name of the Metadata record that ends the run of an episode."""
-SENSORS_SHA256 = "sensors_sha256"
-"""Key of that record under which the hashes of the chunks of sensors stand, if there are any."""
 BAG = "rosbag2"
 """Name of the Metadata record in which rosbag2 looks for a copy of the bag's metadata."""
 PROFILE = "ros2"
@@ -60,79 +58,63 @@ def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], lis
 
 @dataclass(frozen=True)
 class RecordGroup:
-    """Records that follow each other without a gap: chunks, each with its message indexes, and maybe a Metadata record.
+    """Records that follow each other without a gap: a chunk, its message indexes, and maybe a Metadata record.
 
     Attributes:
-        chunk_indexes: Index of each chunk, as if the run began at offset 0.
+        chunk_index: Index of the chunk, as if the run began at offset 0.
         counts: Number of messages on each channel, by its number.
         metadata_length: Size of the Metadata record at the end [bytes]; 0 if there is none.
     """
 
     data: bytes
-    chunk_indexes: tuple[records.ChunkIndex, ...]
+    chunk_index: records.ChunkIndex
     counts: Mapping[int, int]
     metadata_length: int
 
     @property
     def length(self) -> int:
         """Size of the records [bytes]."""
-        return _end_of(self.chunk_indexes[-1]) + self.metadata_length
+        index = self.chunk_index
+        return int(index.chunk_length + index.message_index_length) + self.metadata_length
 
     @property
     def start_ns(self) -> int:
-        """Time of the first message of its first chunk [ns]."""
-        return int(self.chunk_indexes[0].message_start_time)
+        """Time of the first message of its chunk [ns]."""
+        return int(self.chunk_index.message_start_time)
 
     @classmethod
-    def of(cls, chunks: Iterable[tuple[Chunk, Mapping[int, bytes]]], metadata: bytes = b"") -> RecordGroup:
-        """Make the run of chunks, each with its Message Index records by channel, and of a Metadata record."""
-        parts: list[bytes | memoryview] = []
-        places: list[records.ChunkIndex] = []
-        counts: dict[int, int] = {}
-        for chunk, indexes in chunks:
-            parts += (chunk.record_header(), chunk.data, *indexes.values())
-            places.append(_index_chunk(chunk, indexes, _end_of(places[-1]) if places else 0))
-            counts |= {channel: count_indexed(index) for channel, index in indexes.items()}
-        return cls(b"".join((*parts, metadata)), tuple(places), counts, len(metadata))
-
-
-def _index_chunk(chunk: Chunk, indexes: Mapping[int, bytes], start: int) -> records.ChunkIndex:
-    """Make the index of a chunk that begins at `start` [bytes] and is followed by its message indexes."""
-    end = start + chunk.record_size
-    offsets, offset = {}, end
-    for channel, index in indexes.items():
-        offsets[channel] = offset
-        offset += len(index)
-    return records.ChunkIndex(
-        chunk_length=chunk.record_size,
-        chunk_start_offset=start,
-        compression="zstd",
-        compressed_size=len(chunk.data),
-        message_end_time=chunk.end_ns,
-        message_index_length=offset - end,
-        message_index_offsets=offsets,
-        message_start_time=chunk.start_ns,
-        uncompressed_size=chunk.uncompressed_size,
-    )
-
-
-def _end_of(index: records.ChunkIndex) -> int:
-    """Find where the message indexes of a chunk end [bytes]."""
-    return int(index.chunk_start_offset + index.chunk_length + index.message_index_length)
+    def of(cls, chunk: Chunk, indexes: Mapping[int, bytes], metadata: bytes = b"") -> RecordGroup:
+        """Make the run of a chunk with its Message Index records by channel, and of a Metadata record."""
+        offsets, offset = {}, chunk.record_size
+        for channel, index in indexes.items():
+            offsets[channel] = offset
+            offset += len(index)
+        chunk_index = records.ChunkIndex(
+            chunk_length=chunk.record_size,
+            chunk_start_offset=0,
+            compression="zstd",
+            compressed_size=len(chunk.data),
+            message_end_time=chunk.end_ns,
+            message_index_length=offset - chunk.record_size,
+            message_index_offsets=offsets,
+            message_start_time=chunk.start_ns,
+            uncompressed_size=chunk.uncompressed_size,
+        )
+        counts = {channel: count_indexed(index) for channel, index in indexes.items()}
+        data = b"".join((chunk.record_header(), chunk.data, *indexes.values(), metadata))
+        return cls(data, chunk_index, counts, len(metadata))
 
 
 def episode_run(episode: Episode) -> RecordGroup:
     """Encode the records of an episode."""
-    chunks = [(each.chunk, indexes) for each, indexes in zip(episode.chunks, episode.message_indexes, strict=True)]
     facts = {
         "trial": str(episode.header.trial),
         "digest": episode.digest,
-        "records_sha256": episode.state.records_sha256,
+        "records_sha256": episode.chunk.records_sha256,
         "header": episode.header_json,
     }
-    if episode.sensors:
-        facts[SENSORS_SHA256] = " ".join(sensor.records_sha256 for sensor in episode.sensors)
-    return RecordGroup.of(chunks, encode_records(records.Metadata(name=EPISODE, metadata=facts)))
+    metadata = encode_records(records.Metadata(name=EPISODE, metadata=facts))
+    return RecordGroup.of(episode.chunk, episode.message_indexes, metadata)
 
 
 class McapFile:
@@ -159,10 +141,9 @@ class McapFile:
 
     def append(self, run: RecordGroup) -> None:
         """Write a run of records, such as that of an episode."""
-        for index in run.chunk_indexes:
-            offsets = {channel: self.size + offset for channel, offset in index.message_index_offsets.items()}
-            start = self.size + index.chunk_start_offset
-            self._chunk_indexes.append(replace(index, chunk_start_offset=start, message_index_offsets=offsets))
+        offsets = {channel: self.size + offset for channel, offset in run.chunk_index.message_index_offsets.items()}
+        index = replace(run.chunk_index, chunk_start_offset=self.size, message_index_offsets=offsets)
+        self._chunk_indexes.append(index)
         self._counts.update(run.counts)
         if run.metadata_length:
             start = self.size + run.length - run.metadata_length
@@ -241,4 +222,4 @@ def encode_latched_run(channels: Channels, stamp_ns: int) -> RecordGroup:
     }
     contents = b"".join(messages)
     data = zstandard.ZstdCompressor(level=_LATCHED_LEVEL).compress(contents)
-    return RecordGroup.of([(Chunk.of(contents, data, start_ns=stamp_ns, end_ns=stamp_ns), indexes)])
+    return RecordGroup.of(Chunk.of(contents, data, start_ns=stamp_ns, end_ns=stamp_ns), indexes)

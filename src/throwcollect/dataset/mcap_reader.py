@@ -7,10 +7,9 @@ import io
 import mmap
 import os
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
@@ -20,17 +19,16 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from rclzenoh.interfaces import deserialize, get_message
-from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, RecordGroup, episode_run
+from throwcollect.dataset.mcap_file import EPISODE, MAGIC, RecordGroup, episode_run
 from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
-from throwcollect.episode.episode_message import Episode, make_episode
+from throwcollect.episode.episode_message import Episode, header_from_json
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
+from throwcollect.sweep.digest import is_digest
 
 _RECORD_HEADER = struct.Struct("<BQ")
-MOST_CHUNKS = 64
-"""Most chunks that an episode may have, so that a file of nothing but chunks is not read again and again."""
 _R = TypeVar("_R", covariant=True)
 
 
@@ -67,29 +65,22 @@ class McapRecord(NamedTuple):
 
 
 @dataclass(frozen=True)
-class StoredChunk:
-    """A chunk of an episode as it lies in a file: its record, and those of its message indexes by channel."""
-
-    record: McapRecord
-    indexes: Mapping[int, McapRecord]
-
-
-@dataclass(frozen=True)
 class StoredEpisode:
-    """An episode's run of records as it lies in a file: its chunks, the state chunk first, and a Metadata record.
+    """An episode as it lies in a file: its chunk, the bytes of its message indexes, and a Metadata record, `facts`.
 
-    `stated_digest` is the digest that this record, `facts`, states; None if it states none.
+    `stated_digest` is the digest that this record states; None if it states none.
     """
 
     episode: Episode
-    chunks: tuple[StoredChunk, ...]
+    chunk: McapRecord
+    indexes: bytes
     facts: McapRecord
     stated_digest: str | None
 
     @property
     def offset(self) -> int:
         """Where it begins in the file [bytes]."""
-        return self.chunks[0].record.offset
+        return self.chunk.offset
 
     @property
     def end(self) -> int:
@@ -97,27 +88,33 @@ class StoredEpisode:
         return self.facts.end
 
     @classmethod
-    def of(cls, chunks: Sequence[StoredChunk], facts: McapRecord, stated: Mapping[str, str]) -> StoredEpisode:
-        """Make the episode of some chunks and the Metadata record `facts` behind them, whose contents are `stated`."""
-        hashes = [stated.get("records_sha256", ""), *stated.get(SENSORS_SHA256, "").split()]
-        parsed = [Chunk.parse(memoryview(each.record.data)) for each in chunks]
-        episode = make_episode(stated.get("header", ""), hashes, parsed)
-        return cls(episode, tuple(chunks), facts, stated.get("digest"))
+    def of(cls, chunk: McapRecord, indexes: bytes, facts: McapRecord) -> StoredEpisode:
+        """Make the episode of a chunk, its message indexes, and the Metadata record behind them."""
+        stated = facts.parse(records.Metadata) if facts.opcode == Opcode.METADATA else None
+        if stated is None or stated.name != EPISODE:
+            place = f"byte {facts.offset}"
+            raise DatasetError(f"a {facts.kind} where the metadata of an episode should be", place=place)
+        try:
+            if not is_digest(sha256 := stated.metadata.get("records_sha256", "")):
+                raise DatasetError(f"episode: SHA-256 {sha256[:80]!r}", expected="64 hexadecimal digits")
+            parsed = replace(Chunk.parse(memoryview(chunk.data)), records_sha256=sha256)
+            episode = Episode(header_from_json(stated.metadata.get("header", "")), parsed)
+        except DatasetError as error:
+            raise error.locate(place=f"byte {chunk.offset}") from error
+        return cls(episode, chunk, indexes, facts, stated.metadata.get("digest"))
 
-    @cached_property
-    def intact_run(self) -> RecordGroup:
-        """Its records as the writer makes them for the episode, which may differ from those in the file."""
-        return episode_run(self.episode)
+    @property
+    def run(self) -> RecordGroup | None:
+        """Its run of records; None if that is not byte for byte what the writer makes of the episode.
 
-    def run(self) -> RecordGroup:
-        """Make the run of its records as they lie in the file, whether or not they fit each other."""
-        chunks = zip(self.episode.chunks, self.chunks, strict=True)
-        runs = [(each.chunk, {channel: index.data for channel, index in at.indexes.items()}) for each, at in chunks]
-        return RecordGroup.of(runs, self.facts.data)
+        The message indexes or metadata of a whole episode without a run are damaged, so it has to be written anew.
+        """
+        run = episode_run(self.episode)
+        return run if run.data == self.chunk.data + self.indexes + self.facts.data else None
 
     def check_whole(self) -> None:
         """Compare everything that is hashed with its hashes."""
-        self.episode.check_records()
+        self.episode.chunk.check_records()
         if self.stated_digest != self.episode.digest:
             place, expected = f"byte {self.facts.offset}", self.episode.digest
             raise DatasetError("the digest is not that of the header", place=place, expected=expected)
@@ -185,37 +182,18 @@ class McapContents:
             raise DatasetError(f"/robot_description is not readable: {error}") from error
         return text
 
-    def message_indexes(self, offset: int) -> tuple[dict[int, McapRecord], McapRecord]:
-        """Read the Message Index records from an offset on, by channel, and the record that follows them."""
-        indexes: dict[int, McapRecord] = {}
-        record = self.record(offset)
+    def episode(self, chunk: McapRecord) -> StoredEpisode:
+        """Read the episode whose chunk a record is."""
+        if chunk.opcode != Opcode.CHUNK:
+            raise DatasetError(f"a {chunk.kind} where the chunk of an episode should be", place=f"byte {chunk.offset}")
+        record = self.record(chunk.end)
         while record.opcode == Opcode.MESSAGE_INDEX:
-            channel = int.from_bytes(record.data[_RECORD_HEADER.size : _RECORD_HEADER.size + 2], "little")
-            if channel in indexes:
-                raise DatasetError(f"a second message index of channel {channel}", place=f"byte {record.offset}")
-            indexes[channel] = record
             record = self.record(record.end)
-        return indexes, record
+        return self.episode_between(chunk, record)
 
-    def episode(self, first: McapRecord) -> StoredEpisode:
-        """Read the episode whose first chunk a record is."""
-        chunks: list[StoredChunk] = []
-        record = first
-        # Bounded, as a damaged file may have chunk after chunk and no metadata.
-        while record.opcode == Opcode.CHUNK and len(chunks) < MOST_CHUNKS:
-            indexes, following = self.message_indexes(record.end)
-            chunks.append(StoredChunk(record, indexes))
-            record = following
-        if not chunks:
-            raise DatasetError(f"a {record.kind} where the chunk of an episode should be", place=f"byte {first.offset}")
-        metadata = record.parse(records.Metadata) if record.opcode == Opcode.METADATA else None
-        if metadata is None or metadata.name != EPISODE:
-            place = f"byte {record.offset}"
-            raise DatasetError(f"a {record.kind} where the metadata of an episode should be", place=place)
-        try:
-            return StoredEpisode.of(chunks, record, metadata.metadata)
-        except DatasetError as error:
-            raise error.locate(place=f"byte {first.offset}") from error
+    def episode_between(self, chunk: McapRecord, facts: McapRecord) -> StoredEpisode:
+        """Read the episode of a chunk and of the Metadata record that ends it, whatever lies between the two."""
+        return StoredEpisode.of(chunk, self.slice(chunk.end, facts.offset), facts)
 
 
 def read_latched_table(record: McapRecord) -> MessageTable:

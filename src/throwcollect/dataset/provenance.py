@@ -1,7 +1,8 @@
 """How a dataset was collected: ``provenance.json``.
 
-Where, when and how fast a collection ran does not follow from its configuration, so neither digest nor manifest cover
-this file. It and the data card, which shows it to people, may differ between two collections of one configuration.
+Where, when and how fast a collection ran does not follow from its configuration, so the digest of the dataset does not
+cover this file; the manifest does. It and the data card, which shows it to people, may differ between two collections
+of one configuration.
 """
 
 from __future__ import annotations
@@ -122,20 +123,10 @@ def write_provenance(directory: Path, provenance: Provenance) -> None:
 
 
 def read_provenance(directory: Path) -> Provenance | None:
-    """Read how a dataset was collected; None if the file is damaged or missing."""
-    with suppress(DatasetError):
-        return load_provenance(directory / PROVENANCE)
+    """Read how a dataset was collected; None if the file is missing or damaged."""
+    with suppress(DatasetError, ValidationError):
+        return _JSON.validate_json(read_text(directory / PROVENANCE, most_bytes=_MOST_BYTES))
     return None
-
-
-def load_provenance(path: Path) -> Provenance:
-    """Read the file that says how a dataset was collected."""
-    try:
-        return _JSON.validate_json(read_text(path, most_bytes=_MOST_BYTES))
-    except ValidationError as error:
-        wrong = error.errors()[0]
-        place = ".".join(map(str, wrong["loc"]))
-        raise DatasetError(f"is damaged: {wrong['msg']}", path=path, place=place) from error
 
 
 @cache

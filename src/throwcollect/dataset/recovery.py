@@ -28,8 +28,8 @@ from throwcollect.dataset.directory import (
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import map_file
-from throwcollect.dataset.scan import scan_whole
-from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
+from throwcollect.dataset.scan import scan_file
+from throwcollect.dataset.shard import FinishedShard, OpenShard, rewrite
 from throwcollect.dataset.throws_table import EpisodePlace
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
@@ -155,9 +155,9 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
         remove(shard.part)
     only_final = {each.place.chunk_offset: each for trial, each in final.items() if trial not in runs}
     if only_final:
-        for found in scan_whole(shard.path):
-            if found.stored.offset in only_final:
-                shard.append(found.stored.episode)
+        for found in scan_file(shard.path):
+            if found.offset in only_final:
+                shard.append(found.episode)
     # The final file goes last: if this process is killed before, the next one finds these episodes in it again.
     remove(shard.path)
     episodes = {**{trial: begun[trial] for trial in runs}, **{each.trial: each for each in only_final.values()}}
@@ -184,8 +184,8 @@ def find_episodes(
     """
     episodes: dict[int, RecoveredEpisode] = {}
     trials_to_run = frozenset(plan.trials.numbers_to_run)
-    for found in scan_whole(path):
-        episode = found.stored.episode
+    for found in scan_file(path):
+        episode = found.episode
         trial = episode.header.trial
         if trial not in trials_to_run or (trial in episodes and episodes[trial].run is not None):
             continue
@@ -193,32 +193,20 @@ def find_episodes(
             result = judge(plan.config_of(plan.trial(trial)), episode)
         except DatasetError:
             continue
-        recorded = channels is None or channels.fit(episode.channels())
+        recorded = channels is None or channels.numbers == tuple(episode.table.columns)
         if recorded and episode.header.start_ns == plan.config.trial_start_ns(trial):
-            place = EpisodePlace(path.name, found.stored.offset, episode.header.samples, episode.digest)
-            run = replace(found.stored.intact_run, data=b"") if found.intact else None
+            place = EpisodePlace(path.name, found.offset, episode.header.samples, episode.digest)
+            run = found.run
             if run is not None or trial not in episodes:
-                episodes[trial] = RecoveredEpisode(trial, result, place, run)
+                episodes[trial] = RecoveredEpisode(trial, result, place, run and replace(run, data=b""))
     return episodes
 
 
 def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, RecoveredEpisode]) -> FinishedShard | None:
     """Describe a finished file; None if it is not, byte for byte, what the writer makes of its episodes."""
-    written = 0
-    same = True
+    runs = {trial: (each.place.chunk_offset, each.run) for trial, each in episodes.items() if each.run is not None}
+    if len(runs) < len(episodes):
+        return None
     with map_file(path) as contents:
-
-        def compare(data: bytes) -> None:
-            nonlocal written, same
-            # After a difference, the rest is only counted: the writer that calls this cannot be stopped from here.
-            same = same and contents.slice(written, written + len(data)) == data
-            written += len(data)
-
-        def read(offset: int, length: int) -> bytes:
-            return contents.slice(offset, offset + length)
-
-        runs = {trial: (each.place.chunk_offset, each.run) for trial, each in episodes.items() if each.run is not None}
-        if len(runs) < len(episodes):
-            return None
-        finished = write_in_order(compare, channels, runs, read, name=path.name)
-        return finished if same and written == len(contents) else None
+        finished, difference = rewrite(contents, channels, runs, name=path.name)
+    return finished if difference is None else None

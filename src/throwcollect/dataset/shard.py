@@ -19,6 +19,7 @@ from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import path_of_part
 from throwcollect.dataset.manifest import FileEntry, RunningHash
 from throwcollect.dataset.mcap_file import McapFile, RecordGroup, episode_run
+from throwcollect.dataset.mcap_reader import McapContents
 from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
@@ -70,6 +71,27 @@ def write_in_order(
         file.append(replace(run, data=read(offset, run.length)))
     summary = file.finish(name)
     return FinishedShard((summary, FileEntry(name, file.size, sha256.hexdigest())), offsets)
+
+
+def rewrite(contents: McapContents, channels: Channels, runs: Runs, *, name: str) -> tuple[FinishedShard, int | None]:
+    """Write the finished file of the episodes of a file, and compare the two.
+
+    Returns:
+        What is written, and the offset of the first records in which the file differs from it; None if it does not.
+    """
+    size, difference = 0, None
+
+    def compare(data: bytes) -> None:
+        nonlocal size, difference
+        if difference is None and contents.slice(size, size + len(data)) != data:
+            difference = size
+        size += len(data)
+
+    def read(offset: int, length: int) -> bytes:
+        return contents.slice(offset, offset + length)
+
+    finished = write_in_order(compare, channels, runs, read, name=name)
+    return finished, size if difference is None and size != len(contents) else difference
 
 
 class OpenShard:

@@ -236,7 +236,7 @@ class Throw:
         if isinstance(episode, StoredThrow):
             return episode.start_ns, episode.joints, episode.read_rows()
         header, joints = episode.header, episode.table.joints
-        return header.start_ns, joints, trajectory_rows(episode.state.contents, header.samples, joints)
+        return header.start_ns, joints, trajectory_rows(episode.chunk.contents, header.samples, joints)
 
     def _read_columns(self, names: Iterable[str]) -> list[Column]:
         """Read columns into arrays of their own, after those of times and stamps."""

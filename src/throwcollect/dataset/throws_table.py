@@ -176,30 +176,41 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
 
 
 class RowsByTrial(Mapping[int, Row]):
-    """The rows of a table of throws, by trial; rows without a trial are left out.
+    """The rows of a table of throws, in order of trials; rows without a trial are left out.
 
     Only a piece of the table at a time is made into rows, which take ten times its memory: a million rows would take
     3 GB.
+
+    Args:
+        table: The table.
+        recorded: Whether rows of trials without an episode are left out, too.
     """
 
-    def __init__(self, table: pa.Table) -> None:
+    def __init__(self, table: pa.Table, *, recorded: bool = False) -> None:
         self._table = table
-        self._places = {trial: place for place, trial in enumerate(table["trial"].to_pylist()) if trial is not None}
+        places = np.flatnonzero(table["digest" if recorded else "trial"].is_valid().to_numpy())[::-1]
+        # Of the rows of one trial in a damaged table, the last one counts.
+        self._trials, first = np.unique(table["trial"].fill_null(-1).to_numpy()[places], return_index=True)
+        self._places = places[first]
         self._start = 0
         self._piece: list[Row] = []
 
     def __getitem__(self, trial: int) -> Row:
-        place = self._places[trial]
+        # Dictionaries of a million trials would take 200 MB.
+        index = int(np.searchsorted(self._trials, trial))
+        if index == len(self) or self._trials[index] != trial:
+            raise KeyError(trial)
+        place = int(self._places[index])
         if not self._start <= place < self._start + len(self._piece):
             self._start = place - place % _ROWS_A_PIECE
             self._piece = self._table.slice(self._start, _ROWS_A_PIECE).to_pylist()
         return self._piece[place - self._start]
 
     def __iter__(self) -> Iterator[int]:
-        return iter(self._places)
+        return map(int, self._trials)
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._trials)
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:

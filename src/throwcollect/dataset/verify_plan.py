@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import PLAN
+from throwcollect.dataset.directory import PLAN, TRIALS
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.throws_table import Row
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
+from throwcollect.sweep.point_file import read_points
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.wording import blank_numbers, format_count
 
@@ -27,11 +30,11 @@ CheckOf = Callable[[Config], Check]
 """Makes the check of the trials of a configuration."""
 
 
-def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] | None) -> Iterator[Finding]:
+def find_drawing_problems(directory: Path, plan: Plan, throws: pa.Table | None) -> Iterator[Finding]:
     """Find trials that are not those that the configuration draws, and a plan that does not end where it should.
 
     Where a plan with `until` has to end follows from the table of throws, which other checks compare with the episodes;
-    without its rows, this is not known.
+    without that table, this is not known.
     """
     # A list lies beside the plan and is compared with it there. Trials of joined plans have the seeds of these.
     if plan.config.sweep.file is not None:
@@ -45,9 +48,9 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
         yield Finding(PLAN, "", f"the configuration sweeps {', '.join(points.keys)}, the plan {', '.join(plan.keys)}")
         return
     count, there = len(points.values), len(plan.trials)
-    if plan.config.until is not None and rows is not None:
-        count = _find_end(plan, rows, at_most=count)
-    if count != there and (plan.config.until is None or rows is not None):
+    if plan.config.until is not None and throws is not None:
+        count = _find_end(plan, throws, at_most=count)
+    if count != there and (plan.config.until is None or throws is not None):
         yield Finding(PLAN, "", f"has {format_count(there, 'trial')}, the configuration gives {count}")
     drawn = make_trials(plan.config, points[:there])
     planned = plan.trials[: len(drawn)]
@@ -68,11 +71,11 @@ def _find_same(planned: NDArray[np.float64], drawn: NDArray[np.float64]) -> NDAr
     return np.isclose(planned, drawn, rtol=_TOLERANCE, atol=_TOLERANCE)
 
 
-def _find_end(plan: Plan, rows: Mapping[int, Row], *, at_most: int) -> int:
+def _find_end(plan: Plan, throws: pa.Table, *, at_most: int) -> int:
     """Find how many trials a dataset has to have, the last of which brings as many successes as `until` asks for."""
     left = plan.config.until.wanted if plan.config.until else 0
-    for number in plan.trials.numbers:
-        left -= number in rows and rows[number]["outcome"] == plan.config.task.success
+    for number, outcome in zip(plan.trials.numbers, throws["outcome"].to_pylist(), strict=True):
+        left -= outcome == plan.config.task.success
         if not left:
             return number + 1
     return at_most
@@ -103,3 +106,28 @@ def _strip_numbers(reason: str | None) -> str | None:
 
 def _make_finding(number: int, problem: str) -> Finding:
     return Finding(PLAN, f"trial {number}", problem)
+
+
+def read_list(directory: Path, plan: Plan) -> Points:
+    """Read the list of points that a dataset's own configuration names."""
+    path = directory / TRIALS
+    if not path.exists():
+        raise DatasetError("is missing", path=path)
+    try:
+        points = read_points(path, plan.config)
+    except ConfigError as error:
+        raise DatasetError(error.problems[0].message, path=path) from error
+    if points[: len(plan.trials)] != plan.trials.points:
+        raise DatasetError(f"begins with other points than those of {PLAN}", path=path)
+    return points
+
+
+def find_wrong_trials(plan: Plan) -> dict[int, str]:
+    """Find the trials of a plan that were changed since it was made, and the digests that their values and seeds give.
+
+    Every trial has its digest in the plan.
+    """
+    trials = plan.trials
+    digests = trial_digests(plan.config, trials.points, trials.seeds)
+    wrong = np.flatnonzero((digests != trials.digests).any(axis=1)).tolist()
+    return {trials.first + row: digests[row].tobytes().hex() for row in wrong}

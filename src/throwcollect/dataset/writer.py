@@ -2,13 +2,13 @@
 
 A directory that holds ``config.yaml`` and ``plan.parquet`` is a created dataset; one that also holds ``metadata.yaml``
 is finished, as that file is written last. While a dataset is filled, each open shard lies beside its final name (see
-`shard`), and the rows of finished shards are kept on disk for ``throws.parquet`` (see `row_store`). If the process is
+`shard`), and the rows of finished shards are kept in memory, 0.5 kB each, for ``throws.parquet``. If the process is
 stopped, the next writer takes in the files that it left (see `recovery`) and goes on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
@@ -32,11 +32,10 @@ from throwcollect.dataset.recovery import (
     recover_shard,
     remove_unfinished,
 )
-from throwcollect.dataset.row_store import EpisodeRows, RowStore
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.shard_layout import ShardLayout
 from throwcollect.dataset.summary_files import write_description
-from throwcollect.dataset.throws_table import EpisodePlace, Row, ThrowsTable
+from throwcollect.dataset.throws_table import EpisodePlace, Row, RowsByTrial, ThrowsTable
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
@@ -80,7 +79,8 @@ class DatasetWriter:
         """Unfinished shards with at least one trial that has ended."""
         self._recordings: dict[int, Recording] = {}
         """The file of each finished shard that has one."""
-        self._finished_rows = RowStore(directory, self._table.schema)
+        self._finished_rows: dict[int, pa.Table] = {}
+        """The rows of each finished shard, in order of trials."""
         self._held = ExitStack()
         for number in self._layout.numbers_of(plan.trials.numbers):
             # A shard of refused trials alone waits for no episode, and nothing would finish it later.
@@ -165,7 +165,7 @@ class DatasetWriter:
     def take_shard(self, number: int, recording: Recording | None, rows: pa.Table) -> None:
         """Take in a finished shard with the rows of its trials; its file, if it has one, already has its final name."""
         self._unfinished.discard(number)
-        self._finished_rows.put(number, rows)
+        self._finished_rows[number] = rows
         if recording is not None:
             self._recordings[number] = recording
 
@@ -205,9 +205,12 @@ class DatasetWriter:
         for shard in self._shards.values():
             shard.sync()
 
-    def episode_rows(self) -> EpisodeRows:
-        """Return the row of each trial that has an episode; all shards must be finished."""
-        return EpisodeRows(self._finished_rows.table)
+    def episode_rows(self) -> Mapping[int, Row]:
+        """Return the row of each trial that has an episode, in order of trials; all shards must be finished."""
+        return RowsByTrial(self._join_rows(), recorded=True)
+
+    def _join_rows(self) -> pa.Table:
+        return pa.concat_tables(rows for _, rows in sorted(self._finished_rows.items()))
 
     def finish(
         self, *, wall_s: float | None = None, simulations: int | None = None, provenance: Provenance | None = None
@@ -226,20 +229,19 @@ class DatasetWriter:
             missing = self.list_missing()
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
-        throws = self._finished_rows.table
+        throws = self._join_rows()
         if self._journal is not None:
             wall_s = self._journal.measure_collected_s()
         provenance = provenance or Provenance.of_this_machine(
             simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory), robot=self._channels.robot
         )
-        # How it was run must not change the dataset, so only files that the manifest does not cover say that.
+        # How it was run must not change the dataset, so only data card and provenance say that.
         config = self._config.without_run()
         write_provenance(self._directory, provenance)
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_file(self._directory / CONFIG, dump_yaml(config).encode())
         recordings = [self._recordings[number] for number in sorted(self._recordings)]
-        let_go = self._finished_rows.let_go
-        write_description(self._directory, config.name, throws, self._channels, recordings, on_piece=let_go)
+        write_description(self._directory, config.name, throws, self._channels, recordings)
         self.note("finished", wall_s=wall_s)
         return count_outcomes(throws)
 
@@ -247,7 +249,6 @@ class DatasetWriter:
         """Close all files; written data stay."""
         for shard in self._shards.values():
             shard.close()
-        self._finished_rows.close()
         self._held.close()
         self._journal = None
 

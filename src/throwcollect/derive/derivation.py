@@ -145,7 +145,7 @@ def _read(source: Dataset, row: Row) -> Episode:
     with locating_damage(source, row["trial"]):
         episode = source.episode(row["trial"])
         # The copy gets hashes of its own, which would make damage look as if it had been recorded.
-        episode.check_records()
+        episode.chunk.check_records()
         if episode.digest != row["digest"]:
             raise DatasetError(f"digest {episode.digest}", expected=f"{row['digest']} as throws.parquet says")
         return episode

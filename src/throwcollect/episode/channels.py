@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -87,18 +86,12 @@ class Channel:
     qos: Qos
 
 
-SENSORS: list[tuple[Channel, ...]] = []
-"""Channels of the chunks that follow the state chunk of an episode, chunk by chunk; their messages begin with a
-std_msgs/Header. No sensor is simulated yet: a camera adds its channels here, with numbers that no other channel has."""
-
-
 class Channels:
     """The channels of the recordings of a configuration.
 
     Attributes:
         latched: Channels with one message per file: ``/robot_description`` and ``/tf_static``.
         recorded: Channels with one message per sample, in the order of their numbers, with their topics.
-        sensors: Channels of each chunk that follows the state chunk of an episode.
         robot: URDF text of the robot.
 
     Raises:
@@ -114,7 +107,6 @@ class Channels:
         self.robot = urdf
         self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
         topics = _make_topics(config, self._frames)
-        self.sensors = tuple(SENSORS)
         self.recorded: dict[Channel, Topic] = {
             Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == _TF_ID else _SAMPLED): topic
             for number, topic in sorted(topics.items())
@@ -123,21 +115,12 @@ class Channels:
     @property
     def all(self) -> tuple[Channel, ...]:
         """All channels, by number."""
-        return (*self.latched, *self.recorded, *itertools.chain(*self.sensors))
+        return (*self.latched, *self.recorded)
 
     @property
-    def numbers(self) -> tuple[tuple[int, ...], ...]:
-        """Numbers of the channels of each chunk of an episode."""
-        return tuple(tuple(channel.id for channel in chunk) for chunk in (self.recorded, *self.sensors))
-
-    def fit(self, numbers: tuple[tuple[int, ...], ...]) -> bool:
-        """Say whether chunks with these channels fit; the chunk of a sensor may lack channels that have no data."""
-        state, *sensors = self.numbers
-        return (
-            len(numbers) == len(self.numbers)
-            and numbers[0] == state
-            and all(set(recorded) <= set(known) for recorded, known in zip(numbers[1:], sensors, strict=True))
-        )
+    def numbers(self) -> tuple[int, ...]:
+        """Numbers of the channels of an episode's chunk."""
+        return tuple(channel.id for channel in self.recorded)
 
     def encode_latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
         """Encode the CDR messages of the latched channels; `stamp_ns` is the stamp of the static transforms [ns]."""

@@ -6,9 +6,12 @@ number (MCAP specification, records Message, Chunk and Message Index); `encoder`
 
 from __future__ import annotations
 
+import hashlib
 import struct
 import threading
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -89,7 +92,7 @@ def _cut_message_index(records: memoryview) -> tuple[int, bytes]:
 
 @dataclass(frozen=True)
 class Chunk:
-    """A compressed MCAP chunk.
+    """A compressed MCAP chunk, which is decompressed when its contents are needed.
 
     Attributes:
         data: Compressed records (zstd); may be a view of the message or file that they came in.
@@ -97,6 +100,8 @@ class Chunk:
         crc: CRC-32 of the records.
         start_ns: Time of the first message [ns].
         end_ns: Time of the last message [ns].
+        records_sha256: SHA-256 of the records in hexadecimal, as it is written beside the chunk; empty if it is not.
+        indexes: MCAP Message Index records by channel, as they came with the chunk; empty if they did not.
     """
 
     data: bytes | memoryview
@@ -104,11 +109,24 @@ class Chunk:
     crc: int
     start_ns: int
     end_ns: int
+    records_sha256: str = ""
+    indexes: Mapping[int, bytes] = field(default_factory=dict, compare=False)
 
     @classmethod
     def of(cls, contents: bytes | bytearray | memoryview, data: bytes, *, start_ns: int, end_ns: int) -> Chunk:
         """Make the chunk of records, which are given both uncompressed and compressed."""
-        return cls(data, len(contents), crc32(contents), start_ns, end_ns)
+        return cls(data, len(contents), crc32(contents), start_ns, end_ns, hashlib.sha256(contents).hexdigest())
+
+    @cached_property
+    def contents(self) -> bytes:
+        """The records, decompressed once."""
+        return self.decompress()
+
+    def check_records(self) -> None:
+        """Hash the records and compare the hash with the one that was written beside them."""
+        actual = hashlib.sha256(self.contents).hexdigest()
+        if actual != self.records_sha256:
+            raise DatasetError(f"chunk: SHA-256 of its records is {actual}", expected=self.records_sha256)
 
     def record(self) -> bytes:
         """Encode the MCAP Chunk record, with its opcode and length."""
@@ -145,25 +163,17 @@ class Chunk:
         return _CHUNK_HEADER.size + stored if is_ours else 0
 
     @classmethod
-    def parse_all(cls, records: memoryview) -> tuple[list[Chunk], list[dict[int, bytes]]]:
-        """Read MCAP Chunk records, at least one, each with its Message Index records, without decompressing them.
-
-        Returns:
-            The chunks, and the index records of each by channel.
-        """
-        chunks: list[Chunk] = []
-        indexes: list[dict[int, bytes]] = []
-        while records or not chunks:
-            # Bytes that announce no size are taken as a whole, and `parse` refuses them.
-            size = cls.read_announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
-            chunks.append(cls.parse(records[:size]))
-            indexes.append({})
-            records = records[size:]
-            while records and records[0] == Opcode.MESSAGE_INDEX:
-                channel, index = _cut_message_index(records)
-                indexes[-1][channel] = index
-                records = records[len(index) :]
-        return chunks, indexes
+    def parse_indexed(cls, records: memoryview, records_sha256: str) -> Chunk:
+        """Read an MCAP Chunk record with the Message Index records behind it, without decompressing it."""
+        # Bytes that announce no size are taken as a whole, and `parse` refuses them.
+        size = cls.read_announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
+        chunk, rest = cls.parse(records[:size]), records[size:]
+        indexes: dict[int, bytes] = {}
+        while rest:
+            channel, index = _cut_message_index(rest)
+            indexes[channel] = index
+            rest = rest[len(index) :]
+        return replace(chunk, records_sha256=records_sha256, indexes=indexes)
 
     @classmethod
     def parse(cls, record: bytes | memoryview) -> Chunk:

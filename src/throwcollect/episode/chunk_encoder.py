@@ -10,10 +10,9 @@ import zstandard
 from mcap.opcode import Opcode
 
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES
+from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, Chunk
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import ControllerSamples, Samples
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.topics import Recording
 
 
@@ -32,7 +31,7 @@ class ChunkEncoder:
 
     def encode(
         self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None
-    ) -> tuple[RecordedChunk, MessageTable]:
+    ) -> tuple[Chunk, MessageTable]:
         """Encode an episode, with set points of each controller whose state is recorded, by name.
 
         Returns:
@@ -46,5 +45,5 @@ class ChunkEncoder:
             headers["log_time"] = headers["publish_time"] = samples.stamps_ns
             topic.fill(table.messages(channel).view(topic.layout.dtype)[:, 0], recording)
         data, times = self._compressor.compress(table.contents), table.log_times
-        chunk = RecordedChunk.of(table.contents, data, start_ns=int(times[0]), end_ns=int(times[-1]))
+        chunk = Chunk.of(table.contents, data, start_ns=int(times[0]), end_ns=int(times[-1]))
         return replace(chunk, indexes=table.message_indexes), table

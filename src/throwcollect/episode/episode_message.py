@@ -1,10 +1,10 @@
 """The one message that carries an episode from a simulation to the coordinator: std_msgs/UInt8MultiArray.
 
 Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
-JSON; ``conditions``, the conditions of the episode in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
-bytes; ``chunk``, one or more MCAP Chunk records, each with its Message Index records behind it; and ``signature``,
-which covers all parts before it. The coordinator trusts a sender who has the key of the run, so it does not decompress,
-hash or judge the episode again.
+JSON; ``conditions``, the conditions of the episode in JSON; ``hash``, the SHA-256 of the records of the chunk as 32
+bytes; ``chunk``, its MCAP Chunk record with its Message Index records behind it; and ``signature``, which covers all
+parts before it. The coordinator trusts a sender who has the key of the run, so it does not decompress, hash or judge
+the episode again.
 
 The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
 are the number of the trial that was refused.
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import re
 import struct
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
@@ -28,13 +27,11 @@ from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import Signer
 
-_PARTS = ("header", "result", "conditions", "hashes", "chunk", "signature")
+_PARTS = ("header", "result", "conditions", "hash", "chunk", "signature")
 _HASH_BYTES = 32
-_SHA256 = re.compile(r"[0-9a-f]{64}")
 _HEADER = TypeAdapter(EpisodeHeader)
 _LONGEST_NAME = 256
 """Most characters of a recorded name that a message shows."""
@@ -42,29 +39,18 @@ _COUNT = struct.Struct("<I")
 
 
 class Episode:
-    """The recording of one trial, in a message and on disk: a header and chunks, which are decompressed when needed.
+    """The recording of one trial, in a message and on disk: a header, and a chunk that is decompressed when needed.
 
-    The state chunk comes first and holds one message per channel and sample. Chunks of sensors may follow it, with
-    messages of any size at rates of their own. The digest covers header and state chunk alone, so a throw has the same
-    digest with and without sensors; each chunk of a sensor has a hash of its own beside it.
+    The chunk holds one message per channel and sample.
 
     Attributes:
         header: The facts besides the samples.
-        chunks: All chunks in order, the state chunk first.
-        state: The state chunk.
-        sensors: Chunks of sensors, in the order of the channels that they hold.
+        chunk: The recorded messages, with their hash.
     """
 
-    def __init__(self, header: EpisodeHeader, state: RecordedChunk, *sensors: RecordedChunk) -> None:
+    def __init__(self, header: EpisodeHeader, chunk: Chunk) -> None:
         self.header = header
-        self.chunks = (state, *sensors)
-        self.state = state
-        self.sensors = sensors
-
-    @property
-    def chunk(self) -> Chunk:
-        """The state chunk, compressed."""
-        return self.state.chunk
+        self.chunk = chunk
 
     @cached_property
     def header_json(self) -> str:
@@ -73,8 +59,8 @@ class Episode:
 
     @cached_property
     def table(self) -> MessageTable:
-        """The message records of the state chunk as a table."""
-        return MessageTable(self.state.contents, self.header.samples)
+        """The message records of the chunk as a table."""
+        return MessageTable(self.chunk.contents, self.header.samples)
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
         """Read the samples; `joints` must have been recorded, in this order."""
@@ -83,25 +69,15 @@ class Episode:
         return self.table.samples
 
     @cached_property
-    def message_indexes(self) -> tuple[Mapping[int, bytes], ...]:
-        """The MCAP Message Index records of each chunk, by channel."""
-        sensors = (sensor.indexes or sensor.messages.message_indexes for sensor in self.sensors)
-        return (self.state.indexes or self.table.message_indexes, *sensors)
+    def message_indexes(self) -> Mapping[int, bytes]:
+        """The MCAP Message Index records of the chunk, by channel."""
+        return self.chunk.indexes or self.table.message_indexes
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 over the header's JSON, one zero byte and the hash of the state chunk as 32 bytes, in hexadecimal."""
-        records = bytes.fromhex(self.state.records_sha256)
+        """SHA-256 over the header's JSON, one zero byte and the hash of the chunk as 32 bytes, in hexadecimal."""
+        records = bytes.fromhex(self.chunk.records_sha256)
         return hashlib.sha256(self.header_json.encode() + b"\0" + records).hexdigest()
-
-    def channels(self) -> tuple[tuple[int, ...], ...]:
-        """List the numbers of the channels of each chunk."""
-        return (tuple(self.table.columns), *(sensor.messages.channels for sensor in self.sensors))
-
-    def check_records(self) -> None:
-        """Hash the message records of all chunks again."""
-        for chunk in self.chunks:
-            chunk.check_records()
 
 
 def _require_joints(recorded: tuple[str, ...], wanted: tuple[str, ...]) -> None:
@@ -167,12 +143,8 @@ def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
             episode.header_json.encode(),
             handed.result.encode(),
             handed.conditions.encode(),
-            b"".join(bytes.fromhex(chunk.records_sha256) for chunk in episode.chunks),
-            b"".join(
-                part
-                for chunk, indexes in zip(episode.chunks, episode.message_indexes, strict=True)
-                for part in (chunk.chunk.record(), *indexes.values())
-            ),
+            bytes.fromhex(episode.chunk.records_sha256),
+            b"".join((episode.chunk.record(), *episode.message_indexes.values())),
         ]
     signature = signer.sign(*parts).encode()
     return b"".join((_encode_prefix([*map(len, parts), len(signature)]), *parts, signature))
@@ -205,31 +177,13 @@ def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
     *parts, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
     if not signer.has_signed(bytes(signature).decode(errors="replace"), whole[length : ends[-2]]):
         raise DatasetError("episode: is not signed with the key of this run")
-    header, result, conditions, hashes, chunks = parts
+    header, result, conditions, records_hash, chunk = parts
     try:
         texts = bytes(result).decode(), bytes(conditions).decode()
         if not header:
             return TrialRefusal(trial=int(texts[1]), reason=texts[0])
     except ValueError as error:
         raise DatasetError("episode: its result or its conditions cannot be read") from error
-    given = [hashes[start : start + _HASH_BYTES].hex() for start in range(0, len(hashes), _HASH_BYTES)]
-    return Delivery(make_episode(bytes(header), given, *Chunk.parse_all(chunks)), *texts)
-
-
-def make_episode(
-    header: bytes | str,
-    hashes: Sequence[str],
-    chunks: Sequence[Chunk],
-    indexes: Sequence[Mapping[int, bytes]] = (),
-) -> Episode:
-    """Make an episode of its header in JSON, its chunks, the state chunk first, and the SHA-256 of their records.
-
-    `indexes` has the Message Index records of each chunk by channel, if they came with the chunks.
-    """
-    for given in hashes:
-        if not _SHA256.fullmatch(given):
-            raise DatasetError(f"episode: SHA-256 {given[:80]!r}", expected="64 hexadecimal digits")
-    if len(hashes) != len(chunks) or not chunks:
-        raise DatasetError(f"episode: {len(chunks)} chunks", expected=f"{len(hashes)}, as many as it has hashes of")
-    known = indexes or [{}] * len(chunks)
-    return Episode(header_from_json(header), *map(RecordedChunk, chunks, hashes, known))
+    if len(records_hash) != _HASH_BYTES:
+        raise DatasetError(f"episode: a hash of {len(records_hash)} bytes", expected=f"{_HASH_BYTES}")
+    return Delivery(Episode(header_from_json(bytes(header)), Chunk.parse_indexed(chunk, records_hash.hex())), *texts)

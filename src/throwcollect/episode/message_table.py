@@ -1,13 +1,11 @@
-"""Message records of an uncompressed chunk, seen in place as rows of equal size or as a list.
+"""Message records of an uncompressed chunk, seen in place as rows of equal size.
 
-As all messages of a channel of the state chunk have the same size, that chunk is a table: one row per sample, with the
-record of each channel at a constant place in each row. The chunks of sensors are no tables: their messages may vary in
-size, and each of their channels may have a rate of its own.
+All messages of a channel have the same size, so a chunk is a table: one row per sample, with the record of each channel
+at a constant place in each row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,14 +17,12 @@ from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
 from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, encode_message_index
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import (
-    STAMP,
     Rows,
     Topic,
     ball_odometry,
     joint_states,
     read_joint_names,
     read_samples,
-    read_stamps,
 )
 from throwcollect.errors import DatasetError
 
@@ -39,10 +35,6 @@ _HEADERS = np.dtype(
 """`MESSAGE_HEADER`, of many records at once."""
 _ALIKE_BYTES = 11
 """Size of opcode, length and channel, which are the same in all records of a channel."""
-_TIMES = np.dtype([("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
-"""The rest of `MESSAGE_HEADER`."""
-_STAMP_OFFSET = 4
-"""Place of the stamp in a message that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
 
 
 class RecordPlace(NamedTuple):
@@ -50,22 +42,6 @@ class RecordPlace(NamedTuple):
 
     offset: int
     size: int
-
-
-def _find_records(
-    contents: bytes | bytearray | memoryview, *, shortest: int, wrong: str
-) -> Iterator[tuple[int, RecordPlace]]:
-    """Find the channels and places of Message records that follow each other, each of at least `shortest` bytes."""
-    offset = 0
-    while offset < len(contents):
-        if len(contents) - offset < MESSAGE_HEADER.size:
-            raise DatasetError(f"chunk: a record is cut off at byte {offset}")
-        opcode, length, channel, *_ = MESSAGE_HEADER.unpack_from(contents, offset)
-        size = RECORD_PREFIX_BYTES + length
-        if opcode != Opcode.MESSAGE or size < shortest or offset + size > len(contents):
-            raise DatasetError(f"chunk: {wrong} at byte {offset}")
-        yield channel, RecordPlace(offset, size)
-        offset += size
 
 
 class RowLayout:
@@ -83,10 +59,16 @@ class RowLayout:
             raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
         self._row = bytes(contents[: len(contents) // samples])
         self.columns: dict[int, RecordPlace] = {}
-        wrong = "not one message per channel and sample"
-        for channel, column in _find_records(self._row, shortest=MESSAGE_HEADER.size, wrong=wrong):
-            if channel in self.columns:
-                raise DatasetError(f"chunk: {wrong} at byte {column.offset}")
+        offset = 0
+        while offset < len(self._row):
+            if len(self._row) - offset < MESSAGE_HEADER.size:
+                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
+            opcode, length, channel, *_ = MESSAGE_HEADER.unpack_from(self._row, offset)
+            column = RecordPlace(offset, RECORD_PREFIX_BYTES + length)
+            offset += column.size
+            fits = MESSAGE_HEADER.size <= column.size and offset <= len(self._row)
+            if opcode != Opcode.MESSAGE or not fits or channel in self.columns:
+                raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
             self.columns[channel] = column
 
     @cached_property
@@ -140,18 +122,6 @@ class MessageTable(RowLayout):
         column = self.columns[channel]
         return self._table[:, column.offset : column.offset + _HEADERS.itemsize].view(_HEADERS)[:, 0]
 
-    def are_timed_by(self, stamps_ns: NDArray[np.int64]) -> bool:
-        """Say whether all records are numbered from 0, with these times of logging and publication [ns]."""
-        expected = np.empty(len(self), _TIMES)
-        expected["sequence"] = np.arange(len(self))
-        expected["log_time"] = expected["publish_time"] = self.log_times
-        bytes_of_all = expected.tobytes()
-        starts = [column.offset + _ALIKE_BYTES for column in self.columns.values()]
-        # Copying the bytes of each channel and comparing these takes a third of the time that its numbers take.
-        return np.array_equal(self.log_times, stamps_ns) and all(
-            self._table[:, start : start + _TIMES.itemsize].tobytes() == bytes_of_all for start in starts
-        )
-
     def messages(self, channel: int) -> NDArray[np.uint8]:
         """View the CDR messages of one channel, shape ``(n_samples, size)``."""
         column = self.columns[channel]
@@ -176,55 +146,3 @@ class MessageTable(RowLayout):
     def _read(self, channel: int, topic: Topic) -> Rows:
         self.check_topic(channel, topic)
         return self.messages(channel).view(topic.layout.dtype)[:, 0]
-
-
-class MessageList:
-    """The records of a chunk with messages that begin with their std_msgs/Header, in order, without a copy.
-
-    Attributes:
-        headers: Fields of the records' headers, shape ``(n_messages,)``: ``channel``, ``sequence``, ``log_time`` and
-            ``publish_time`` [ns] among them.
-        offsets: Places of the records [bytes], shape ``(n_messages,)``.
-
-    Raises:
-        DatasetError: If the contents are anything but such records, at least one.
-    """
-
-    def __init__(self, contents: bytes | bytearray | memoryview) -> None:
-        # A message has to hold a stamp at least, as its place is read without another check.
-        shortest = MESSAGE_HEADER.size + _STAMP_OFFSET + STAMP.itemsize
-        records = _find_records(contents, shortest=shortest, wrong="not a message with a header")
-        offsets = [place.offset for _, place in records]
-        if not offsets:
-            raise DatasetError("chunk: holds no messages")
-        self._bytes = np.frombuffer(contents, np.uint8)
-        self.offsets = np.array(offsets)
-        self.headers: Rows = self._gather(0, _HEADERS)
-
-    def __len__(self) -> int:
-        return len(self.offsets)
-
-    @property
-    def channels(self) -> tuple[int, ...]:
-        """Numbers of the channels that have messages, in order."""
-        return tuple(np.unique(self.headers["channel"]).tolist())
-
-    @property
-    def stamps_ns(self) -> NDArray[np.int64]:
-        """Stamps in the messages' headers [ns], shape ``(n_messages,)``."""
-        return read_stamps(self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, STAMP), "stamp")
-
-    def message_index(self, channel: int) -> bytes:
-        """Encode the MCAP Message Index record of one channel."""
-        rows = self.headers["channel"] == channel
-        return encode_message_index(channel, self.headers["log_time"][rows], self.offsets[rows])
-
-    @property
-    def message_indexes(self) -> dict[int, bytes]:
-        """The Message Index records of all channels, by channel."""
-        return {channel: self.message_index(channel) for channel in self.channels}
-
-    def _gather(self, start: int, kind: np.dtype[np.void]) -> Rows:
-        """Copy a value of each record from byte `start` on."""
-        places = self.offsets[:, np.newaxis] + start + np.arange(kind.itemsize)
-        return self._bytes[places].view(kind)[:, 0]

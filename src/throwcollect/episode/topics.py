@@ -57,12 +57,6 @@ class Topic:
     layout: MessageLayout
     fill: Callable[[Rows, Recording], None]
 
-    @property
-    def stamps(self) -> list[str]:
-        """Paths of its stamps, for `read_stamps`; durations, such as ``time_from_start``, are none."""
-        names = self.layout.dtype.names or ()
-        return [name.removesuffix(".sec") for name in names if name.endswith(("stamp.sec", "clock.sec"))]
-
     def encode(self, recording: Recording) -> NDArray[np.uint8]:
         """Make the CDR messages of all samples, shape ``(n_samples, size)``."""
         template = np.frombuffer(self.layout.template, np.uint8)

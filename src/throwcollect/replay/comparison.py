@@ -26,10 +26,10 @@ class Comparison:
 
 def compare(stored: Episode, again: Episode) -> Comparison:
     """Compare two episodes of one trial."""
-    stored.check_records()
+    stored.chunk.check_records()
     differences: tuple[str, ...] = ()
     # This compares contents and not chunks, as the same messages may be compressed in different ways.
-    if (stored.state.contents, stored.header_json) != (again.state.contents, again.header_json):
+    if (stored.chunk.contents, stored.header_json) != (again.chunk.contents, again.header_json):
         differences = tuple(_find_differences(stored, again)) or ("other channels than joint states and ball differ",)
     return Comparison(stored.header.trial, stored.digest, again.digest, differences)
 

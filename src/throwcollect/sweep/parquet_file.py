@@ -3,51 +3,42 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from throwcollect.errors import DatasetError
-from throwcollect.files import open_regular, unreadable
+from throwcollect.files import open_regular, replacing, unreadable
 
 _DESCRIPTOR_PATH = "/proc/self/fd/{}"
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
+_ROWS_A_GROUP = 1 << 16
 _BUFFER_BYTES = 1 << 20
 """Number of bytes of a column that are read at once."""
 
 
 def encode_table(table: Any) -> bytes:
     """Encode an Arrow table as Parquet; equal tables give equal bytes."""
-    pieces: list[bytes] = []
-    encode_pieces(table, pieces.append)
-    return b"".join(pieces)
+    encoded = io.BytesIO()
+    _encode(table, encoded)
+    return encoded.getvalue()
 
 
-def encode_pieces(table: Any, put: Callable[[bytes], object]) -> None:
-    """Encode an Arrow table as `encode_table` does, and `put` its bytes piece by piece, in order.
+def write_table(path: Path, table: Any) -> None:
+    """Write the Parquet file of `encode_table`, without holding its bytes in memory."""
+    with replacing(path) as descriptor, open(descriptor, "wb", closefd=False) as file:
+        _encode(table, file)
 
-    Columns of the table that consist of one piece are not copied.
-    """
+
+def _encode(table: Any, file: BinaryIO) -> None:
     import pyarrow.parquet as pq
 
-    # The bytes must not depend on where a column was cut into pieces.
-    pq.write_table(table.combine_chunks(), _Sink(put), compression="zstd", write_page_checksum=True)
-
-
-class _Sink(io.RawIOBase):
-    """A file that Arrow writes to."""
-
-    def __init__(self, put: Callable[[bytes], object]) -> None:
-        self._put = put
-
-    def writable(self) -> bool:
-        return True
-
-    def write(self, data: Any, /) -> int:
-        self._put(data)
-        return len(data)
+    with pq.ParquetWriter(file, table.schema, compression="zstd", write_page_checksum=True) as writer:
+        for first in range(0, len(table) or 1, _ROWS_A_GROUP):
+            # The bytes must not depend on where a column was cut into pieces; groups are joined one at a time.
+            writer.write_table(table.slice(first, _ROWS_A_GROUP).combine_chunks())
 
 
 def read_parquet(path: Path, columns: Sequence[str] | None = None) -> Any:

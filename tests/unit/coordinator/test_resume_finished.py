@@ -78,7 +78,7 @@ def dataset(sound: Path, tmp_path: Path) -> Path:
 
 
 def contents(directory: Path) -> dict[str, bytes]:
-    others = ("README.md", "provenance.json")
+    others = ("README.md", "datapackage.json", "provenance.json")
     return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file() and path.name not in others}
 
 
@@ -116,7 +116,7 @@ def flip_latched(path: Path) -> None:
 
 def flip_index(path: Path) -> None:
     """Flip a bit in the message index of an episode, whose samples stay whole."""
-    flip(path, find_stored(path, 3).chunks[0].indexes[4].offset + 100)
+    flip(path, find_stored(path, 3).chunk.end + 100)
 
 
 def swap(path: Path) -> None:

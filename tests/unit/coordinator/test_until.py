@@ -13,6 +13,7 @@ from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Delivery
 from throwcollect.errors import LossError
 from throwcollect.sim.simulator import Simulator
@@ -85,6 +86,10 @@ def collect(
     return ran
 
 
+def raise_interrupt(*_: object, **__: object) -> None:
+    raise KeyboardInterrupt
+
+
 def files_of(directory: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in directory.iterdir() if path.suffix in (".mcap", ".parquet")}
 
@@ -130,6 +135,19 @@ def test_it_is_the_same_for_any_simulations_order_kills_and_losses(
             assert len(pq.read_table(tmp_path / "data" / "plan.parquet")) >= needed
         resume(CONFIG, tmp_path / "data", sweep_directory=Path())
     collect(tmp_path / "data", deliver, random=random, simulations=simulations)
+    assert files_of(tmp_path / "data") == files_of(undisturbed)
+
+
+def test_a_kill_after_the_plan_was_cut_loses_nothing(
+    deliver: Deliver, undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepare(CONFIG, tmp_path / "data", sweep_directory=Path())
+    with monkeypatch.context() as killed:
+        killed.setattr(DatasetWriter, "finish", raise_interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            collect(tmp_path / "data", deliver, random=Random(0))
+    assert (tmp_path / "data" / "plan.parquet").read_bytes() == (undisturbed / "plan.parquet").read_bytes()
+    assert not collect(tmp_path / "data", deliver, random=Random(0))
     assert files_of(tmp_path / "data") == files_of(undisturbed)
 
 

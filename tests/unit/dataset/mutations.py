@@ -27,7 +27,7 @@ from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text, read_named_manifest
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.scan import scan_whole
+from throwcollect.dataset.scan import scan_file
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import ThrowcollectError
 
@@ -98,7 +98,7 @@ def use(directory: Path) -> None:
     """Read every episode, as a user of the library does."""
     for episode in Dataset.open(directory).episodes():
         episode.samples()
-        episode.check_records()
+        episode.chunk.check_records()
 
 
 def outcomes(directory: Path, name: str) -> list[Callable[[], Any]]:
@@ -109,7 +109,7 @@ def outcomes(directory: Path, name: str) -> list[Callable[[], Any]]:
         lambda: (info(directory), digest(directory)),
         lambda: finish(directory),
     ]
-    return [lambda: list(scan_whole(directory / name)), *calls] if name.endswith(".mcap") else calls
+    return [lambda: list(scan_file(directory / name)), *calls] if name.endswith(".mcap") else calls
 
 
 def draw_mutations(source: random.Random) -> list[Mutation]:

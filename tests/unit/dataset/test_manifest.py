@@ -30,7 +30,7 @@ from throwcollect.derive.selection import filter_trials
 from throwcollect.errors import DatasetError
 
 MANIFEST = "datapackage.json"
-TABLES = ["config.yaml", "metadata.yaml", "plan.parquet", "throws.parquet"]
+BESIDE = ["README.md", "config.yaml", "metadata.yaml", "plan.parquet", "provenance.json", "throws.parquet"]
 SHARDS = [f"quick_{number:05d}.mcap" for number in range(3)]
 FLIPS_PER_CLASS = 100
 
@@ -94,7 +94,7 @@ def test_a_flipped_bit_in_the_footer_of_a_table_is_found_in_that_file(dataset: P
 
 def test_the_manifest_lists_the_promised_files_and_no_others(dataset: Path) -> None:
     entries = read_manifest(dataset)
-    assert [entry.path for entry in entries] == sorted([*TABLES, *SHARDS])
+    assert [entry.path for entry in entries] == sorted([*BESIDE, *SHARDS])
     assert list(entries) == [entry_of_file(dataset / entry.path) for entry in entries]
     document = json.loads((dataset / MANIFEST).read_text())
     assert document["profile"] == "data-package"

@@ -39,7 +39,7 @@ def abandon(writer: DatasetWriter) -> None:
 
 
 def files_of(directory: Path) -> dict[str, bytes]:
-    others = ("README.md", "provenance.json")
+    others = ("README.md", "datapackage.json", "provenance.json")
     return {p.name: p.read_bytes() for p in directory.iterdir() if p.is_file() and p.name not in others}
 
 

@@ -12,8 +12,8 @@ import pytest
 import zstandard
 
 from throwcollect.dataset.mcap_file import MAGIC
-from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.scan import FoundEpisode, scan_whole
+from throwcollect.dataset.mcap_reader import StoredEpisode, open_mcap
+from throwcollect.dataset.scan import scan_file
 from throwcollect.episode.chunk import Chunk
 from throwcollect.errors import DatasetError
 
@@ -26,14 +26,14 @@ def whole(collected: Path) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def runs(collected: Path) -> list[FoundEpisode]:
+def runs(collected: Path) -> list[StoredEpisode]:
     """The three episodes of an undamaged file."""
-    return list(scan_whole(collected / SHARD))
+    return list(scan_file(collected / SHARD))
 
 
 def find_in(path: Path, data: bytes) -> list[tuple[int, bool]]:
     path.write_bytes(data)
-    return [(found.stored.episode.header.trial, found.intact) for found in scan_whole(path)]
+    return [(found.episode.header.trial, found.run is not None) for found in scan_file(path)]
 
 
 @pytest.fixture
@@ -42,65 +42,65 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_a_scan_finds_all_episodes_of_a_sound_recording_at_their_offsets(
-    collected: Path, runs: list[FoundEpisode]
+    collected: Path, runs: list[StoredEpisode]
 ) -> None:
-    assert [(each.stored.episode.header.trial, each.intact) for each in runs] == [(3, True), (4, True), (5, True)]
-    assert [each.stored.offset for each in runs[1:]] == [each.stored.end for each in runs[:-1]]
+    assert [(each.episode.header.trial, each.run is not None) for each in runs] == [(3, True), (4, True), (5, True)]
+    assert [each.offset for each in runs[1:]] == [each.end for each in runs[:-1]]
     with open_mcap(collected / SHARD) as contents:
         for each in runs:
-            stored = contents.episode(contents.record(each.stored.offset))
-            assert (stored.chunks, stored.facts) == (each.stored.chunks, each.stored.facts)
+            stored = contents.episode(contents.record(each.offset))
+            assert (stored.chunk, stored.indexes, stored.facts) == (each.chunk, each.indexes, each.facts)
 
 
 @pytest.mark.parametrize("wrong", [0, 1, 2])
 def test_a_damaged_chunk_loses_only_its_own_episode(
-    path: Path, whole: bytes, runs: list[FoundEpisode], wrong: int
+    path: Path, whole: bytes, runs: list[StoredEpisode], wrong: int
 ) -> None:
     data = bytearray(whole)
-    data[runs[wrong].stored.offset + 3000] ^= 1
+    data[runs[wrong].offset + 3000] ^= 1
     assert find_in(path, bytes(data)) == [(trial, True) for trial in (3, 4, 5) if trial != 3 + wrong]
 
 
-def test_a_wrong_length_of_a_chunk_loses_only_its_episode(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
+def test_a_wrong_length_of_a_chunk_loses_only_its_episode(path: Path, whole: bytes, runs: list[StoredEpisode]) -> None:
     for length in (0, 1, 2**32 - 1, 2**63, 2**64 - 1):
         data = bytearray(whole)
-        struct.pack_into("<Q", data, runs[1].stored.offset + 1, length)
+        struct.pack_into("<Q", data, runs[1].offset + 1, length)
         assert find_in(path, bytes(data)) == [(3, True), (5, True)]
 
 
 def test_a_missing_or_inserted_stretch_hides_no_later_episode(
-    path: Path, whole: bytes, runs: list[FoundEpisode]
+    path: Path, whole: bytes, runs: list[StoredEpisode]
 ) -> None:
-    place = runs[1].stored.offset + 5000
+    place = runs[1].offset + 5000
     assert find_in(path, whole[:place] + whole[place + 512 :]) == [(3, True), (5, True)]
     assert find_in(path, whole[:place] + bytes(512) + whole[place:]) == [(3, True), (5, True)]
     # So many bytes are missing that the length of the chunk leads into the next one.
     assert find_in(path, whole[:place] + whole[place + 20_000 :]) == [(3, True), (5, True)]
     assert find_in(path, whole[len(MAGIC) + 1000 :]) == [(3, True), (4, True), (5, True)]
     # The end of an episode and the start of the next one are missing.
-    assert find_in(path, whole[: runs[1].stored.end - 50] + whole[runs[2].stored.offset + 50 :]) == [(3, True)]
+    assert find_in(path, whole[: runs[1].end - 50] + whole[runs[2].offset + 50 :]) == [(3, True)]
 
 
 def test_an_episode_with_damaged_indexes_is_found_but_not_intact(
-    path: Path, whole: bytes, runs: list[FoundEpisode]
+    path: Path, whole: bytes, runs: list[StoredEpisode]
 ) -> None:
-    indexes = runs[1].stored.chunks[0].indexes
-    for place in (indexes[3].offset, indexes[4].offset + 1, indexes[4].offset + 300):
+    begin = runs[1].chunk.end
+    for place in (begin, begin + 1, runs[1].facts.offset - 300):
         data = bytearray(whole)
         data[place] ^= 0x40
         assert find_in(path, bytes(data)) == [(3, True), (4, False), (5, True)]
 
 
-def test_an_episode_with_a_changed_header_is_not_found(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
-    facts = runs[1].stored.facts
+def test_an_episode_with_a_changed_header_is_not_found(path: Path, whole: bytes, runs: list[StoredEpisode]) -> None:
+    facts = runs[1].facts
     place = facts.offset + facts.data.index(b"landed")
     assert find_in(path, whole[:place] + b"rested" + whole[place + 6 :]) == [(3, True), (5, True)]
 
 
 def test_a_recording_cut_anywhere_has_the_episodes_before_the_cut(
-    path: Path, whole: bytes, runs: list[FoundEpisode]
+    path: Path, whole: bytes, runs: list[StoredEpisode]
 ) -> None:
-    ends = [run.stored.end for run in runs]
+    ends = [run.end for run in runs]
     cuts = {0, 3, *range(100, len(whole), 9973), *ends, *(end - 1 for end in ends)}
     for size in sorted(cuts):
         assert len(find_in(path, whole[:size])) == sum(end <= size for end in ends), size
@@ -111,13 +111,13 @@ def test_a_file_of_noise_has_no_episode(path: Path) -> None:
     assert find_in(path, b"") == []
 
 
-def test_a_chunk_that_announces_too_much_is_not_decompressed(path: Path, runs: list[FoundEpisode]) -> None:
+def test_a_chunk_that_announces_too_much_is_not_decompressed(path: Path, runs: list[StoredEpisode]) -> None:
     """Zeros compress so well that a small file could fill the memory."""
     zeros = zstandard.ZstdCompressor(level=1).compress(bytes(50_000_000))
     bomb = Chunk(zeros, 50_000_000, 0, 0, 0)
     with pytest.raises(DatasetError, match="bytes of data announce 50000000"):
         bomb.decompress()
-    assert find_in(path, bomb.record() + runs[0].stored.facts.data) == []
+    assert find_in(path, bomb.record() + runs[0].facts.data) == []
 
 
 def test_a_scan_of_nested_chunks_gives_up_after_64_times_the_file_size(
@@ -137,20 +137,20 @@ def test_a_scan_of_nested_chunks_gives_up_after_64_times_the_file_size(
 
 
 def test_an_episode_with_changed_samples_and_a_fitting_crc_is_not_found(
-    path: Path, whole: bytes, runs: list[FoundEpisode]
+    path: Path, whole: bytes, runs: list[StoredEpisode]
 ) -> None:
-    stored = runs[1].stored
+    stored = runs[1]
     contents = bytearray(stored.episode.chunk.decompress())
     contents[200] ^= 1
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(stored.episode.chunk, data=data, crc=zlib.crc32(contents)).record()
-    assert find_in(path, whole[: stored.offset] + chunk + whole[stored.chunks[0].record.end :]) == [
+    assert find_in(path, whole[: stored.offset] + chunk + whole[stored.chunk.end :]) == [
         (3, True),
         (5, True),
     ]
 
 
 def test_a_scan_of_a_directory_is_an_error_and_a_missing_file_has_no_episodes(tmp_path: Path) -> None:
-    assert not list(scan_whole(tmp_path / "missing.mcap"))
+    assert not list(scan_file(tmp_path / "missing.mcap"))
     with pytest.raises(DatasetError, match="cannot be read: not a file"):
-        list(scan_whole(tmp_path))
+        list(scan_file(tmp_path))

@@ -103,7 +103,7 @@ def test_rows_by_trial_finds_rows_across_pieces_of_the_table(monkeypatch: pytest
     table = pa.table({"trial": [4, None, 0, 2, 4], "outcome": ["a", "b", "c", "d", "e"]})
     rows = RowsByTrial(table)
     # If a trial has two rows, the later one counts.
-    expected = {4: "e", 0: "c", 2: "d"}
+    expected = {0: "c", 2: "d", 4: "e"}
     assert list(rows) == list(expected)
     for trial in (2, 4, 0, 0, 4, 2):
         assert rows[trial] == {"trial": trial, "outcome": expected[trial]}

@@ -17,10 +17,9 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Episode
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import ConfigError, DatasetError
 
-MAY_DIFFER = {"README.md", "provenance.json"}
+MAY_DIFFER = {"README.md", "datapackage.json", "provenance.json"}
 
 
 def files_of(directory: Path) -> dict[str, bytes]:
@@ -242,7 +241,7 @@ def test_the_writer_refuses_second_refused_and_unknown_episodes(collection: Any,
         with pytest.raises(DatasetError, match=f"no episode of trial {trial} is waited for"):
             writer.append_lost(trial, "gone")
     stranger = collection.episode(1)
-    stranger = Episode(replace(stranger.header, trial=99), stranger.state)
+    stranger = Episode(replace(stranger.header, trial=99), stranger.chunk)
     with pytest.raises(DatasetError, match="no episode of trial 99 is waited for"):
         writer.append(stranger, collection.result(collection.episode(1)))
     writer.close()
@@ -252,7 +251,7 @@ def test_the_writer_refuses_a_damaged_episode(collection: Any, tmp_path: Path) -
     writer = create_and_open(tmp_path / "dataset", collection.plan)
     whole = collection.episode(0)
     chunk = whole.chunk
-    damaged = Episode(whole.header, RecordedChunk(replace(chunk, crc=chunk.crc ^ 1), whole.state.records_sha256))
+    damaged = Episode(whole.header, replace(chunk, crc=chunk.crc ^ 1, indexes={}))
     with pytest.raises(DatasetError, match="CRC differs"):
         writer.append(damaged, collection.result(whole))
     assert not list((tmp_path / "dataset").glob("*.part"))

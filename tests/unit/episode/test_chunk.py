@@ -14,13 +14,12 @@ from mcap.records import Chunk as McapChunk
 from mcap.records import Message, MessageIndex
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID, Channels
+from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.topics import Recording
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
@@ -108,17 +107,17 @@ def test_samples_can_be_read_back_from_a_chunk(encoder: ChunkEncoder, make_sampl
 
 def test_equal_samples_give_equal_chunks(make_samples: Any) -> None:
     encoders = [ChunkEncoder(Channels(Config(), URDF), level=3) for _ in range(2)]
-    chunk = encoders[0].encode(make_samples(30))[0].chunk
-    assert chunk == encoders[1].encode(make_samples(30))[0].chunk
+    chunk = encoders[0].encode(make_samples(30))[0]
+    assert chunk == encoders[1].encode(make_samples(30))[0]
 
 
 def test_the_mcap_library_can_read_the_record_of_a_chunk(encoder: ChunkEncoder, make_samples: Any) -> None:
-    chunk = encoder.encode(make_samples(20))[0].chunk
+    chunk = encoder.encode(make_samples(20))[0]
     read = McapChunk.read(ReadDataStream(io.BytesIO(chunk.record()[9:])))
     assert (read.compression, read.data, read.uncompressed_size) == ("zstd", chunk.data, len(chunk.decompress()))
     assert (read.message_start_time, read.message_end_time) == (10**10, 10**10 + 19 * 4_000_000)
     assert read.uncompressed_crc == zlib.crc32(chunk.decompress())
-    assert Chunk.parse(chunk.record()) == chunk
+    assert Chunk.parse(chunk.record()) == replace(chunk, records_sha256="")
 
 
 def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_samples: Any) -> None:
@@ -135,7 +134,7 @@ def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_sampl
 def test_a_chunk_record_with_a_changed_or_missing_byte_is_refused(
     encoder: ChunkEncoder, make_samples: Any, at: int
 ) -> None:
-    record = bytearray(encoder.encode(make_samples(20))[0].chunk.record())
+    record = bytearray(encoder.encode(make_samples(20))[0].record())
     if at == -1:
         del record[-1]
     else:
@@ -145,7 +144,7 @@ def test_a_chunk_record_with_a_changed_or_missing_byte_is_refused(
 
 
 def test_a_chunk_whose_data_or_crc_is_wrong_is_not_decompressed(encoder: ChunkEncoder, make_samples: Any) -> None:
-    chunk = encoder.encode(make_samples(20))[0].chunk
+    chunk = encoder.encode(make_samples(20))[0]
     bomb = zstandard.ZstdCompressor().compress(bytes(50_000_000))
     for data, message in [
         (chunk.data[:-1], "cannot be decompressed"),
@@ -200,8 +199,8 @@ def test_samples_for_joints_other_than_the_recorded_ones_are_refused(
     encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any
 ) -> None:
 
-    def record(contents: bytes) -> RecordedChunk:
-        return RecordedChunk.of(contents, zstandard.compress(contents), start_ns=10**10, end_ns=10**10 + 49 * 4_000_000)
+    def record(contents: bytes) -> Chunk:
+        return Chunk.of(contents, zstandard.compress(contents), start_ns=10**10, end_ns=10**10 + 49 * 4_000_000)
 
     contents = encoder.encode(make_samples(50))[0].contents
     assert Episode(header, record(contents)).samples(TALOS.joints).position.shape == (50, 32)
@@ -212,32 +211,3 @@ def test_samples_for_joints_other_than_the_recorded_ones_are_refused(
         renamed.samples(TALOS.joints)
     with pytest.raises(DatasetError, match=r"joint states of 32 joints\n.*2"):
         renamed.samples(("shoulder_joint", "elbow_joint"))
-
-
-def test_a_changed_time_of_a_record_no_longer_fits_the_stamps(encoder: ChunkEncoder, make_samples: Any) -> None:
-    samples = make_samples(5)
-    contents = bytearray(encoder.encode(samples)[0].contents)
-    assert MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
-    contents[len(contents) // 5 + 11] ^= 1
-    assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
-
-
-@pytest.mark.parametrize("place", [11, 15, 23], ids=["sequence", "log time", "publish time"])
-@pytest.mark.parametrize("channel", [JOINT_STATES_ID, BALL_ODOMETRY_ID])
-def test_every_changed_part_of_a_record_header_no_longer_fits_the_stamps(
-    encoder: ChunkEncoder, make_samples: Any, place: int, channel: int
-) -> None:
-    samples = make_samples(5)
-    contents = bytearray(encoder.encode(samples)[0].contents)
-    contents[4 * len(contents) // 5 + MessageTable(contents, 5).columns[channel].offset + place] ^= 1
-    assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
-
-
-def test_a_negative_stamp_does_not_fit_a_record_time_with_the_same_bits(
-    encoder: ChunkEncoder, make_samples: Any
-) -> None:
-    contents = bytearray(encoder.encode(make_samples(1))[0].contents)
-    table = MessageTable(contents, 1)
-    for channel in table.columns:
-        table.headers(channel)["log_time"] = table.headers(channel)["publish_time"] = 2**64 - 1
-    assert not table.are_timed_by(np.array([-1]))

@@ -22,12 +22,10 @@ from throwcollect.episode.episode_message import (
     TrialRefusal,
     header_from_json,
     header_to_json,
-    make_episode,
     pack,
     unpack,
 )
 from throwcollect.episode.record import EpisodeHeader
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.run_key import Signer
@@ -50,8 +48,7 @@ def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Epi
 def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
     episode, result, conditions = unpack(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), SIGNER)
     assert (result, conditions) == (RESULT, CONDITIONS)
-    assert (episode.header, episode.chunk, episode.sensors) == (sent.header, sent.chunk, ())
-    assert episode.state.records_sha256 == sent.state.records_sha256
+    assert (episode.header, episode.chunk) == (sent.header, sent.chunk)
     assert episode.digest == sent.digest
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
@@ -59,14 +56,14 @@ def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> 
 def test_the_message_of_an_episode_is_a_standard_array_that_names_its_parts(sent: Episode) -> None:
     message = deserialize(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
     sizes = {part.label: part.size for part in message.layout.dim}
-    assert list(sizes) == ["header", "result", "conditions", "hashes", "chunk", "signature"]
+    assert list(sizes) == ["header", "result", "conditions", "hash", "chunk", "signature"]
     data, parts = message.data.tobytes(), {}
     for name, size in sizes.items():
         parts[name], data = data[:size], data[size:]
     assert header_from_json(parts["header"]) == sent.header
     assert parts["result"].decode() == RESULT
     assert parts["conditions"].decode() == CONDITIONS
-    assert parts["hashes"].hex() == sent.state.records_sha256
+    assert parts["hash"].hex() == sent.chunk.records_sha256
     assert parts["chunk"] == sent.chunk.record() + b"".join(sent.table.message_indexes.values())
     assert SIGNER.has_signed(parts.pop("signature").decode(), *parts.values())
 
@@ -74,7 +71,7 @@ def test_the_message_of_an_episode_is_a_standard_array_that_names_its_parts(sent
 def test_message_indexes_come_with_an_episode_so_that_its_chunk_is_not_decompressed(
     sent: Episode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from_contents = Episode(sent.header, replace(sent.state, indexes={})).message_indexes
+    from_contents = Episode(sent.header, replace(sent.chunk, indexes={})).message_indexes
     message = pack(Delivery(sent, RESULT, CONDITIONS), SIGNER)
     monkeypatch.setattr(Chunk, "decompress", Mock(side_effect=AssertionError))
     assert unpack(message, SIGNER).episode.message_indexes == from_contents
@@ -91,8 +88,8 @@ def test_message_indexes_come_with_an_episode_so_that_its_chunk_is_not_decompres
     ],
 )
 def test_an_episode_with_a_damaged_message_index_is_refused(sent: Episode, damage: Callable[[bytes], bytes]) -> None:
-    *_, last = sent.state.indexes
-    damaged = Episode(sent.header, replace(sent.state, indexes={last: damage(sent.state.indexes[last])}))
+    *_, last = sent.chunk.indexes
+    damaged = Episode(sent.header, replace(sent.chunk, indexes={last: damage(sent.chunk.indexes[last])}))
     with pytest.raises(DatasetError, match="a message index behind it cannot be read"):
         unpack(pack(Delivery(damaged, RESULT, CONDITIONS), SIGNER), SIGNER)
 
@@ -107,24 +104,18 @@ def test_the_digest_covers_header_and_records_but_not_their_compression(
     assert packed_more.chunk.data != sent.chunk.data
     assert packed_more.digest == sent.digest
     others = [
-        Episode(replace(header, end_reason="rest"), sent.state),
-        Episode(replace(header, contacts=header.contacts[:1]), sent.state),
-        Episode(replace(header, goals=()), sent.state),
+        Episode(replace(header, end_reason="rest"), sent.chunk),
+        Episode(replace(header, contacts=header.contacts[:1]), sent.chunk),
+        Episode(replace(header, goals=()), sent.chunk),
         Episode(header, encoder.encode(make_samples(50, seed=1))[0]),
     ]
     assert len({sent.digest, *(other.digest for other in others)}) == 5
 
 
 def test_a_hash_that_is_not_that_of_the_records_is_an_error(sent: Episode) -> None:
-    sent.check_records()
+    sent.chunk.check_records()
     with pytest.raises(DatasetError, match="SHA-256 of its records is"):
-        Episode(sent.header, RecordedChunk(sent.chunk, "0" * 64)).check_records()
-
-
-@pytest.mark.parametrize("sha256", ["", "0" * 63, "0" * 65, "G" * 64, "\xff" * 64, "A" * 64])
-def test_a_malformed_hash_is_refused(sent: Episode, sha256: str) -> None:
-    with pytest.raises(DatasetError, match="64 hexadecimal digits"):
-        make_episode(sent.header_json, [sha256], [sent.chunk])
+        Episode(sent.header, replace(sent.chunk, records_sha256="0" * 64)).chunk.check_records()
 
 
 def test_a_header_survives_json_unchanged(header: EpisodeHeader) -> None:
@@ -157,7 +148,7 @@ def test_a_header_with_a_wrong_or_missing_value_is_refused(header: EpisodeHeader
 
 
 def test_a_header_that_claims_more_samples_than_recorded_is_an_error(sent: Episode) -> None:
-    claim = Episode(replace(sent.header, samples=51), sent.state)
+    claim = Episode(replace(sent.header, samples=51), sent.chunk)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
         unpack(pack(Delivery(claim, "", ""), SIGNER), SIGNER).episode.samples()
 
@@ -215,8 +206,8 @@ def test_a_refusal_arrives_as_it_was_sent() -> None:
 
 def test_a_message_with_a_chunk_without_hash_is_refused(sent: Episode) -> None:
     message = pack(Delivery(sent, "", ""), SIGNER)
-    without = Episode(sent.header, RecordedChunk(sent.chunk, ""))
-    with pytest.raises(DatasetError, match="episode: 1 chunks"):
+    without = Episode(sent.header, replace(sent.chunk, records_sha256=""))
+    with pytest.raises(DatasetError, match="episode: a hash of 0 bytes"):
         unpack(pack(Delivery(without, "", ""), SIGNER), SIGNER)
     assert unpack(message, SIGNER).episode.digest == sent.digest
 

@@ -136,12 +136,12 @@ def test_fields_after_fields_of_every_kind_are_found() -> None:
 
 def test_a_layout_does_not_describe_messages_with_other_constant_bytes() -> None:
     layout = joint_states(TALOS.joints).layout
-    rows = np.tile(np.frombuffer(layout.template, np.uint8), (3, 1))
-    rows.view(layout.dtype)["position"] = 1.5
-    assert layout.describes(rows)
-    rows[2, layout.template.index(b"arm_left_1_joint")] ^= 1
-    assert not layout.describes(rows)
-    assert not layout.describes(rows[:, :-1])
+    message = bytearray(layout.template)
+    np.frombuffer(message, layout.dtype)["position"] = 1.5
+    assert layout.describes_message(message)
+    message[layout.template.index(b"arm_left_1_joint")] ^= 1
+    assert not layout.describes_message(message)
+    assert not layout.describes_message(message[:-1])
 
 
 @pytest.mark.parametrize(

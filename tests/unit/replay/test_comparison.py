@@ -10,7 +10,6 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
 from throwcollect.replay.comparison import compare
 from throwcollect.robots.description import full_description
@@ -59,6 +58,6 @@ def test_different_contacts_and_fewer_samples_are_reported() -> None:
 
 def test_comparing_a_damaged_episode_is_an_error() -> None:
     whole = episode()
-    damaged = Episode(HEADER, RecordedChunk(whole.chunk, "0" * 64))
+    damaged = Episode(HEADER, replace(whole.chunk, records_sha256="0" * 64))
     with pytest.raises(DatasetError, match="SHA-256 of its records is"):
         compare(damaged, whole)

@@ -50,7 +50,7 @@ def test_a_trial_has_the_result_that_judging_its_episode_gives(engine: str) -> N
     trial = with_values(config, VALUES)
     task = task_of(config)
     assert task.columns.from_json(task.outcomes, delivery.result) == judge_episode(trial, delivery.episode)
-    delivery.episode.check_records()
+    delivery.episode.chunk.check_records()
     conditions = conditions_from_json(delivery.conditions)
     assert conditions.values == {"ball.mass_kg": 0.05}
     assert conditions.trajectory == task_of(trial).trajectory().digest

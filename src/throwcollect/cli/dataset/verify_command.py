@@ -1,66 +1,67 @@
-"""`throwcollect dataset verify`: checks that a dataset is whole, and that its throws are physically possible."""
+"""`throwcollect dataset verify`: checks that a dataset is whole, and that its throws come out again."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.printing import print_result
 from throwcollect.errors import DatasetError
-from throwcollect.extras import MissingExtraError, install_command, require, require_engine
+from throwcollect.extras import MissingExtraError, install_command
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
 
-if TYPE_CHECKING:
-    from throwcollect.dataset.reader import Dataset
-
-_SUGGESTED = 100
-"""Number of throws that the message suggests for a replay."""
+_SAMPLE = 10
+"""Number of throws that are simulated again without `--replay`: they take about two seconds, most of them the start."""
 
 
 def verify_dataset(
     directory: DatasetArgument,
     replay: Annotated[
-        int | None,
-        typer.Option("--replay", metavar="N", min=1, help="Also simulate N throws again, chosen by the seed."),
-    ] = None,
+        bool, typer.Option("--replay", help=f"Simulate all throws again, and not a sample of {_SAMPLE}.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
-    """Check a dataset against itself and against physics; exit code 4 if anything is wrong."""
+    """Check a dataset against its manifest, itself and a replay; exit code 4 if anything is wrong."""
     from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.verification import verify_dataset as verify
 
-    findings = verify(directory, replay=replay, processes=count_cores())
+    count, missing = _count_replayed(directory, replay=replay)
+    findings = verify(directory, replay=count or None, processes=count_cores())
     if findings:
         print_result([asdict(finding) for finding in findings], "\n".join(map(str, findings)), json=json)
         raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")
     dataset = Dataset.open(directory)
-    print_result([], f"{directory}: nothing wrong\n{_describe_unchecked(dataset, replay)}", json=json)
+    text = f"replayed: {count} of {format_count(len(dataset.recorded), 'throw')}, the same bit for bit"
+    if missing is not None:
+        text = f"replayed: 0 of {format_count(len(dataset.recorded), 'throw')} ({missing.message})"
+    elif count < len(dataset.recorded):
+        text += f" (all: {command('dataset', 'verify', directory, '--replay')})"
+    print_result([], f"{directory}: nothing wrong\n{text}", json=json)
     if left_out := find_unchecked(dataset.config):
         typer.echo(f"not checked without the extra collect: {', '.join(left_out)}", err=json)
         typer.echo(f"  try: {install_command('collect')}", err=json)
 
 
-def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
-    """Say what was not checked in a dataset in which nothing is wrong, and which command checks it or what it needs."""
-    from throwcollect.dataset.verify_plan import CHECKED_AGAIN
-    from throwcollect.robots.description import is_available
+def _count_replayed(directory: Path, *, replay: bool) -> tuple[int, MissingExtraError | None]:
+    """Find how many throws to simulate again: all or a sample, and none where an extra is missing for that."""
+    from throwcollect.dataset.reader import Dataset
+    from throwcollect.replay.audit import require_simulating
 
-    if replay is not None:
-        text = f"replayed: {format_count(min(replay, len(dataset.recorded)), 'throw')}, the same bit for bit"
-    else:
-        text = "not checked: whether the simulation gives the same throws again"
+    # If the dataset cannot be opened, the check reports why.
+    with suppress(DatasetError):
+        dataset = Dataset.open(directory)
         try:
-            require("pinocchio")
-            require_engine(dataset.config.sim.engine)
-            text += f" ({command('dataset', 'verify', dataset.directory, '--replay', _SUGGESTED)})"
+            require_simulating(dataset.config.sim.engine)
         except MissingExtraError as error:
-            text += f" ({error.message})"
-    run = len(dataset.plan.trials) - len(dataset.plan.trials.refused)
-    if run > CHECKED_AGAIN and is_available(dataset.config):
-        text += f"; whether the robot can do them was checked for {CHECKED_AGAIN} of {run} trials"
-    return text
+            if replay:
+                raise
+            return 0, error
+        return len(dataset.recorded) if replay else min(_SAMPLE, len(dataset.recorded)), None
+    return 0, None
