@@ -185,7 +185,7 @@ class Simulator:
         with self._lock:
             # Another thread may have closed it since the throw was asked for.
             self._require_open()
-            episode = self._simulator.run(trial).episode
+            episode = self._simulator.run(trial)
         keys = tuple(trial.values)
         table = ThrowsTable(keys, self.config, tuple(trial.target))
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)

@@ -67,4 +67,4 @@ def test_the_flight_of_a_simulated_throw_is_ballistic(name: str, tmp_path: Path)
     assert run
     for trial in run:
         planned = plan.trials[trial]
-        assert list(find_flight_problems(simulator.run(planned).episode, plan.config_of(planned))) == [], trial
+        assert list(find_flight_problems(simulator.run(planned), plan.config_of(planned))) == [], trial

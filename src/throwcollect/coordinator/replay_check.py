@@ -100,8 +100,8 @@ def _begin(directory: Path) -> Callable[[int], Row]:
     simulator = Simulator(plan.config)
 
     def simulate(trial: int) -> Row:
-        delivery = simulator.run(plan.trial(trial))
-        return {"digest": delivery.episode.digest, **json.loads(delivery.result)}
+        episode = simulator.run(plan.trial(trial))
+        return {"digest": episode.digest, **json.loads(episode.result)}
 
     return simulate
 

@@ -60,7 +60,7 @@ def _begin(directory: Path) -> Callable[[int], Comparison]:
         """Simulate a trial, and compare it with the stored one."""
         # A merged dataset has numbers of its own, and episodes those of their own plans.
         trial = replace(dataset.plan.trial(number), number=number - dataset.plan.first_of_part(number))
-        again = simulator.run(trial).episode
+        again = simulator.run(trial)
         with locating_damage(dataset, number):
             return replace(compare(dataset.episode(number), again), trial=number)
 

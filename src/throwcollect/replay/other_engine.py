@@ -90,7 +90,7 @@ def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
     def simulate(number: int) -> Deviation:
         """Simulate a trial, and compare its row with the stored one."""
         trial = plan.trial(number)
-        result = judge_episode(with_values(config, trial.values), simulator.run(trial).episode)
+        result = judge_episode(with_values(config, trial.values), simulator.run(trial))
         stored, again = dataset.select([number])[0].row, table.row(trial, result, None)
         # Columns of text, and numbers that only one of the two rows has, cannot be compared.
         compared = [

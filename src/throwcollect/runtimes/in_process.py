@@ -99,11 +99,11 @@ class InProcess:
                 collection.drain()
             if leased := collection.lease(_SIMULATION):
                 try:
-                    delivery = simulator.run(collection.writer.plan.trial(leased[0]))
+                    episode = simulator.run(collection.writer.plan.trial(leased[0]))
                 except ThrowcollectError as error:
                     collection.refuse(_SIMULATION, leased[0], str(error))
                 else:
-                    collection.take_in(_SIMULATION, delivery)
+                    collection.take_in(_SIMULATION, episode)
             else:
                 collection.check_next()
             if collection.backlog:

@@ -16,7 +16,7 @@ from throwcollect.config.values import with_values
 from throwcollect.control import GoalResult, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk_encoder import ChunkEncoder
-from throwcollect.episode.episode_message import Delivery, Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples, find_infinite_columns
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
@@ -82,14 +82,14 @@ class Simulator:
         """Simulated time [ns]."""
         return self.world.stamp_ns
 
-    def run(self, trial: Trial) -> Delivery:
-        """Simulate a trial, which need not be in a plan; return its episode, its result and its conditions."""
+    def run(self, trial: Trial) -> Episode:
+        """Simulate a trial, which need not be in a plan; return its episode, with its result and conditions."""
         self.begin(trial.number, trial.values)
         steps = round(STRETCH_S * self.config.sim.physics_hz)
-        while (delivery := self.hand_over()) is None:
+        while (episode := self.hand_over()) is None:
             self.step(steps)
         self.pop_results()
-        return delivery
+        return episode
 
     def begin(self, number: int, values: Mapping[str, float]) -> None:
         """Begin a trial: controllers are as they are configured, and get the goals that follow from the trial.
@@ -166,7 +166,7 @@ class Simulator:
                 break
         return steps - remaining
 
-    def hand_over(self) -> Delivery | None:
+    def hand_over(self) -> Episode | None:
         """Return the episode of a trial that has ended, only once; None if there is none.
 
         The episode is judged if `begin` began the trial.
@@ -187,7 +187,7 @@ class Simulator:
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
         result = self._judge(config, motion, table.samples, header) if motion else ""
-        return Delivery(Episode(header, state), result, conditions.to_json())
+        return Episode(header, state, result=result, conditions=conditions.to_json())
 
     def take_recording(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:
         """Return what was recorded of a trial that has ended, only once; None while there is no such recording."""

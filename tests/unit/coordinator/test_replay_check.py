@@ -38,11 +38,11 @@ def rows() -> dict[int, Row]:
     simulator = Simulator(PLAN.config)
     found = {}
     for trial in PLAN.trials:
-        delivery = simulator.run(trial)
+        episode = simulator.run(trial)
         found[trial.number] = {
             "trial": trial.number,
-            "digest": delivery.episode.digest,
-            **json.loads(delivery.result),
+            "digest": episode.digest,
+            **json.loads(episode.result),
             **trial.values,
         }
     simulator.close()

@@ -14,7 +14,7 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.episode_message import Delivery
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import LossError
 from throwcollect.sim.simulator import Simulator
 
@@ -36,16 +36,16 @@ CONFIG = Config.model_validate(
         "run": {"retries": 0, "replay": 0},
     }
 )
-Deliver = Callable[[int], Delivery]
+Deliver = Callable[[int], Episode]
 
 
 @pytest.fixture(scope="module")
 def deliver(tmp_path_factory: pytest.TempPathFactory) -> Deliver:
     plan = prepare(CONFIG, tmp_path_factory.mktemp("plan") / "data", sweep_directory=Path())
     simulator = Simulator(CONFIG)
-    made: dict[int, Delivery] = {}
+    made: dict[int, Episode] = {}
 
-    def deliver(trial: int) -> Delivery:
+    def deliver(trial: int) -> Episode:
         if trial not in made:
             made[trial] = simulator.run(plan.trial(trial))
         return made[trial]

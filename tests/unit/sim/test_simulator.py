@@ -12,7 +12,7 @@ from throwcollect.control import ErrorCode, TrajectoryRefusal
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.engine import Observer, Steps
-from throwcollect.episode.episode_message import Delivery
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import TrialSetup
@@ -32,11 +32,11 @@ def simulator() -> Iterator[Simulator]:
     simulator.close()
 
 
-def finish(simulator: Simulator) -> Delivery:
-    while (delivery := simulator.hand_over()) is None:
+def finish(simulator: Simulator) -> Episode:
+    while (episode := simulator.hand_over()) is None:
         simulator.step(500)
     assert simulator.hand_over() is None
-    return delivery
+    return episode
 
 
 @pytest.mark.parametrize("engine", ["ballistic", "bullet"])
@@ -45,13 +45,13 @@ def test_a_trial_has_the_result_that_judging_its_episode_gives(engine: str) -> N
     simulator = Simulator(config)
     simulator.begin(3, VALUES)
     assert simulator.trial.leased
-    delivery = finish(simulator)
+    episode = finish(simulator)
     assert not simulator.trial.leased
     trial = with_values(config, VALUES)
     task = task_of(config)
-    assert task.columns.from_json(task.outcomes, delivery.result) == judge_episode(trial, delivery.episode)
-    delivery.episode.chunk.check_records()
-    conditions = conditions_from_json(delivery.conditions)
+    assert task.columns.from_json(task.outcomes, episode.result) == judge_episode(trial, episode)
+    episode.chunk.check_records()
+    conditions = conditions_from_json(episode.conditions)
     assert conditions.values == {"ball.mass_kg": 0.05}
     assert conditions.trajectory == task_of(trial).trajectory().digest
     simulator.close()
@@ -99,10 +99,10 @@ def test_a_setup_during_a_trial_is_only_for_the_next_one(simulator: Simulator) -
     simulator.step(100)
     simulator.trial.setup = TrialSetup(4, (), with_values(CONFIG, {"ball.mass_kg": 0.06}))
     simulator.step(100_000)
-    delivery = simulator.hand_over()
-    assert delivery is not None
-    assert delivery.episode.header.trial == 3
-    assert conditions_from_json(delivery.conditions).values == {"ball.mass_kg": 0.05}
+    episode = simulator.hand_over()
+    assert episode is not None
+    assert episode.header.trial == 3
+    assert conditions_from_json(episode.conditions).values == {"ball.mass_kg": 0.05}
 
 
 def test_after_a_leased_trial_the_setup_is_the_configuration_again(simulator: Simulator) -> None:
@@ -134,7 +134,7 @@ def test_a_trial_in_which_the_engine_fails_is_an_error_and_the_next_one_begins(
     foreign.drop()
     assert foreign.hand_over() is None
     foreign.begin(1, {})
-    assert finish(foreign).episode.header.trial == 1
+    assert finish(foreign).header.trial == 1
 
 
 def test_a_sample_of_a_wrong_step_is_an_error_of_the_engine(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from throwcollect.episode.episode_message import Delivery, TrialRefusal
+from throwcollect.episode.episode_message import Episode, TrialRefusal
 from throwcollect.errors import ThrowcollectError
 from throwcollect.sim.live import LiveSimulator
 from throwcollect.trial.lease import Lease
@@ -60,19 +60,19 @@ class LeaseQueue:
         self._simulator.drop()
         return self._refuse(lease, error)
 
-    def hand_over(self) -> Delivery | TrialRefusal | None:
+    def hand_over(self) -> Episode | TrialRefusal | None:
         """Return the episode of the trial that has just ended, or its refusal; None if no trial has ended."""
         try:
-            delivery = self._simulator.hand_over()
+            episode = self._simulator.hand_over()
         except ThrowcollectError as error:
             # Only episodes of leased trials are judged, so only they can be refused.
             lease, self._running = self._running, None
             return self._refuse(lease, error) if lease else None
         # The episode of a trial that a client has set up by hand belongs to no lease.
-        if delivery is not None and self._running is not None:
+        if episode is not None and self._running is not None:
             self._done.append(self._running.token)
             self._running = None
-        return delivery
+        return episode
 
     def _refuse(self, lease: Lease, error: ThrowcollectError) -> TrialRefusal:
         self._done.append(lease.token)
