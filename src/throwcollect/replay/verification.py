@@ -28,8 +28,7 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: 
     Args:
         directory: Its directory.
         replay: How many throws to simulate again; None for 10 if that can give the same bits here (`count_replayed`).
-        processes: How many processes may check the recordings of a large dataset; if there are several, each imports
-            the main program, as processes of `multiprocessing` do.
+        processes: How many processes may check the recordings of a large dataset.
 
     Returns:
         The problems, file by file; empty if there are none.
