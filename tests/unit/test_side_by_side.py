@@ -143,6 +143,19 @@ def test_processes_import_no_module_from_the_working_directory(tmp_path: Path) -
         assert (done.stdout, done.stderr) == ("0 1 2 2\n", "")
 
 
+def test_processes_do_not_import_the_program(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import work_side_by_side as work\n"
+        "from throwcollect.side_by_side import work_side_by_side\n"
+        "print(*[each for each, _ in work_side_by_side(range(4), work.begin, (3,), processes=2, doing='counts')])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, program], capture_output=True, text=True, env=find_tests(), timeout=60, check=False
+    )
+    assert (done.stdout, done.stderr) == ("0 3 6 9\n", "")
+
+
 def test_a_process_that_was_forked_off_and_is_killed_is_named() -> None:
     done = subprocess.run(
         [sys.executable, "-c", DEAD], capture_output=True, text=True, env=find_tests(), timeout=60, check=False

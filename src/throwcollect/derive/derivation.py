@@ -114,9 +114,9 @@ def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
     provenance = Provenance.of_this_machine(
         simulations=None, wall_s=time.monotonic() - began, was_open=False, robot=channels.robot
     )
-    write_provenance(directory, provenance)
     write_file(directory / SOURCES, encode_table(_tabulate_sources(copies, sources)))
     write_file(directory / CARD, (data_card(plan.config, throws, provenance) + _describe_sources(sources)).encode())
+    write_provenance(directory, provenance)
     write_description(directory, plan.config.name, throws, channels, recordings)
     return len(copies), Dataset.open(directory).digest
 

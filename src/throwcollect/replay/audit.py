@@ -51,16 +51,16 @@ def require_simulating(engine: str) -> None:
 def _begin(directory: Path) -> Callable[[int], Comparison]:
     """Open dataset and simulation in a process, which keeps both from one trial to the next."""
     # This import needs the extra `collect`, but datasets can be verified without it.
-    from throwcollect.replay.replayer import Replayer
+    from throwcollect.sim.simulator import Simulator
 
     dataset = Dataset.open(directory)
-    replayer = Replayer(dataset.config)
+    simulator = Simulator(dataset.config)
 
     def replay(number: int) -> Comparison:
         """Simulate a trial, and compare it with the stored one."""
         # A merged dataset has numbers of its own, and episodes those of their own plans.
         trial = replace(dataset.plan.trial(number), number=number - dataset.plan.first_of_part(number))
-        again = replayer.run(trial)
+        again = simulator.run(trial)
         with locating_damage(dataset, number):
             return replace(compare(dataset.episode(number), again), trial=number)
 

@@ -14,9 +14,9 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.episode_message import Delivery
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import LossError
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 
 LANDED = 12
 CONFIG = Config.model_validate(
@@ -36,18 +36,18 @@ CONFIG = Config.model_validate(
         "run": {"retries": 0, "replay": 0},
     }
 )
-Deliver = Callable[[int], Delivery]
+Deliver = Callable[[int], Episode]
 
 
 @pytest.fixture(scope="module")
 def deliver(tmp_path_factory: pytest.TempPathFactory) -> Deliver:
     plan = prepare(CONFIG, tmp_path_factory.mktemp("plan") / "data", sweep_directory=Path())
-    replayer = Replayer(CONFIG)
-    made: dict[int, Delivery] = {}
+    simulator = Simulator(CONFIG)
+    made: dict[int, Episode] = {}
 
-    def deliver(trial: int) -> Delivery:
+    def deliver(trial: int) -> Episode:
         if trial not in made:
-            made[trial] = replayer.delivery(plan.trial(trial))
+            made[trial] = simulator.run(plan.trial(trial))
         return made[trial]
 
     return deliver
