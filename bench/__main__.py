@@ -18,7 +18,7 @@ from typing import Any
 from bench import collection, containers, intake, raw, reading, soak
 from bench.other_version import OtherVersion
 from throwcollect.config.loader import load
-from throwcollect.engine_packages import PACKAGES
+from throwcollect.extras import ENGINE_PACKAGES
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
 RESULT = Path("build/bench.json")
@@ -37,7 +37,7 @@ def main() -> None:
     overrides = {
         engine: [f"trials={arguments.trials}", f"sim.engine={engine}"]
         for engine in _ENGINES
-        if find_spec(PACKAGES[engine].module) is not None
+        if find_spec(ENGINE_PACKAGES[engine].module) is not None
     }
     report: dict[str, Any] = {"cores": cores, **vars(arguments)}
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:

@@ -18,7 +18,7 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.episode_message import Delivery, pack, unpack
+from throwcollect.episode.episode_message import Episode, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
@@ -49,7 +49,8 @@ def measure(directory: Path) -> tuple[float, float]:
             values=settings.find_replaced(config),
             trajectory=task_of(config).trajectory().digest,
         )
-        messages.append(pack(Delivery(episode, result, conditions.to_json()), _SIGNER))
+        judged = Episode(episode.header, episode.chunk, result=result, conditions=conditions.to_json())
+        messages.append(pack(judged, _SIGNER))
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
         taken_in = _take_in(messages, dataset.plan, acceptance, Path(scratch) / "data")
@@ -63,19 +64,19 @@ def _take_in(messages: list[bytes], plan: Plan, acceptance: Acceptance, director
     columns = task.columns
     began = time.perf_counter()
     for message in messages:
-        delivery = unpack(message, _SIGNER)
-        assert isinstance(delivery, Delivery)
-        trial = plan.trial(delivery.episode.header.trial)
-        if acceptance.find_difference(delivery.conditions, plan, trial):
+        episode = unpack(message, _SIGNER)
+        assert isinstance(episode, Episode)
+        trial = plan.trial(episode.header.trial)
+        if acceptance.find_difference(episode.conditions, plan, trial):
             raise ValueError(f"trial {trial.number} is refused")
-        writer.append(delivery.episode, columns.from_json(task.outcomes, delivery.result))
+        writer.append(episode, columns.from_json(task.outcomes, episode.result))
     seconds = time.perf_counter() - began
     writer.close()
     return len(messages) / seconds
 
 
 def _raw(messages: list[bytes], path: Path) -> float:
-    chunks = [unpack(message, _SIGNER).episode.chunk for message in messages]  # type: ignore[union-attr]
+    chunks = [unpack(message, _SIGNER).chunk for message in messages]  # type: ignore[union-attr]
     began = time.perf_counter()
     with path.open("wb", buffering=0) as file:
         for message, chunk in zip(messages, chunks, strict=True):

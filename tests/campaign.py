@@ -26,11 +26,10 @@ from pathlib import Path
 import psutil
 
 from tests.e2e.collection import Running, collect_here, fingerprints, launch, start, words_of, write_config
-from throwcollect.config.loader import load
-from throwcollect.dataset.manifest import find_manifest_problems, list_promised_names
-from throwcollect.dataset.verify import verify
+from throwcollect.dataset.manifest import list_promised_names
+from throwcollect.dataset.verify import find_damage, verify
 
-MANIFEST = "datapackage.json"
+MANIFEST, CARD, PROVENANCE = "datapackage.json", "README.md", "provenance.json"
 TRIALS = 40
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGSTOP)
 _WHOLE_VERIFY_EVERY = 100
@@ -54,8 +53,7 @@ class Count:
 def flips(directory: Path, count: int, source: random.Random) -> Count:
     """Flip single bits of a dataset, one at a time; the dataset is as it was when this returns."""
     result = Count()
-    collection = load(directory / "config.yaml").name
-    names = [*list_promised_names(directory), MANIFEST]
+    names = [*list_promised_names(directory), MANIFEST, CARD, PROVENANCE]
     for number in range(count):
         # All files alike, however large they are.
         path = directory / source.choice(names)
@@ -64,7 +62,7 @@ def flips(directory: Path, count: int, source: random.Random) -> Count:
         damaged = bytearray(whole)
         damaged[place] ^= 1 << bit
         path.write_bytes(damaged)
-        seen = bool(list(find_manifest_problems(directory, collection)))
+        seen = bool(list(find_damage(directory, in_full=True)))
         if number % _WHOLE_VERIFY_EVERY == 0:
             seen = seen and bool(verify(directory))
         path.write_bytes(whole)

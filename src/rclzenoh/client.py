@@ -80,11 +80,6 @@ class Client(Receiver):
         """Send a request; the future of the response stays pending if nobody answers.
 
         The result of the future is what ``convert`` makes of the response, by default the response itself.
-
-        Raises:
-            TypeError: If the request is not of the service's type.
-            ValueError: If a field does not fit its type.
-            InvalidHandle: If the client was destroyed or the session closed.
         """
         if not isinstance(request, self.srv_type.Request):
             raise TypeError(f"{self.service_name}: expected {self.srv_type.TYPE}.Request, got {type(request).__name__}")
@@ -102,11 +97,7 @@ class Client(Receiver):
         return future
 
     def _send(self, querier: Any, sequence: int, payload: bytes) -> None:
-        """Send a request.
-
-        Raises:
-            InvalidHandle: If the session was closed.
-        """
+        """Send a request."""
         # Zenoh drops the handler after the last reply, which puts the number into the queue after all replies.
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
         attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
@@ -117,11 +108,7 @@ class Client(Receiver):
             raise self._endpoint.invalid(error) from error
 
     def _send_waiting(self) -> None:
-        """Send the requests that wait, in their order, as far as the service keeps them.
-
-        Raises:
-            InvalidHandle: If the session was closed.
-        """
+        """Send the requests that wait, in their order, as far as the service keeps them."""
         while True:
             with self._lock:
                 if not self._unsent:
@@ -162,8 +149,7 @@ class Client(Receiver):
             return
         future, convert = self._pending.pop(attachment.sequence)
         future.call_back_through(self.mailbox)
-        if not future.cancelled():
-            future.set_result(convert(response))
+        future.set_result(convert(response))
 
     def destroy(self) -> None:
         """Withdraw the client; pending futures stay pending. See `Node.destroy_client`."""

@@ -49,11 +49,6 @@ class Context:
             args: Not used: rclpy has this argument, but names cannot be remapped here.
             domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
             config: Configuration of the session; None makes it from the environment.
-
-        Raises:
-            RuntimeError: If the context is in use already.
-            ConfigurationError: If an environment variable has a wrong value.
-            NoRouterError: If there is no router.
         """
         del args
         if self._session is not None:
@@ -75,20 +70,12 @@ class Context:
 
     @property
     def session(self) -> zenoh.Session:
-        """The session.
-
-        Raises:
-            NotInitializedException: If there is none.
-        """
+        """The session."""
         return _require_initialized(self._session)
 
     @property
     def graph(self) -> Graph:
-        """The ROS graph.
-
-        Raises:
-            NotInitializedException: If there is no session.
-        """
+        """The ROS graph."""
         return _require_initialized(self._graph)
 
     def get_domain_id(self) -> int:
@@ -112,11 +99,7 @@ class Context:
                 callback()
 
     def shutdown(self) -> None:
-        """End all spinning and close the session.
-
-        Raises:
-            RuntimeError: If the context was never initialised.
-        """
+        """End all spinning and close the session."""
         if self._session is None:
             raise RuntimeError("the context has not been initialised, or was shut down already")
         self.try_shutdown()
@@ -139,9 +122,6 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
     """Open a session with a router, which may just be starting; the caller has to close it.
 
     Zenoh itself waits for a router only if the configuration has ``connect/timeout_ms``, which it lacks by default.
-
-    Raises:
-        NoRouterError: If there is no router within some seconds.
     """
     zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
     begin = time.monotonic()
@@ -179,13 +159,7 @@ def get_default_context() -> Context:
 
 
 def init(*, context: Context | None = None, domain_id: int | None = None, config: zenoh.Config | None = None) -> None:
-    """Initialise a context as `Context.init` does; for the default one, a SIGTERM ends all spinning from now on.
-
-    Raises:
-        RuntimeError: If the context is in use already.
-        ConfigurationError: If an environment variable has a wrong value.
-        NoRouterError: If there is no router.
-    """
+    """Initialise a context as `Context.init` does; for the default one, a SIGTERM ends all spinning from now on."""
     (context or get_default_context()).init(domain_id=domain_id, config=config)
     # Python allows setting handlers of signals only in the main thread. A handler that the program has set stays.
     in_main_thread = threading.current_thread() is threading.main_thread()
@@ -194,11 +168,7 @@ def init(*, context: Context | None = None, domain_id: int | None = None, config
 
 
 def shutdown(*, context: Context | None = None) -> None:
-    """Shut a context down, the default one if none is given, and stop handling SIGTERM.
-
-    Raises:
-        RuntimeError: If it was never initialised.
-    """
+    """Shut a context down, the default one if none is given, and stop handling SIGTERM."""
     (context or get_default_context()).shutdown()
     if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is _on_sigterm:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -9,12 +9,11 @@ from queue import Empty
 from typing import Any
 
 from rclzenoh.context import Context, get_default_context
-from rclzenoh.duration import S_TO_NS, deadline_after
 from rclzenoh.exceptions import ExternalShutdownException
 from rclzenoh.mailbox import Mailbox
 from rclzenoh.node_base import NodeBase
 from rclzenoh.task import Future, Task, call, submit
-from rclzenoh.timer import Timer
+from rclzenoh.time import S_TO_NS, Timer, deadline_after
 
 _FOREVER = float("inf")
 _LONGEST_WAIT_S = 0.5
@@ -69,33 +68,21 @@ class Executor:
         self.wake()
 
     def spin(self) -> None:
-        """Call callbacks until the executor is shut down.
-
-        Raises:
-            ExternalShutdownException: If the context is shut down meanwhile.
-        """
+        """Call callbacks until the executor is shut down."""
         while self.context.ok() and not self._is_shutdown:
             self.spin_once()
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Call callbacks until a future is done or cancelled, ``timeout_sec`` at most; None or negative is no limit.
-
-        Raises:
-            ExternalShutdownException: If the context is shut down meanwhile.
-        """
+        """Call callbacks until a future is done, ``timeout_sec`` at most; None or negative is no limit."""
         future.add_done_callback(lambda _: self.wake())
         deadline = deadline_after(timeout_sec)
-        while self.context.ok() and not (future.done() or future.cancelled() or self._is_shutdown):
+        while self.context.ok() and not (future.done() or self._is_shutdown):
             self._spin_once(deadline, future)
             if time.monotonic() >= deadline:
                 return
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Call one callback, waiting for it if need be, ``timeout_sec`` at most; None or negative is no limit.
-
-        Raises:
-            ExternalShutdownException: If the context is not usable.
-        """
+        """Call one callback, waiting for it if need be, ``timeout_sec`` at most; None or negative is no limit."""
         self._spin_once(deadline_after(timeout_sec), None)
 
     def _spin_once(self, deadline: float, until: Future | None) -> None:
@@ -113,7 +100,7 @@ class Executor:
             self._timer_was_last = False
             if not queued:
                 left = deadline - time.monotonic()
-                if left <= 0 or self._is_shutdown or (until is not None and (until.done() or until.cancelled())):
+                if left <= 0 or self._is_shutdown or (until is not None and until.done()):
                     return
                 wait = min(wait, left)
             try:

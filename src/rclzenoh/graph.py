@@ -17,8 +17,8 @@ from typing import Any
 
 import zenoh
 
-from rclzenoh.duration import deadline_after
 from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token, token_keys
+from rclzenoh.time import deadline_after
 
 _MOST_UNREAD = 10_000
 """With this many unread changes, they are read even if nobody asks about the graph."""

@@ -9,9 +9,8 @@ import time
 from collections.abc import Callable
 from enum import IntEnum
 
-from rclzenoh.duration import S_TO_NS
 from rclzenoh.interfaces.msg import Log
-from rclzenoh.time import Time
+from rclzenoh.time import S_TO_NS, Time
 
 
 class LoggingSeverity(IntEnum):

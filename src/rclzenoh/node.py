@@ -29,10 +29,6 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
         namespace: Namespace of the node and its relative names.
         enable_rosout: Whether what the node logs is published on ``/rosout``.
         start_parameter_services: Whether other nodes may read and change the parameters.
-
-    Raises:
-        NotInitializedException: If the context is not initialised.
-        NameValidationException: If the name or namespace is invalid.
     """
 
     def __init__(

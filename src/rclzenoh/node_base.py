@@ -10,8 +10,7 @@ from rclzenoh.keys import EntityKind, Token
 from rclzenoh.logging import Logger
 from rclzenoh.mailbox import Mailbox
 from rclzenoh.names import absolute_namespace, check_node_name, join, resolve
-from rclzenoh.time import ROSClock
-from rclzenoh.timer import Timer
+from rclzenoh.time import ROSClock, Timer
 
 
 class NodeKeeper(Protocol):
@@ -27,10 +26,6 @@ class NodeBase:
     Attributes:
         mailbox: Where work of the node waits for its executor.
         token: Token that announces the node.
-
-    Raises:
-        NotInitializedException: If the context is not initialised.
-        NameValidationException: If the name or namespace is invalid.
     """
 
     def __init__(self, node_name: str, namespace: str, context: Context | None) -> None:
@@ -76,9 +71,5 @@ class NodeBase:
         return self._logger
 
     def resolve_topic_name(self, topic: str) -> str:
-        """Absolute name of a topic or service that is given as ``/x``, ``x`` or ``~/x``.
-
-        Raises:
-            NameValidationException: If it is no valid name.
-        """
+        """Absolute name of a topic or service that is given as ``/x``, ``x`` or ``~/x``."""
         return resolve(topic, self._namespace, self._name)

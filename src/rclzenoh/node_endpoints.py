@@ -7,7 +7,6 @@ from typing import Any, TypeVar
 
 from rclzenoh.client import Client
 from rclzenoh.context import Context
-from rclzenoh.duration import S_TO_NS
 from rclzenoh.interfaces import Message
 from rclzenoh.interfaces import Service as ServiceType
 from rclzenoh.node_base import NodeBase
@@ -15,7 +14,7 @@ from rclzenoh.publisher import Publisher
 from rclzenoh.qos import QoSProfile, qos_profile_services_default
 from rclzenoh.service import Service
 from rclzenoh.subscription import Subscription
-from rclzenoh.timer import Timer
+from rclzenoh.time import S_TO_NS, Timer
 
 _E = TypeVar("_E", Publisher, Subscription, Service, Client)
 
@@ -28,11 +27,7 @@ class NodeEndpoints(NodeBase):
         self._entities: list[Publisher | Subscription | Service | Client] = []
 
     def create_publisher(self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int) -> Publisher:
-        """Make a publisher, with a profile or only a depth.
-
-        Raises:
-            NameValidationException: If the name is invalid.
-        """
+        """Make a publisher, with a profile or only a depth."""
         return self._keep(Publisher(self, msg_type, topic, _make_profile(qos_profile)))
 
     def create_subscription(
@@ -48,10 +43,6 @@ class NodeEndpoints(NodeBase):
 
         The callback may be a coroutine function. It gets the message (with ``raw`` its CDR bytes) and, if it takes two
         arguments, a dictionary that says when the message was sent.
-
-        Raises:
-            NameValidationException: If the name is invalid.
-            RuntimeError: If the callback takes neither one argument nor two.
         """
         return self._keep(Subscription(self, msg_type, topic, callback, _make_profile(qos_profile), raw=raw))
 
@@ -66,9 +57,6 @@ class NodeEndpoints(NodeBase):
         """Make a service.
 
         The callback gets the request and an empty response, and returns the response; it may be a coroutine function.
-
-        Raises:
-            NameValidationException: If the name is invalid.
         """
         return self._keep(Service(self, srv_type, srv_name, callback, qos_profile))
 
@@ -79,11 +67,7 @@ class NodeEndpoints(NodeBase):
         *,
         qos_profile: QoSProfile = qos_profile_services_default,
     ) -> Client:
-        """Make a client of a service.
-
-        Raises:
-            NameValidationException: If the name is invalid.
-        """
+        """Make a client of a service."""
         return self._keep(Client(self, srv_type, srv_name, qos_profile))
 
     def create_timer(self, timer_period_sec: float, callback: Callable[[], Any]) -> Timer:

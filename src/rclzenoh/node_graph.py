@@ -7,7 +7,7 @@ from enum import IntEnum
 
 from rclzenoh.keys import EntityKind, Token
 from rclzenoh.node_base import NodeBase
-from rclzenoh.qos import HistoryPolicy, QoSProfile, decode
+from rclzenoh.qos import QoSProfile, decode
 
 
 class TopicEndpointTypeEnum(IntEnum):
@@ -28,28 +28,6 @@ class TopicEndpointInfo:
     endpoint_type: TopicEndpointTypeEnum
     endpoint_gid: list[int]
     qos_profile: QoSProfile
-
-    def __str__(self) -> str:
-        qos = self.qos_profile
-        depth = f" ({qos.depth})" if qos.history is HistoryPolicy.KEEP_LAST else ""
-        return "\n".join(
-            [
-                f"Node name: {self.node_name}",
-                f"Node namespace: {self.node_namespace}",
-                f"Topic type: {self.topic_type}",
-                f"Topic type hash: {self.topic_type_hash}",
-                f"Endpoint type: {self.endpoint_type.name}",
-                f"GID: {'.'.join(format(octet, '02x') for octet in self.endpoint_gid)}",
-                "QoS profile:",
-                f"  Reliability: {qos.reliability.name}",
-                f"  History (Depth): {(qos.history or HistoryPolicy.UNKNOWN).name}{depth}",
-                f"  Durability: {qos.durability.name}",
-                f"  Lifespan: {qos.lifespan}",
-                f"  Deadline: {qos.deadline}",
-                f"  Liveliness: {qos.liveliness.name}",
-                f"  Liveliness lease duration: {qos.liveliness_lease_duration}",
-            ]
-        )
 
 
 def endpoint_info(token: Token) -> TopicEndpointInfo | None:

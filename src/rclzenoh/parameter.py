@@ -28,11 +28,7 @@ class ParameterKind(Enum):
 
     @classmethod
     def from_parameter_value(cls, value: object) -> ParameterKind:
-        """Type that a Python value has as a parameter.
-
-        Raises:
-            TypeError: If parameters cannot have such values.
-        """
+        """Type that a Python value has as a parameter."""
         # An empty list fits all types of arrays. As in rclpy, it becomes an array of bytes, because that comes first.
         for kind in cls:
             if kind.check(value):
@@ -103,21 +99,13 @@ class Parameter:
 
     @classmethod
     def from_parameter_msg(cls, param_msg: ParameterMessage) -> Parameter:
-        """Parameter that a message holds.
-
-        Raises:
-            ValueError: If the message's type is none of `Type`.
-        """
+        """Parameter that a message holds."""
         type_ = ParameterKind(param_msg.value.type)
         return cls(param_msg.name, type_, parameter_value_to_python(param_msg.value))
 
 
 def parameter_value_to_python(message: ParameterValue) -> Any:
-    """Python value that a message holds; None if it is not set.
-
-    Raises:
-        ValueError: If the message's type is none of `Type`.
-    """
+    """Python value that a message holds; None if it is not set."""
     type_ = ParameterKind(message.type)
     if type_ is ParameterKind.NOT_SET:
         return None

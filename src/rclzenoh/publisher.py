@@ -40,13 +40,7 @@ class Publisher:
         return self._endpoint.name
 
     def publish(self, msg: Message | bytes) -> None:
-        """Publish a message, or its CDR bytes.
-
-        Raises:
-            TypeError: If the message is not of the topic's type.
-            ValueError: If a field does not fit its type.
-            InvalidHandle: If the publisher was destroyed or the session closed.
-        """
+        """Publish a message, or its CDR bytes."""
         if isinstance(msg, self.msg_type):
             data = serialize(msg)
         elif isinstance(msg, bytes):

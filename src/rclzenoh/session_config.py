@@ -197,11 +197,7 @@ def _insert(config: zenoh.Config, key: str, value: str, where: str) -> None:
 
 
 def domain_of_environment() -> int:
-    """Domain identifier that the environment names; 0 if none.
-
-    Raises:
-        ConfigurationError: If it is no number of a domain.
-    """
+    """Domain identifier that the environment names; 0 if none."""
     text = os.environ.get(DOMAIN_VARIABLE) or "0"
     if not text.isdecimal() or int(text) > _LARGEST_DOMAIN:
         raise ConfigurationError(f"{DOMAIN_VARIABLE} must be a number from 0 to {_LARGEST_DOMAIN}, got {text!r}")

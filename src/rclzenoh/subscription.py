@@ -40,8 +40,6 @@ class Subscription(Receiver):
         self.callback = callback
         # As in rclpy, a callback whose second argument is optional gets the message alone.
         self._wants_info = _takes(callback, 2) and not _takes(callback, 1)
-        if not self._wants_info and not _takes(callback, 1):
-            raise RuntimeError(f"{topic}: the callback must take a message, or a message and its info")
         self._endpoint = Endpoint(node, EntityKind.SUBSCRIPTION, topic, msg_type.TYPE, qos_profile)
         # `handle` may be called with earlier messages before `_declare` returns, so it must not use anything set below.
         self._endpoint.announce(self._declare())

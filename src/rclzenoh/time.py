@@ -1,12 +1,16 @@
-"""Points in time, and the clock of ROS time: the simulation's while it provides one, otherwise the system's."""
+"""Times, timers, and the clock of ROS time: the simulation's time if it provides one, or the system's."""
 
 from __future__ import annotations
 
 import time as system
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from rclzenoh.duration import S_TO_NS
 from rclzenoh.interfaces.msg import Time as TimeMessage
+
+S_TO_NS = 1_000_000_000
+"""Nanoseconds in a second."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,3 +62,33 @@ class ROSClock:
     def timer_now_ns(self) -> int:
         """Time by which timers run [ns]; in real time, that of a steady clock, as the system's may be corrected."""
         return self._override_ns if self._active else system.monotonic_ns()
+
+
+class Timer:
+    """Calls back once a period of its clock; periods that were missed are skipped."""
+
+    def __init__(self, callback: Callable[[], Any], timer_period_ns: int, clock: ROSClock) -> None:
+        self.callback = callback
+        self.timer_period_ns = timer_period_ns
+        self.clock = clock
+        self._next = clock.timer_now_ns() + timer_period_ns
+
+    def time_until_next_call(self) -> int:
+        """Time left [ns], not positive when due."""
+        now = self.clock.timer_now_ns()
+        if self._next - now > self.timer_period_ns:
+            # The clock has jumped back, or has changed between simulated and real time, so `_next` is meaningless.
+            self._next = now + self.timer_period_ns
+        return self._next - now
+
+    def advance(self) -> None:
+        """Begin the next period; called before the callback."""
+        now = self.clock.timer_now_ns()
+        self._next += self.timer_period_ns
+        if self._next <= now and self.timer_period_ns:
+            self._next += (now - self._next) // self.timer_period_ns * self.timer_period_ns + self.timer_period_ns
+
+
+def deadline_after(timeout_s: float | None) -> float:
+    """Time of `time.monotonic` at which a wait ends [s]; never if the timeout is None or negative, as in rclpy."""
+    return float("inf") if timeout_s is None or timeout_s < 0 else system.monotonic() + timeout_s

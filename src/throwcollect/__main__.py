@@ -10,9 +10,9 @@ def main() -> None:
     # The handlers come before all other imports, which take a while: Ctrl-C during them would end in a traceback.
     leave_when_stopped()
     from throwcollect.cli.streams import open_streams
-    from throwcollect.own_process import limit_library_threads
+    from throwcollect.own_process import prepare_environment
 
-    limit_library_threads()
+    prepare_environment()
     open_streams()
     from throwcollect.cli.main import main as run_command
 

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import rclzenoh
-from throwcollect.engine_packages import PACKAGES
+from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import list_origins
 
 _PACKAGES = ("example-robot-data", "zstandard")
@@ -48,8 +48,8 @@ def _list_facts(engine: str, **others: str) -> Iterator[str]:
     """List what counts besides the sources: of an engine, and of members of other families, by family."""
     for distribution in _PACKAGES:
         yield _version_of(distribution)
-    if engine in PACKAGES:
-        package = PACKAGES[engine]
+    if engine in ENGINE_PACKAGES:
+        package = ENGINE_PACKAGES[engine]
         yield _version_of(package.distribution)
         # Two builds of one version differ in size. Hashing would take each node a second, because Bullet has 140 MB.
         found = find_spec(package.module)

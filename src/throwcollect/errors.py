@@ -8,7 +8,6 @@
     │   ├── NotFoundError            exit 2   the request names something that does not exist
     │   └── ConflictError            exit 2   the request does not fit the state of the thing that it names
     ├── MissingExtraError            exit 2   a package that an extra brings is not installed (`throwcollect.extras`)
-    ├── MissingLibraryError          exit 2   the system lacks a library that such a package loads (likewise)
     ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
     ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself

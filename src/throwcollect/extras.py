@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -44,6 +45,30 @@ EXTRA_OF = MappingProxyType(
 )
 """The extra that brings a package, by the name of the package in imports."""
 
+
+@dataclass(frozen=True)
+class EnginePackage:
+    """The package of an engine.
+
+    Attributes:
+        distribution: Name of the package on the package index.
+        module: Name of the package in imports.
+        compiled: Pattern of the name of the compiled file, which lies beside the module.
+    """
+
+    distribution: str
+    module: str
+    compiled: str
+
+
+ENGINE_PACKAGES = MappingProxyType(
+    {
+        "bullet": EnginePackage("pybullet", "pybullet", "pybullet.*.so"),
+        "mujoco": EnginePackage("mujoco-core", "mujoco", "libmujoco.so.*"),
+    }
+)
+"""The package of each engine of our own that needs one, by name of the engine."""
+
 _LAST_WITH_BULLET = (3, 11)
 """The latest Python with a wheel of pybullet. Compiling Bullet would not help, because it would compute other bytes."""
 
@@ -73,23 +98,6 @@ _INSTEAD = {
     "mujoco": "Python 3.11 or later, or `sim.engine: bullet`",
 }
 """The hint if the package of an engine has no wheel for this Python. Pictures need Bullet, too."""
-
-_SYSTEM_LIBRARY_OF = MappingProxyType({"pinocchio": ("libgomp.so.1", "libgomp1")})
-"""The system library that a package loads but no wheel brings, and the package of Debian that has this library."""
-
-
-class MissingLibraryError(ThrowcollectError, ImportError):
-    """A package is installed, but this system lacks the file of a library that it loads; nothing has been started."""
-
-    exit_code = ConfigError.exit_code
-
-    def __init__(self, package: str) -> None:
-        self.package = package
-        self.library, system_package = _SYSTEM_LIBRARY_OF[package]
-        super().__init__(
-            f"{package} needs {self.library}, which this system lacks",
-            hint=f"apt install {system_package}, or what has it in another system than Debian and Ubuntu",
-        )
 
 
 def has_wheel(package: str) -> bool:
@@ -122,6 +130,12 @@ def require(*packages: str, extra: str | None = None) -> None:
             raise MissingExtraError(package, extra)
 
 
+def require_engine(name: str) -> None:
+    """Check that the package of an engine is installed, before anything begins."""
+    if name in ENGINE_PACKAGES:
+        require(ENGINE_PACKAGES[name].module)
+
+
 @contextmanager
 def explain_missing(extra: str | None = None) -> Iterator[None]:
     """Turn a failed import in the block into an error that names `extra`, or else the extra in `EXTRA_OF`."""
@@ -138,22 +152,9 @@ def lazily(name: str, *, extra: str | None = None) -> Any:
     """Make a stand-in for a module of a package in `EXTRA_OF`, which imports the module when it is first used.
 
     Using an attribute raises `MissingExtraError` if the package is not installed, which names `extra`, or else the
-    extra in `EXTRA_OF`; and `MissingLibraryError` if the system lacks a library that the package loads.
+    extra in `EXTRA_OF`; and `ConfigError` if the system lacks a library that the package loads.
     """
     return _LazyModule(name, extra)
-
-
-def _lacks_library(package: str) -> bool:
-    """Say whether a package is installed, but a system library that it loads is missing."""
-    if package not in _SYSTEM_LIBRARY_OF or not is_installed(package):
-        return False
-    import ctypes  # takes 7 ms, and is needed only after an import has failed
-
-    try:
-        ctypes.CDLL(_SYSTEM_LIBRARY_OF[package][0])
-    except OSError:
-        return True
-    return False
 
 
 class _LazyModule:
@@ -167,9 +168,11 @@ class _LazyModule:
             try:
                 module = import_module(self._name)
             except ImportError as error:
-                if _lacks_library(self._name):
-                    raise MissingLibraryError(self._name) from error
-                raise
+                if ".so" not in str(error):
+                    raise
+                # The loader says which library the system lacks, such as libgomp.so.1 of Pinocchio.
+                hint = "docs/installing.md names the libraries of the system that are needed"
+                raise ConfigError(f"{self._name} cannot be loaded: {error}", hint=hint) from error
         # This is outside of the block above, because a missing attribute is an error of the caller.
         value = getattr(module, attribute)
         # The next look-up finds the value in the instance, and does not call this function.

@@ -14,9 +14,13 @@ fills the machine, and everything that ends up in files is computed without BLAS
 """
 
 
-def limit_library_threads() -> None:
-    """Let numerical libraries start no threads in this process, which runs a command; call it before their import."""
-    for name, value in SERIAL_LIBRARIES.items():
+def prepare_environment() -> None:
+    """Prepare the environment of this process, which runs a command, and of all that it starts, before their imports.
+
+    Numerical libraries start no threads, and Python looks for no modules in the working directory: it would run files
+    there, perhaps of somebody's dataset, in place of modules of its own library.
+    """
+    for name, value in {**SERIAL_LIBRARIES, "PYTHONSAFEPATH": "1"}.items():
         os.environ.setdefault(name, value)
 
 

@@ -5,23 +5,27 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
-from typing import Any, TypeVar
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from throwcollect.errors import WorkerError
 from throwcollect.interruption import die_with_parent
 
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
 _THROWS_A_START = 20
 """Number of throws that a process simulates in about the time that it takes to start."""
 
-_SAFE_PATH = "PYTHONSAFEPATH"
-_safe_path_lock = threading.Lock()
-_values_before: list[str | None] = []
-"""Value of the variable `_SAFE_PATH` before each block of any thread that has set it and still runs; oldest first."""
+_launch = threading.Lock()
+"""Held while processes are started, because that changes what belongs to the whole process for a moment."""
 
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
@@ -35,6 +39,67 @@ def count_cores() -> int:
 def limit_processes(processes: int, throws: int) -> int:
     """Limit the number of processes that simulate throws, as a start takes as long as some throws; it is at least 1."""
     return min(processes, max(1, throws // _THROWS_A_START))
+
+
+class Workers(Generic[_Piece, _Found]):
+    """Processes that do pieces of work, and know nothing of this process but the arguments of `begin`.
+
+    They start when the first pieces are submitted, and end when this process ends, even by Ctrl-C.
+
+    Args:
+        begin: Called once in each process; returns the function that does a piece.
+        arguments: Arguments of `begin`.
+        processes: Largest number of processes.
+        doing: Verb and object for messages, such as ``checks trials``.
+        fork: Whether to fork the processes off this one, with everything that it has imported and read, if it has only
+            one Python thread. The pieces must not use libraries with threads of their own.
+    """
+
+    def __init__(
+        self,
+        begin: Callable[..., Callable[[_Piece], _Found]],
+        arguments: tuple[Any, ...],
+        *,
+        processes: int,
+        doing: str,
+        fork: bool = False,
+    ) -> None:
+        # Imported here, because most commands need neither.
+        import multiprocessing
+        from concurrent.futures import ProcessPoolExecutor
+
+        # If there are several threads, new interpreters are started: a fork could wait for ever for another thread's
+        # lock.
+        context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
+        self._doing = doing
+        with _launching():
+            self._pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
+
+    def submit(self, pieces: Iterable[_Piece]) -> list[Future[_Found]]:
+        """Let the processes do pieces of work, in this order."""
+        with _launching(), warnings.catch_warnings():
+            # From 3.12 on, Python warns about the threads of Arrow and BLAS, which forked processes do not use.
+            warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+            return [self._pool.submit(_work, piece) for piece in pieces]
+
+    def wait(self, future: Future[_Found]) -> _Found:
+        """Wait for the result of a piece."""
+        from concurrent.futures.process import BrokenProcessPool
+
+        try:
+            return future.result()
+        except BrokenProcessPool as error:
+            raise WorkerError(
+                f"a process that {self._doing} was killed", hint="the kernel's log may say why: memory may be short"
+            ) from error
+
+    def close(self) -> None:
+        """End the processes at once; a second call does nothing."""
+        # `shutdown` waits for pieces that are being worked on, so the processes are killed first. Only the pool knows
+        # its own, because other threads start processes, too; before 3.14, Python has no public way to kill them.
+        for process in list((self._pool._processes or {}).values()):
+            process.kill()
+        self._pool.shutdown(cancel_futures=True)
 
 
 def work_side_by_side(
@@ -61,79 +126,41 @@ def working_side_by_side(
     doing: str,
     fork: bool = False,
 ) -> Iterator[Iterator[_Found]]:
-    """Do pieces of work in several processes, which import the calling program, as `multiprocessing` does.
+    """Do pieces of work in `Workers`, or in this process if one process, or one piece, is enough.
 
-    The processes begin at once, so this process can do something else meanwhile. They end at once when this process or
-    the block ends, even by Ctrl-C.
-
-    Args:
-        pieces: The pieces; each is sent to a process.
-        begin: Called once in each process; returns the function that does a piece.
-        arguments: Arguments of `begin`.
-        processes: Largest number of processes; with 1, this process does the work itself.
-        doing: Verb and object for messages, such as ``checks trials``.
-        fork: Whether to fork the processes off this one, with everything that it has imported and read, if it has only
-            one Python thread. The pieces must not use libraries with threads of their own.
+    The processes begin at once, so this process can do something else meanwhile, and end with the block.
 
     Yields:
         The results, in the order of the pieces.
     """
-    # Imported here, because most commands need neither.
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
-    from concurrent.futures.process import BrokenProcessPool
-
     processes = min(processes, len(pieces))
     if processes <= 1:
         yield map(begin(*arguments), pieces)
         return
-    # If there are several threads, new interpreters are started: a fork could wait for ever for another thread's lock.
-    context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
-    with _hiding_working_directory():
-        pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
+    workers = Workers(begin, arguments, processes=processes, doing=doing, fork=fork)
     try:
-        # Only this process shall see Ctrl-C and then end the others, so the others start with the signal blocked.
-        unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
-        try:
-            with _hiding_working_directory(), warnings.catch_warnings():
-                # From 3.12 on, Python warns about the threads of Arrow and BLAS, which forked processes do not use.
-                warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
-                found = pool.map(_work, pieces)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
-        yield found
-    except BrokenProcessPool as error:
-        raise WorkerError(
-            f"a process that {doing} was killed", hint="the kernel's log may say why: memory may be short"
-        ) from error
+        futures = deque(workers.submit(pieces))
+        # Each result is freed when it has been used.
+        yield (workers.wait(futures.popleft()) for _ in range(len(futures)))
     finally:
-        # `shutdown` waits for pieces that are being worked on, so the processes are killed first. Only the pool knows
-        # its own, because other threads start processes, too; before 3.14, Python has no public way to kill them.
-        for process in list(pool._processes.values()):
-            process.kill()
-        pool.shutdown(cancel_futures=True)
+        workers.close()
 
 
 @contextmanager
-def _hiding_working_directory() -> Iterator[None]:
-    """Keep Python processes that are started in the block from looking for modules in the working directory.
+def _launching() -> Iterator[None]:
+    """Let processes that start in the block not import the user's program, which may do its work when it is imported.
 
-    They would run files in that directory, perhaps somebody else's dataset, in place of modules of Python's own
-    library. A pool that has just been made starts a process, too, which looks after what the others share. Python
-    before 3.11 has no way to prevent that.
+    Only this process shall see Ctrl-C and then end the others, so these start with the signal blocked.
     """
-    with _safe_path_lock:
-        _values_before.append(os.environ.get(_SAFE_PATH))
-        os.environ[_SAFE_PATH] = "1"
-    try:
-        yield
-    finally:
-        with _safe_path_lock:
-            # While other threads are in such a block, the newest value was set by a block, so the variable stays set.
-            if (before := _values_before.pop()) is None:
-                del os.environ[_SAFE_PATH]
-            else:
-                os.environ[_SAFE_PATH] = before
+    with _launch:
+        program = sys.modules["__main__"]
+        unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = program
+            signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
 
 
 _make: list[Callable[[], Callable[[Any], Any]]] = []
@@ -142,6 +169,8 @@ _make: list[Callable[[], Callable[[Any], Any]]] = []
 
 def _begin(make: Callable[[], Callable[[Any], Any]], parent: int) -> None:
     die_with_parent(parent)
+    # What engines and tasks of other packages print must not mix with the output of a command.
+    os.dup2(2, 1)
     # The objects made so far live until the end, so the garbage collector need not examine them again and again.
     gc.freeze()
     # The function is made with the first piece, because an error here would not reach the parent.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from threading import RLock
 
@@ -15,7 +14,7 @@ from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
-from throwcollect.config.target_columns import LARGEST_TARGET
+from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
@@ -24,8 +23,8 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.replay.replayer import Replayer
 from throwcollect.side_by_side import work_side_by_side
+from throwcollect.sim import simulator as sim
 from throwcollect.sweep.plan import make_trials, refusal
 from throwcollect.sweep.points import Points, Targets
 from throwcollect.sweep.trials import Trial
@@ -35,8 +34,6 @@ require("pinocchio")
 
 Point = Mapping[str, float]
 """Values that replace those of the configuration, by dotted key, in the key's unit."""
-_FORKED_S = 1.0
-"""Time that a forked process waits for the first throw of another thread of its own [s]."""
 
 
 class Simulator:
@@ -72,10 +69,8 @@ class Simulator:
             self.config, self._source = load(config, overrides), os.fspath(config)
         # A throw changes the robot's model and the world. A handler of a signal may close during a throw of its thread.
         self._lock = RLock()
-        self._holder = os.getpid()
-        """Process in which the lock was last taken."""
         self._check = feasibility_check(self.config)
-        self._replayer = Replayer(self.config)
+        self._simulator = sim.Simulator(self.config)
 
     def __enter__(self) -> Simulator:
         return self
@@ -84,13 +79,9 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """Free the physics engine; nothing can be simulated afterwards. Closing it once more does nothing.
-
-        Raises:
-            ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
-        """
-        with self._alone():
-            self._replayer.close()
+        """Free the physics engine; nothing can be simulated afterwards. Closing it once more does nothing."""
+        with self._lock:
+            self._simulator.close()
 
     def throw(self, values: Point | None = None, *, trial: int = 0, target: Point | None = None) -> Throw:
         """Simulate one throw.
@@ -108,8 +99,7 @@ class Simulator:
 
         Raises:
             ConfigError: If a key cannot vary, a value is out of its range, or the task has no such target.
-            ConflictError: If the simulator is closed, or this process was forked off while a thread of its parent was
-                simulating a throw.
+            ConflictError: If the simulator is closed.
             PlanError: If the plan of a collection would refuse the throw; the error gives the plan's reason.
         """
         self._require_open()
@@ -137,19 +127,17 @@ class Simulator:
 
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
-            ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
         """
         wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
         if wrong:
             raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
-        with self._alone():
+        with self._lock:
             return refusal(with_values(self.config, values), self._check)
 
     def throw_many(self, points: Iterable[Point], *, processes: int = 1) -> Iterator[Throw]:
         """Simulate many throws, which are the trials 0, 1, 2 and so on.
 
-        With several processes, the program must do its work below ``if __name__ == "__main__":``, because each process
-        imports it (see `multiprocessing`). Then all points are taken before the first throw is there.
+        With several processes, all points are taken before the first throw is there.
 
         Args:
             points: Values that differ from the configuration, for each throw.
@@ -188,30 +176,16 @@ class Simulator:
                 hint=error.hint,
             ) from error
 
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Keep other threads of this process from the simulator."""
-        # That thread does not exist here, so it never releases the lock, and the world may be in the middle of a step.
-        if not self._lock.acquire(timeout=-1 if self._holder == os.getpid() else _FORKED_S):
-            raise ConflictError(
-                "this process was forked off while another thread simulated a throw", hint="make another Simulator"
-            )
-        try:
-            self._holder = os.getpid()
-            yield
-        finally:
-            self._lock.release()
-
     def _require_open(self) -> None:
         """Refuse to simulate after `close`."""
-        if not self._replayer.close.alive:
+        if not self._simulator.close.alive:
             raise ConflictError("this simulator is closed", hint="make another Simulator")
 
     def _throw(self, trial: Trial) -> Throw:
-        with self._alone():
+        with self._lock:
             # Another thread may have closed it since the throw was asked for.
             self._require_open()
-            episode = self._replayer.run(trial)
+            episode = self._simulator.run(trial)
         keys = tuple(trial.values)
         table = ThrowsTable(keys, self.config, tuple(trial.target))
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)

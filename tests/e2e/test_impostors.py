@@ -16,10 +16,10 @@ from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.episode_message import pack
-from throwcollect.replay.replayer import Replayer
 from throwcollect.ros import SetParametersResult, get_message
 from throwcollect.ros.router import router
 from throwcollect.run_key import Signer
+from throwcollect.sim.simulator import Simulator
 
 TRIALS = 40
 UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
@@ -110,7 +110,7 @@ def test_impostor_simulations_do_not_change_the_dataset(graph: ros.Context, tmp_
 def forge_message(directory: Path, path: Path) -> bytes:
     """A sound episode of the first trial, of another configuration, and with another key."""
     config = load(path)
-    delivery = Replayer(config).delivery(make_plan(config, directory=directory).trials[0])
+    delivery = Simulator(config).run(make_plan(config, directory=directory).trials[0])
     return pack(delivery, Signer(b"a key of its own"))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, POSTURE, TORSO, Robot, goal, signer, swing, trajectory
-from throwcollect.episode.episode_message import Delivery, unpack
+from throwcollect.episode.episode_message import Episode, unpack
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.run_key import Signer
 from throwcollect.trial.lease import Lease, leases_to_json
@@ -29,14 +29,14 @@ def ask_for(robot: Robot, *leases: Lease) -> Any:
     return robot.set({"trial.leases": leases_to_json(leases)})
 
 
-def by_hand(robot: Robot) -> Delivery:
+def by_hand(robot: Robot) -> Episode:
     """The episode of a trial that was set up by parameters."""
     with robot.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
         assert robot.send(swing()).accepted
         assert robot.send(goal(TORSO), TORSO).accepted
         robot.wait_until(lambda: bool(heard), "an episode")
     delivery = unpack(heard[0], signer())
-    assert isinstance(delivery, Delivery)
+    assert isinstance(delivery, Episode)
     return delivery
 
 
@@ -65,11 +65,11 @@ def wait_for_episodes(robot: Robot, *leases: Lease, meanwhile: Callable[[], obje
 def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> None:
     leases = [lease(robot, {"ball.mass_kg": 0.04 + trial / 1000}, trial=trial) for trial in (4, 2, 3)]
     deliveries = wait_for_episodes(robot, *leases)
-    assert [delivery.episode.header.trial for delivery in deliveries] == [4, 2, 3]
+    assert [delivery.header.trial for delivery in deliveries] == [4, 2, 3]
     conditions = [json.loads(delivery.conditions) for delivery in deliveries]
     assert [each["values"] for each in conditions] == [dict(each.values) for each in leases]
     assert [json.loads(delivery.result)["outcome"] for delivery in deliveries] == ["landed"] * 3
-    start_ns = [delivery.episode.header.start_ns for delivery in deliveries]
+    start_ns = [delivery.header.start_ns for delivery in deliveries]
     assert start_ns == [CONFIG.trial_start_ns(trial) for trial in (4, 2, 3)]
 
 
@@ -78,7 +78,7 @@ def test_an_impossible_trial_is_refused_and_the_next_one_is_simulated(robot: Rob
     refusal, delivery = wait_for_episodes(robot, wrong, right)
     assert refusal.trial == wrong.trial
     assert "ball.mass_kg" in refusal.reason
-    assert delivery.episode.header.trial == 5
+    assert delivery.header.trial == 5
 
 
 def test_leases_that_are_not_signed_are_refused(robot: Robot) -> None:
@@ -177,7 +177,7 @@ def test_other_clients_cannot_move_or_stop_a_leased_controller(robot: Robot) -> 
 
     (touched,) = wait_for_episodes(robot, asked[1], meanwhile=disturb)
     robot.set({"sim.real_time_factor": 0.0})
-    assert touched.episode.digest == untouched.episode.digest
+    assert touched.digest == untouched.digest
 
 
 def test_controllers_are_as_configured_in_every_leased_trial(robot: Robot) -> None:
@@ -185,7 +185,7 @@ def test_controllers_are_as_configured_in_every_leased_trial(robot: Robot) -> No
     assert robot.set({f"constraints.{ELBOW}.trajectory": 1e-12}, node=ARM).successful
     robot.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
     (touched,) = wait_for_episodes(robot, lease(robot, {}))
-    assert touched.episode.digest == untouched.episode.digest
+    assert touched.digest == untouched.digest
 
 
 def test_a_lease_can_be_ended_by_hand(leased: Robot) -> None:

@@ -7,8 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -23,7 +23,7 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError
 from throwcollect.files import unwritable
 from throwcollect.runs.slices import collect_slice
-from throwcollect.sim.trial_runner import TrialRunner
+from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.slice import Slice
 
 INPROCESS = ["run.runtime=inprocess"]
@@ -248,15 +248,15 @@ def test_a_full_disk_ends_the_attempt_and_a_later_one_goes_on_with_its_episodes(
 def test_a_slice_with_a_lost_trial_keeps_its_others_for_the_next_attempt(
     frozen: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begin, refused, begun = TrialRunner.begin, True, set[int]()
+    begin, refused, begun = Simulator.begin, True, set[int]()
 
-    def begin_or_refuse(self: TrialRunner, trial: int, *values: Any, **token: str) -> None:
+    def begin_or_refuse(self: Simulator, trial: int, values: Mapping[str, float]) -> None:
         if trial == 1 and refused:
             raise ThrowcollectError("no")
         begun.add(trial)
-        begin(self, trial, *values, **token)
+        begin(self, trial, values)
 
-    monkeypatch.setattr(TrialRunner, "begin", begin_or_refuse)
+    monkeypatch.setattr(Simulator, "begin", begin_or_refuse)
     on_scratch = [*INPROCESS, f"cluster.scratch={tmp_path / 'scratch'}"]
     with pytest.raises(LossError):
         collect_slice(frozen, Slice(0, 2), overrides=on_scratch)

@@ -10,7 +10,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import draw_plan
 from throwcollect.dataset.verify_recording import find_flight_problems
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 
 ALL_TOPICS = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 GENTLE = {"task.duration_s": 2.0, "task.end.arm_right_4_joint": -1.6}
@@ -62,9 +62,9 @@ def test_the_flight_of_a_simulated_throw_is_ballistic(name: str, tmp_path: Path)
     (tmp_path / "points.csv").write_text("\n".join(",".join(row) for row in [[*default], *rows]))
     config = Config.model_validate({**SETTINGS[name], "sweep": {"sampler": "list", "file": "points.csv"}})
     plan = draw_plan(config, directory=tmp_path)
-    replayer = Replayer(config)
+    simulator = Simulator(config)
     run = [trial.number for trial in plan.trials if trial.refused is None]
     assert run
     for trial in run:
         planned = plan.trials[trial]
-        assert list(find_flight_problems(replayer.run(planned), plan.config_of(planned))) == [], trial
+        assert list(find_flight_problems(simulator.run(planned), plan.config_of(planned))) == [], trial

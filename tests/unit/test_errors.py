@@ -7,7 +7,7 @@ import pytest
 
 from throwcollect.dataset.findings import Finding
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem, RequestError, ThrowcollectError
-from throwcollect.extras import MissingExtraError, MissingLibraryError
+from throwcollect.extras import MissingExtraError
 
 
 def test_a_dataset_error_has_its_facts_as_fields_and_in_its_message() -> None:
@@ -36,10 +36,9 @@ def test_an_error_has_its_message_and_its_hint_in_one_line() -> None:
     "error",
     [
         MissingExtraError("pinocchio"),
-        MissingLibraryError("pinocchio"),
         RequestError("NAME_INVALID", "no such name", expected="another", hint="try it"),
         ForeignPlanError("differs", path=Path("a"), place="trial 3", evidence="6"),
-        ConfigError([Problem("is missing", "a.b")], expected="a number", more=3),
+        ConfigError([Problem("is missing", "a.b")], expected="a number"),
     ],
     ids=lambda error: type(error).__name__,
 )

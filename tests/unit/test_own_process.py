@@ -40,7 +40,7 @@ def test_a_command_imports_no_module_from_the_working_directory(
     for name in ("queue", "types", "runpy", "signal", "numpy", "throwcollect"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the working directory was run')\n")
     monkeypatch.setattr(sys, "version_info", version)
-    for words in (["--version"], ["simulate", "--help"]):
+    for words in (["--version"], ["router", "--help"]):
         done = subprocess.run([*make_command(), *words], cwd=tmp_path, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (0, "")
         assert "throwcollect" in done.stdout

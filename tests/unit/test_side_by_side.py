@@ -131,7 +131,9 @@ def test_processes_import_no_module_from_the_working_directory(tmp_path: Path) -
         (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the working directory was run')\n")
     program = (
         "import operator\n"
+        "from throwcollect.own_process import prepare_environment\n"
         "from throwcollect.side_by_side import work_side_by_side\n"
+        "prepare_environment()\n"
         "print(*work_side_by_side(range(4), operator.methodcaller, ('bit_length',), processes=2, doing='counts'))\n"
     )
     words = [sys.executable, "-P", "-c", program]
@@ -139,6 +141,19 @@ def test_processes_import_no_module_from_the_working_directory(tmp_path: Path) -
     for switch in (words, [sys.executable, "-c", f"import sys; del sys.path[0]\n{program}"]):
         done = subprocess.run(switch, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
         assert (done.stdout, done.stderr) == ("0 1 2 2\n", "")
+
+
+def test_processes_do_not_import_the_program(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import work_side_by_side as work\n"
+        "from throwcollect.side_by_side import work_side_by_side\n"
+        "print(*[each for each, _ in work_side_by_side(range(4), work.begin, (3,), processes=2, doing='counts')])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, program], capture_output=True, text=True, env=find_tests(), timeout=60, check=False
+    )
+    assert (done.stdout, done.stderr) == ("0 3 6 9\n", "")
 
 
 def test_a_process_that_was_forked_off_and_is_killed_is_named() -> None:

@@ -1,15 +1,11 @@
 """Single throws by `Simulator`, in this process or in several."""
 
-import os
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 import pytest
@@ -176,32 +172,6 @@ def test_a_simulator_throws_for_several_threads_one_after_the_other(simulator: S
 
     with ThreadPoolExecutor(4) as threads:
         assert list(threads.map(throw, points)) == alone
-
-
-def test_a_process_that_was_forked_off_during_a_throw_refuses_to_throw_instead_of_waiting_for_ever(
-    simulator: Simulator,
-) -> None:
-    def throw() -> None:
-        with simulator._alone():
-            throws.set()
-            forked.wait()
-
-    throws, forked = Event(), Event()
-    with ThreadPoolExecutor(1) as threads:
-        done = threads.submit(throw)
-        throws.wait()
-        if (child := os.fork()) == 0:
-            signal.alarm(20)
-            with suppress(ConflictError):
-                simulator.throw(POINT)
-                os._exit(1)
-            os._exit(0)
-        assert os.waitpid(child, 0)[1] == 0
-        forked.set()
-        done.result()
-    if (child := os.fork()) == 0:
-        os._exit(simulator.throw(POINT).outcome != "landed")
-    assert os.waitpid(child, 0)[1] == 0
 
 
 def test_a_missing_configuration_is_an_error_that_names_it(tmp_path: Path) -> None:

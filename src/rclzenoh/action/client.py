@@ -104,9 +104,6 @@ class ActionClient:
             feedback_callback: Called with each feedback message, which has ``goal_id`` and ``feedback``, until the
                 result has been received.
             goal_uuid: Identifier of the goal; None for a random one.
-
-        Raises:
-            TypeError: If the goal is of another type.
         """
         if not isinstance(goal, self._action_type.Goal):
             raise TypeError(f"expected {self._action_type.TYPE}.Goal, got {type(goal).__name__}")
@@ -184,13 +181,6 @@ def get_action_server_names_and_types_by_node(
 ) -> NamesAndTypes:
     """Actions that one node offers."""
     return _list_actions(node.get_publisher_names_and_types_by_node(remote_node_name, remote_node_namespace))
-
-
-def get_action_client_names_and_types_by_node(
-    node: NodeGraph, remote_node_name: str, remote_node_namespace: str
-) -> NamesAndTypes:
-    """Actions that one node has clients of."""
-    return _list_actions(node.get_subscriber_names_and_types_by_node(remote_node_name, remote_node_namespace))
 
 
 def _list_actions(topics: NamesAndTypes) -> NamesAndTypes:

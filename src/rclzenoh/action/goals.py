@@ -63,11 +63,7 @@ class TrackedGoal:
         return (self.status, event) in _MOVES
 
     def advance(self, event: GoalEvent, now_ns: int) -> None:
-        """Change the state.
-
-        Raises:
-            RuntimeError: If the event is not possible in the present state.
-        """
+        """Change the state."""
         if not self.can(event):
             key = key_of(self.info.goal_id).hex()
             raise RuntimeError(f"goal {key} is {_NAMES[self.status]} and cannot be {event.value}")

@@ -8,13 +8,13 @@ from functools import partial
 from typing import Any
 
 from rclzenoh.action.goals import GoalEvent, GoalTable, TrackedGoal, key_of
-from rclzenoh.duration import S_TO_NS
 from rclzenoh.interfaces import Action, AnyMessage, Message
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray
 from rclzenoh.interfaces.srv import CancelGoal
 from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.qos import QoSProfile, qos_profile_action_status_default
 from rclzenoh.task import Future, submit
+from rclzenoh.time import S_TO_NS
 
 _RESULT_TIMEOUT_S = 900
 _RESULT_QOS = QoSProfile(depth=1000)
@@ -66,11 +66,7 @@ class ServerGoalHandle(TrackedGoal):
         self._server.schedule(self, execute_callback)
 
     def publish_feedback(self, feedback: Message) -> None:
-        """Publish feedback.
-
-        Raises:
-            TypeError: If it is of another type.
-        """
+        """Publish feedback."""
         self._server.publish_feedback(self, feedback)
 
     def succeed(self, response: Message | None = None) -> None:
@@ -86,11 +82,7 @@ class ServerGoalHandle(TrackedGoal):
         self.finish(GoalEvent.CANCELED, response)
 
     def finish(self, event: GoalEvent, response: Message | None) -> None:
-        """End the goal; without a response, the execute callback returns the result.
-
-        Raises:
-            RuntimeError: If the goal cannot end like this in its present state.
-        """
+        """End the goal; without a response, the execute callback returns the result."""
         self._server.change(self, event)
         if response is not None:
             self._server.set_result(self, response)
@@ -152,20 +144,12 @@ class ActionServer:
         self._goals.clear()
 
     def change(self, handle: ServerGoalHandle, event: GoalEvent) -> None:
-        """Change a goal's state, and publish it.
-
-        Raises:
-            RuntimeError: If the event is not possible in its present state.
-        """
+        """Change a goal's state, and publish it."""
         handle.advance(event, self._read_clock_ns())
         self._publish_status()
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
-        """Publish feedback of a goal.
-
-        Raises:
-            TypeError: If it is of another type.
-        """
+        """Publish feedback of a goal."""
         if not isinstance(feedback, self.action_type.Feedback):
             raise TypeError(f"expected {self.action_type.TYPE}.Feedback, got {type(feedback).__name__}")
         self._feedback.publish(self.action_type.Impl.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
@@ -177,11 +161,7 @@ class ActionServer:
             submit(self._node.mailbox, partial(self._execute, handle, callback))
 
     def set_result(self, handle: ServerGoalHandle, result: Message) -> None:
-        """Set the result of a goal that has ended, and answer those who wait for it; only the first result counts.
-
-        Raises:
-            TypeError: If it is of another type.
-        """
+        """Set the result of a goal that has ended, and answer those who wait for it; only the first result counts."""
         if not isinstance(result, self.action_type.Result):
             raise TypeError(f"expected {self.action_type.TYPE}.Result, got {type(result).__name__}")
         if not handle.result_future.done():
@@ -218,8 +198,6 @@ class ActionServer:
         answer = None
         if key not in self._goals:
             answer = await _await_outcome(self._goal_callback(request.goal))
-            if not isinstance(answer, GoalResponse):
-                raise TypeError(f"the goal callback must return a GoalResponse, got {answer!r:.80}")
         # While the callback was waiting, another goal with the same identifier may have been accepted.
         response.accepted = answer is GoalResponse.ACCEPT and key not in self._goals
         if response.accepted:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rclzenoh.interfaces.catalog import Field, structure
-from rclzenoh.interfaces.layout import Alignment, FunctionWriter
+from rclzenoh.interfaces.layout import FunctionWriter
 from rclzenoh.interfaces.message import DTYPES, message_class
 
 _STRINGS_OF_NOTHING = (b"\x00\x00\x00\x00", ())
@@ -98,7 +98,7 @@ class _Reader(FunctionWriter):
             # string.
             self.line(depth, f"{operand} = data[at + 4 : at + 3 + {length}].decode()")
             self.line(depth, f"at += {length}")
-            self.at = Alignment(1, 0)
+            self.lose_position()
         else:
             self.scalar(field.type, operand, depth)
 
@@ -112,13 +112,12 @@ class _Reader(FunctionWriter):
             self.align(size, depth)
             self.line(depth, f"{operand} = {view}[at >> {shift} : (at >> {shift}) + {field.length}]")
             self.line(depth, f"at += {size * field.length}")
-            self.at = self.at.after(size * field.length)
+            self.offset += size * field.length
             return
         count, empty = self.name("count"), self.name("empty")
         self.namespace[empty] = np.zeros(0, dtype)
         self.scalar("uint32", count, depth)
         self.flush(depth)
-        before = self.at
         self.line(depth, f"if {count}:")
         self.align(size, depth + 1)
         self.line(depth + 1, f"{operand} = {view}[at >> {shift} : (at >> {shift}) + {count}]")
@@ -126,7 +125,7 @@ class _Reader(FunctionWriter):
         self.line(depth, "else:")
         self.line(depth + 1, f"{operand} = {empty}")
         # Padding belongs to the first number and not to the count, so an empty sequence has none.
-        self.at = before.either(Alignment(size, 0))
+        self.base, self.offset = min(size, 4), 0
 
     def elements(self, field: Field, operand: str, depth: int) -> None:
         count = str(field.length)
@@ -156,4 +155,4 @@ class _Reader(FunctionWriter):
         self.line(depth + 1, f"{operand} = [*names]; at += len(known) - 4")
         self.line(depth, "else:")
         self.line(depth + 1, f"{operand}, at = strings(data, at, {count}, {memory})")
-        self.at = Alignment(1, 0)
+        self.lose_position()

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from rclzenoh.interfaces.catalog import Field, structure
-from rclzenoh.interfaces.layout import Alignment, FunctionWriter
+from rclzenoh.interfaces.layout import FunctionWriter
 from rclzenoh.interfaces.message import DTYPES, Message
 
 HEADER = b"\x00\x01\x00\x00"
@@ -116,7 +116,7 @@ class _Writer(FunctionWriter):
             self.scalar("uint32", f"len({text})", depth)
             self.flush(depth)
             self.line(depth, f"out += {text}")
-            self.at = Alignment(1, 0)
+            self.lose_position()
         else:
             self.scalar(field.type, f"check_bool({operand})" if field.type == "bool" else operand, depth)
 
@@ -133,15 +133,15 @@ class _Writer(FunctionWriter):
             self.align(size, depth)
             # The memory can be copied as it is, because `as_numbers` has made it contiguous and of the field's type.
             self.line(depth, f"out += {array}.data")
-            self.at = self.at.after(size * field.length)
+            self.offset += size * field.length
             return
         self.scalar("uint32", f"{array}.size", depth)
         self.flush(depth)
-        empty = self.at
         self.line(depth, f"if {array}.size:")
         self.align(size, depth + 1)
         self.line(depth + 1, f"out += {array}.data")
-        self.at = empty.either(Alignment(size, 0))
+        # An empty sequence ends with its count of four bytes.
+        self.base, self.offset = min(size, 4), 0
 
     def elements(self, field: Field, operand: str, depth: int) -> None:
         values = self.name("values")
@@ -153,7 +153,7 @@ class _Writer(FunctionWriter):
         if field.type == "string":
             self.align(4, depth)
             self.line(depth, f"out += strings(check_list({values}))")
-            self.at = Alignment(1, 0)
+            self.lose_position()
             return
         self.flush(depth)
         item = self.name("item")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import struct
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from math import gcd
 from typing import Any
 
 from rclzenoh.interfaces.catalog import Field
@@ -28,27 +26,6 @@ CODES = {
 """Format character of `struct` for each primitive."""
 
 
-@dataclass(frozen=True)
-class Alignment:
-    """A position in the body of which only the remainder is known: ``position = remainder (mod modulus)``."""
-
-    modulus: int
-    remainder: int
-
-    def padding(self, size: int) -> int | None:
-        """Bytes up to the next multiple of ``size``; None if the position is not known well enough."""
-        return -self.remainder % size if self.modulus % size == 0 else None
-
-    def after(self, count: int) -> Alignment:
-        """The position ``count`` bytes on."""
-        return Alignment(self.modulus, (self.remainder + count) % self.modulus)
-
-    def either(self, other: Alignment) -> Alignment:
-        """The knowledge of a position that may be either this one or the other one."""
-        modulus = gcd(self.modulus, other.modulus, self.remainder - other.remainder)
-        return Alignment(modulus, self.remainder % modulus)
-
-
 class FunctionWriter(ABC):
     """Writes the source of a function that goes through one structure, field by field; `namespace` has its globals.
 
@@ -59,7 +36,8 @@ class FunctionWriter(ABC):
     def __init__(self, **namespace: Any) -> None:
         self.lines: list[str] = []
         self.namespace = namespace
-        self.at = Alignment(8, 0)
+        # The position in the body is a multiple of the first number plus the second.
+        self.base, self.offset = 8, 0
         # Neighbouring primitives, collected for one call of `struct`.
         self.run_format = ""
         self.run_operands: list[str] = []
@@ -106,13 +84,12 @@ class FunctionWriter(ABC):
     def scalar(self, primitive: str, operand: str, depth: int) -> None:
         """Collect a primitive."""
         size = struct.calcsize(CODES[primitive])
-        padding = self.at.padding(size)
-        if padding is None:
+        if self.base < size:
             self.align(size, depth)
-            padding = 0
+        padding = -self.offset % size
         self.run_format += "x" * padding + CODES[primitive]
         self.run_operands.append(operand)
-        self.at = self.at.after(padding + size)
+        self.offset += padding + size
 
     def flush(self, depth: int) -> None:
         """Go through the primitives that were collected so far."""
@@ -122,25 +99,21 @@ class FunctionWriter(ABC):
 
     def align(self, size: int, depth: int) -> None:
         """Flush and go on to a multiple of a size, at run time if the position is not known well enough."""
-        padding = self.at.padding(size)
         self.flush(depth)
-        if padding != 0:
+        if self.base < size:
+            self.line(depth, self.pad(size, None))
+            self.base, self.offset = size, 0
+        elif padding := -self.offset % size:
             self.line(depth, self.pad(size, padding))
-        self.at = Alignment(size, 0) if padding is None else self.at.after(padding)
+            self.offset += padding
+
+    def lose_position(self) -> None:
+        """Note that nothing is known of the position any more, as after a string."""
+        self.base, self.offset = 1, 0
 
     def loop_body(self, field: Field, item: str, depth: int) -> None:
-        """Write the body of a loop over elements.
-
-        The code must be right for the first element and for later ones, which may begin at other positions. So it is
-        written again, with less knowledge of the position, until it is right for all elements.
-        """
-        entry, first_line = self.at, len(self.lines)
-        while True:
-            self.at = entry
-            self.element(field, item, depth)
-            self.flush(depth)
-            self.at = entry.either(self.at)
-            if self.at == entry:
-                return
-            entry = self.at
-            del self.lines[first_line:]
+        """Write the body of a loop over elements, which may begin anywhere."""
+        self.lose_position()
+        self.element(field, item, depth)
+        self.flush(depth)
+        self.lose_position()

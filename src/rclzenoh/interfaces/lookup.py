@@ -36,22 +36,14 @@ class Action:
 
 
 def get_message(name: str) -> type[AnyMessage]:
-    """Class of a message, such as ``sensor_msgs/msg/JointState``.
-
-    Raises:
-        ValueError: If no such message is known, or the name is not one of a message.
-    """
+    """Class of a message, such as ``sensor_msgs/msg/JointState``."""
     _expect_kind(name, "msg")
     return message_class(name)
 
 
 @cache
 def get_service(name: str) -> type[Service]:
-    """Class of a service, such as ``std_srvs/srv/Trigger``; it has the classes of the request and the response.
-
-    Raises:
-        ValueError: If no such service is known, or the name is not one of a service.
-    """
+    """Class of a service, such as ``std_srvs/srv/Trigger``; it has the classes of the request and the response."""
     _expect_kind(name, "srv")
     structure(name)  # This refuses an unknown service by its own name instead of that of its request.
     return _make_service(name)
@@ -59,11 +51,7 @@ def get_service(name: str) -> type[Service]:
 
 @cache
 def get_action(name: str) -> type[Action]:
-    """Class of an action, such as ``simulation_interfaces/action/SimulateSteps``; it has the classes of all its parts.
-
-    Raises:
-        ValueError: If no such action is known, or the name is not one of an action.
-    """
+    """Class of an action, such as ``control_msgs/action/FollowJointTrajectory``, with the classes of its parts."""
     _expect_kind(name, "action")
     structure(name)
     parts = {part: message_class(f"{name}_{part}") for part in ("Goal", "Result", "Feedback")}

@@ -7,7 +7,6 @@ lists.
 
 from __future__ import annotations
 
-import keyword
 from collections.abc import Callable, Iterable
 from functools import cache
 from operator import attrgetter
@@ -78,11 +77,7 @@ def is_numbers(field: Field) -> bool:
 
 @cache
 def message_class(name: str) -> type[AnyMessage]:
-    """Class of a message, or of a part of a service or action such as ``std_srvs/srv/Trigger_Response``.
-
-    Raises:
-        ValueError: If no such structure is known.
-    """
+    """Class of a message, or of a part of a service or action such as ``std_srvs/srv/Trigger_Response``."""
     definition = structure(name)
     members: dict[str, Any] = {
         "__slots__": tuple(f"_{field.name}" if is_numbers(field) else field.name for field in definition.fields),
@@ -91,8 +86,6 @@ def message_class(name: str) -> type[AnyMessage]:
         **definition.constants,
     }
     for field in definition.fields:
-        if keyword.iskeyword(field.name):
-            raise ValueError(f"{name}: field {field.name!r} is a Python keyword")
         if is_numbers(field):
             members[field.name] = _make_array_property(name, field)
     members["__init__"] = _make_initialiser(definition.fields)
@@ -106,10 +99,6 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
 
     The value is an array, a list, a tuple, an ``array.array``, or bytes for octets. Errors begin with ``where``, the
     name of the structure that has the field.
-
-    Raises:
-        TypeError: If the value is no sequence of such numbers.
-        ValueError: If a number does not fit the type, or there are too many or too few.
     """
     dtype = DTYPES[field.type]
     is_free = field.length is None and field.bound is None

@@ -185,7 +185,7 @@ def cover(
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help="Directory of the datasets, one for each round."),
     ] = None,
-    rounds: Annotated[int, typer.Option("--rounds", metavar="K", min=2, max=99, help="Number of rounds.")] = 8,
+    rounds: Annotated[int, typer.Option("--rounds", metavar="K", min=2, max=99, help="Number of rounds.")] = 12,
     simulations: SimulationsOption = None,
     settings: SetOption = None,
     runtime: RuntimeOption = None,

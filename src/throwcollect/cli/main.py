@@ -46,7 +46,7 @@ _add(
     node_commands.health,
     panel="Nodes, as `up` starts them",
 )
-_add(collect.launch, collect.begin, node_commands.simulate, hidden=True)
+_add(collect.launch, collect.begin, hidden=True)
 image_app.command("build")(image_commands.build)
 image_app.command("sif")(image_commands.sif)
 dataset_app.command("info")(info.show_info)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument
-from throwcollect.cli.streams import keep_output
 from throwcollect.config.default_path import DEFAULT_CONFIG
-from throwcollect.errors import LossError, NotFoundError
-from throwcollect.files import write_all
+from throwcollect.errors import LossError
 
 
 def router(
@@ -82,27 +79,6 @@ def coordinator(
         typer.echo(describe(info(directory)))
         raise
     typer.echo(describe(info(directory)))
-
-
-def simulate(directory: DatasetArgument, trials: list[int]) -> None:
-    """Simulate trials of a plan and print digests and results; the coordinator starts this command."""
-    from throwcollect.config.loader import load
-    from throwcollect.dataset.directory import CONFIG, PLAN
-    from throwcollect.replay.replayer import Replayer
-    from throwcollect.sweep.plan import Plan
-
-    # The coordinator reads standard output, so whatever engine, robot and task print must go elsewhere.
-    with keep_output() as results:
-        plan = Plan.read(directory / PLAN, load(directory / CONFIG))
-        known = plan.trials.numbers
-        if unknown := [trial for trial in trials if trial not in known]:
-            raise NotFoundError(f"{directory / PLAN}: no trial {unknown[0]}", expected=f"{known[0]} to {known[-1]}")
-        replayer = Replayer(plan.config)
-        for trial in trials:
-            delivery = replayer.delivery(plan.trial(trial))
-            columns = {"trial": trial, "digest": delivery.episode.digest, **json.loads(delivery.result)}
-            line = json.dumps(columns)
-            write_all(results, f"{line}\n".encode())
 
 
 def health(

@@ -11,8 +11,6 @@ import io
 import os
 import select
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
 from throwcollect.errors import OutputError
@@ -67,23 +65,6 @@ def has_reader() -> bool:
     poll.register(1, 0)
     # A pipe without a reader is reported as POLLERR, whatever events were asked for (poll(2)).
     return not any(happened & select.POLLERR for _, happened in poll.poll(0))
-
-
-@contextmanager
-def keep_output() -> Iterator[int]:
-    """Keep standard output for what the block writes into the descriptor that this yields.
-
-    Everything else that is printed meanwhile, even by libraries of other languages, goes to standard error.
-    """
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        yield kept
-    finally:
-        sys.stdout.flush()
-        os.dup2(kept, 1)
-        os.close(kept)
 
 
 def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -> None:

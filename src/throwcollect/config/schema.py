@@ -21,9 +21,8 @@ from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
-from throwcollect.config.task_config import TaskConfig
+from throwcollect.config.task_config import TaskConfig, UntilConfig
 from throwcollect.config.tool_config import ToolConfig
-from throwcollect.config.until import UntilConfig
 from throwcollect.members import find_broken, load_member, names_of, usable_names
 
 __all__ = [

@@ -17,7 +17,6 @@ from pydantic_core import CoreSchema
 from typing_extensions import Self
 
 from throwcollect.config.kinds import ContradictionError
-from throwcollect.errors import MemberError, ThrowcollectError
 
 
 class Section(BaseModel):
@@ -39,17 +38,7 @@ class Section(BaseModel):
 
     @model_validator(mode="after")
     def _refuse_contradictions(self) -> Self:
-        try:
-            wrong = dict(self._find_contradictions())
-        except ThrowcollectError:
-            raise
-        except Exception as error:
-            if type(self).__module__.partition(".")[0] == __name__.partition(".")[0]:
-                raise
-            where = f"{type(self).__module__}.{type(self).__qualname__}"
-            problem = f"{where} of another package cannot check its keys: {type(error).__name__}: {error}"
-            raise MemberError(problem, hint="mend or uninstall that package") from error
-        if wrong:
+        if wrong := dict(self._find_contradictions()):
             raise ContradictionError(wrong)
         return self
 

@@ -1,8 +1,9 @@
-"""Keys of every task: a motion of some joints from a start to an end."""
+"""Keys of every task: a motion of some joints, where it should end, and which outcome is a success."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
@@ -11,9 +12,56 @@ from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
 from throwcollect.config.section import Section
-from throwcollect.config.target_columns import TargetColumn
-from throwcollect.config.until import UntilConfig
 from throwcollect.wording import join_names, suggest
+
+Wanted = Annotated[int, Field(ge=1, le=1_000_000)]
+"""Number of trials that should end with an outcome."""
+
+TARGET_PREFIX = "target_"
+"""Prefix of the columns of targets. No other columns have it: keys have dots, and results have other names."""
+
+LARGEST_TARGET = 1e6
+"""Largest number of a target [m, rad, ...]: no robot reaches that far, and powers of it do not overflow."""
+
+
+@dataclass(frozen=True)
+class TargetColumn:
+    """A column of lists and tables that says where a trial should end; the trial itself does not depend on it.
+
+    Attributes:
+        name: Its name, which begins with `TARGET_PREFIX` and ends with its unit.
+        of: The column of the task's results, or the key given with a target, that should have the value.
+        miss: Column of the table of throws with the miss to which this column contributes.
+        word: Its name in sentences.
+        description: Its meaning, with the unit.
+        required: Whether a target has to have it.
+    """
+
+    name: str
+    of: str
+    miss: str
+    word: str
+    description: str
+    required: bool = False
+
+
+def is_target(column: str) -> bool:
+    """Whether a column of a list or a table is one of targets."""
+    return column.startswith(TARGET_PREFIX) and "." not in column
+
+
+class UntilConfig(Section):
+    """Base of the sections `until`: each has one key, the outcome that is counted, which holds a `Wanted`."""
+
+    @classmethod
+    def outcome(cls) -> str:
+        """Name the outcome that is counted."""
+        return next(iter(cls.model_fields))
+
+    @property
+    def wanted(self) -> int:
+        """Number of trials that should end with that outcome."""
+        return int(getattr(self, self.outcome()))
 
 
 class TaskConfig(Section):

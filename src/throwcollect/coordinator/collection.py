@@ -23,7 +23,7 @@ from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.episode_message import Delivery, Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.sweep.plan import Check, refusal
 from throwcollect.tasks.result import Result
@@ -197,7 +197,7 @@ class TrialCollection:
             held = (*held, trial)
         return held
 
-    def take_in(self, simulation: str, delivery: Delivery) -> bool:
+    def take_in(self, simulation: str, episode: Episode) -> bool:
         """Take in an episode, which `write_one` writes later; refuse one that is not what the plan asks for.
 
         The first episode of a trial counts, whoever holds the trial by now, and further ones are dropped.
@@ -205,14 +205,13 @@ class TrialCollection:
         Returns:
             Whether it was taken in.
         """
-        episode = delivery.episode
         trial = episode.header.trial
         if not self._leases.is_open(trial):
             return False
         try:
-            result = self._columns.from_json(self._outcome_names, delivery.result)
+            result = self._columns.from_json(self._outcome_names, episode.result)
             plan = self.writer.plan
-            reason = self._acceptance.find_difference(delivery.conditions, plan, plan.trial(trial))
+            reason = self._acceptance.find_difference(episode.conditions, plan, plan.trial(trial))
         except DatasetError as error:
             reason = error.message
         if reason is not None:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import IO
+from typing import TYPE_CHECKING
 
+from throwcollect.config.loader import load
+from throwcollect.dataset.directory import CONFIG, PLAN
 from throwcollect.dataset.throws_table import Row
-from throwcollect.errors import DatasetError, WorkerError
-from throwcollect.interruption import die_with_parent
-from throwcollect.own_process import make_command
+from throwcollect.errors import DatasetError
+from throwcollect.side_by_side import Workers
+from throwcollect.sweep.plan import Plan
 from throwcollect.trial.choice import choose_trials
 from throwcollect.wording import format_count
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 
 class ReplayCheck:
@@ -38,13 +40,13 @@ class ReplayCheck:
         self._count = count
         self._seed = seed
         self.begun = False
-        self._early: _Process | None = None
+        self._again: dict[int, Future[Row]] = {}
+        self._held = ExitStack()
 
     def begin(self, trials: Sequence[int]) -> None:
         """Start to simulate the trials that will be chosen if all of these, the trials of the plan, get an episode."""
         self.begun = True
-        if chosen := choose_trials(trials, count=self._count, seed=self._seed):
-            self._early = _Process(self._directory, chosen)
+        self._simulate(choose_trials(trials, count=self._count, seed=self._seed))
 
     def compare(self, rows: Mapping[int, Row], *, meanwhile: Callable[[], None]) -> str | None:
         """Compare episodes and results of some trials, and return a sentence on that; None if there are no trials.
@@ -55,15 +57,13 @@ class ReplayCheck:
         """
         # The choice is made by place in the list, so the order must not depend on which episode came first.
         trials = choose_trials(list(rows), count=self._count, seed=self._seed)
-        again: dict[int, Row] = {}
-        if self._early is not None:
-            # If the guess was wrong, do not wait for the process: a trial that was lost may never end there, either.
-            if self._early.trials == trials:
-                self._early.wait(meanwhile)
-            self._early.end()
-            again = dict(self._early.results)
-        if missing := [trial for trial in trials if trial not in again]:
-            again |= _simulate(self._directory, missing, meanwhile)
+        if list(self._again) != trials:
+            # If the guess was wrong, do not wait: a trial that was lost may never end in that process, either.
+            self._simulate(trials)
+        while not all(future.done() for future in self._again.values()):
+            meanwhile()
+        again = {trial: self._workers.wait(future) for trial, future in self._again.items()}
+        self.close()
         wrong = {trial: sentence for trial in trials if (sentence := _find_difference(rows[trial], again[trial]))}
         if wrong:
             counted = f"{len(wrong)} of {format_count(len(trials), 'trial')}"
@@ -80,68 +80,30 @@ class ReplayCheck:
 
     def close(self) -> None:
         """End the process, if one runs."""
-        if self._early is not None:
-            self._early.end()
+        self._held.close()
+
+    def _simulate(self, trials: Sequence[int]) -> None:
+        """Start a new process that simulates these trials, in order; the one before ends."""
+        self.close()
+        self._again = {}
+        if trials:
+            self._workers = Workers(_begin, (self._directory,), processes=1, doing="simulates trials again")
+            self._held.callback(self._workers.close)
+            self._again = dict(zip(trials, self._workers.submit(trials), strict=True))
 
 
-class _Process:
-    """A process that simulates trials and prints for each the columns of its row that follow from the simulation.
+def _begin(directory: Path) -> Callable[[int], Row]:
+    """Make the function that simulates a trial of the plan: digest of its episode, and columns of its result."""
+    from throwcollect.sim.simulator import Simulator
 
-    Attributes:
-        results: Values of these columns, by trial and column; empty until `end`.
-        errors: Text of its standard error; empty until `end`.
-        exit_code: Its exit code; None until `end`.
-    """
+    plan = Plan.read(directory / PLAN, load(directory / CONFIG))
+    simulator = Simulator(plan.config)
 
-    def __init__(self, directory: Path, trials: Sequence[int]) -> None:
-        self.trials = trials
-        self.results: dict[int, Row] = {}
-        self.errors = ""
-        self.exit_code: int | None = None
-        # Files instead of pipes, because nobody reads while it works, and a full pipe would stop it.
-        self._stdout, self._stderr = TemporaryFile(), TemporaryFile()  # noqa: SIM115 - closed at its end
-        self._process = subprocess.Popen(
-            [*make_command(), "simulate", str(directory), *map(str, trials)],
-            stdin=subprocess.DEVNULL,
-            stdout=self._stdout,
-            stderr=self._stderr,
-            # Ctrl-C reaches only the process of this object, which then ends the new one.
-            start_new_session=True,
-            preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
-        )
+    def simulate(trial: int) -> Row:
+        episode = simulator.run(plan.trial(trial))
+        return {"digest": episode.digest, **json.loads(episode.result)}
 
-    def wait(self, meanwhile: Callable[[], None]) -> None:
-        """Wait until the process has simulated all trials, or has ended."""
-        while self._process.poll() is None and _read_contents(self._stdout).count("\n") < len(self.trials):
-            meanwhile()
-
-    def end(self) -> None:
-        """Kill it; a second call does no harm."""
-        # Ending by itself would take the process time, and everything that is needed from it is in the files.
-        self._process.kill()
-        self.exit_code = self._process.wait()
-        if not self._stdout.closed:
-            with self._stdout, self._stderr:
-                lines = _read_contents(self._stdout).splitlines(keepends=True)
-                self.errors = _read_contents(self._stderr).strip()
-            # The kill may have cut off the last line.
-            whole = (json.loads(line) for line in lines if line[-1] == "\n")
-            self.results = {printed["trial"]: printed for printed in whole}
-
-
-def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, Row]:
-    """Simulate trials in a fresh process, and return the columns that follow from the simulation, by trial."""
-    process = _Process(directory, trials)
-    try:
-        process.wait(meanwhile)
-    finally:
-        process.end()
-    if len(process.results) < len(trials):
-        counted = format_count(len(trials), "trial")
-        raise WorkerError(
-            f"{counted} could not be simulated again (exit code {process.exit_code})", evidence=process.errors or None
-        )
-    return process.results
+    return simulate
 
 
 def _find_difference(row: Row, again: Row) -> str | None:
@@ -150,8 +112,3 @@ def _find_difference(row: Row, again: Row) -> str | None:
         if again[column] != row[column]:
             return f"{column} is {row[column]} in the dataset, {again[column]} in the fresh process"
     return None
-
-
-def _read_contents(file: IO[bytes]) -> str:
-    # The process shares the file's position and writes there, so read without moving it.
-    return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode(errors="replace")

@@ -24,10 +24,10 @@ from throwcollect.coordinator.prepare import (
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import entry_of, entry_of_file, find_damage, is_begun
+from throwcollect.dataset.manifest import entry_of, entry_of_file, is_begun
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
-from throwcollect.dataset.verify_plan import find_wrong_trials, read_list
+from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan

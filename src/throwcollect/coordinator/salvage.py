@@ -10,10 +10,9 @@ from pathlib import Path
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.resume import resume
-from throwcollect.dataset.directory import METADATA, PROVENANCE, SHARD_SUFFIX, THROWS
+from throwcollect.dataset.directory import METADATA, SHARD_SUFFIX, THROWS
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.manifest import was_changed
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws_table
 from throwcollect.dataset.writer import DatasetWriter
@@ -40,9 +39,7 @@ def finish_without_simulating(
     if is_there(directory / METADATA):
         onlooker.say(f"{directory}: is finished, and no file of it is missing or damaged")
         return
-    table = ThrowsTable.of(plan)
-    # Provenance whose bytes were changed must not get a new hash.
-    provenance = None if was_changed(directory, PROVENANCE) else read_provenance(directory)
+    table, provenance = ThrowsTable.of(plan), read_provenance(directory)
     rows: Mapping[int, Row] = {}
     with suppress(DatasetError):
         rows = RowsByTrial(read_throws_table(directory / THROWS, plan))

@@ -1,8 +1,8 @@
 """The manifest ``datapackage.json``: size and hash of every file that a dataset promises.
 
 It is a Frictionless Data Package (https://specs.frictionlessdata.io/data-package/), so other tools can check it, too.
-It follows from the files alone and its text is canonical: equal files give equal bytes. Two collections of one dataset
-differ in `README.md` and `provenance.json`, so their manifests differ in two hashes, and their digest is the same.
+It follows from the files alone and its text is canonical: equal files give equal bytes. Data card and provenance, in
+which two collections of one dataset differ, are not in it; the provenance has hashes of both.
 """
 
 from __future__ import annotations
@@ -18,13 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.directory import (
-    CARD,
     CONFIG,
     JOURNAL,
     MANIFEST,
     METADATA,
     PLAN,
-    PROVENANCE,
     SHARD_SUFFIX,
     SOURCES,
     THROWS,
@@ -38,8 +36,8 @@ from throwcollect.wording import command
 
 _PROFILE = "data-package"
 _HASH = "sha256:"
-DESCRIBING = (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE)
-"""Files beside the recordings and ``metadata.yaml`` that a dataset may have."""
+DESCRIBING = (CONFIG, PLAN, TRIALS, SOURCES, THROWS)
+"""Files beside the recordings and ``metadata.yaml`` that the manifest has, as far as a dataset has them."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 """A file name without directories, so that no manifest can name a file outside of the dataset."""
 _MOST_BYTES = 100_000_000
@@ -127,7 +125,7 @@ class RunningHash:
 def list_promised_names(directory: Path) -> list[str]:
     """List the names of the files in a directory that a manifest has to cover, in order.
 
-    The logs are not among them, as simulations and later commands still write into them.
+    Data card, provenance and logs are not among them, as they differ between equal collections.
     """
     known = {METADATA, *DESCRIBING}
     names = os.listdir(directory)
@@ -182,36 +180,6 @@ def was_changed(directory: Path, name: str) -> bool:
         return any(entry != entry_of_file(directory / name) for entry in entries)
     except DatasetError:
         return False
-
-
-def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Finding]:
-    """Find where the manifest of a dataset and its files differ; every byte of the promised files is read.
-
-    The name of the collection is compared, too, unless it is unknown (None).
-    """
-    if not (directory / MANIFEST).exists():
-        yield Finding(MANIFEST, "", "is missing, so changed bytes may go unnoticed")
-        return
-    try:
-        name_there, entries = read_named_manifest(directory)
-    except DatasetError as error:
-        yield Finding(MANIFEST, "", error.problem)
-        return
-    if name is not None and name_there != name:
-        yield Finding(MANIFEST, "name", f"is {name_there!r}, in the configuration {name!r}")
-    covered = {entry.path for entry in entries}
-    yield from find_changed_files(directory, entries, in_full=True)
-    yield from (
-        Finding(path, "", f"is not in {MANIFEST}") for path in list_promised_names(directory) if path not in covered
-    )
-
-
-def find_damage(directory: Path, *, in_full: bool) -> list[Finding]:
-    """Find the files of a finished dataset that are missing, or not as its manifest says; see `find_changed_files`."""
-    try:
-        return list(find_changed_files(directory, read_manifest(directory), in_full=in_full))
-    except DatasetError as error:
-        return [Finding.of(MANIFEST, error)]
 
 
 def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target_columns import is_target
+from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.sweep.arrow_column import nan_where_null

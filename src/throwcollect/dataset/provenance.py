@@ -1,30 +1,34 @@
 """How a dataset was collected: ``provenance.json``.
 
-Where, when and how fast a collection ran does not follow from its configuration, so the digest of the dataset does not
-cover this file; the manifest does. It and the data card, which shows it to people, may differ between two collections
-of one configuration.
+Where, when and how fast a collection ran does not follow from its configuration, so neither digest nor manifest cover
+this file. It and the data card, which shows it to people, may differ between two collections of one configuration. The
+file has the SHA-256 of the data card and of its own other lines, so that changed bytes of both are found.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import platform
 import socket
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from throwcollect.dataset.directory import PROVENANCE
+from throwcollect.dataset.directory import CARD, PROVENANCE
+from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.manifest import entry_of_file
 from throwcollect.errors import DatasetError
-from throwcollect.files import read_text, write_file
+from throwcollect.files import is_there, read_text, write_file
 from throwcollect.version import __version__
 
 HOST_VARIABLE = "THROWCOLLECT_HOST"
@@ -45,6 +49,8 @@ _LIBRARIES = (
 )
 _MOST_BYTES = 1_000_000
 _GIT_S = 5.0
+_OWN_HASH = "sha256"
+_CARD_HASH = "card_sha256"
 _OPEN = "anybody who reached the router could join, read and disturb the collection"
 
 
@@ -90,7 +96,7 @@ class Provenance:
             host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
             platform=platform.platform(),
             python=platform.python_version(),
-            libraries={"throwcollect": __version__, **_find_versions()},
+            libraries=find_versions(),
             simulations=simulations,
             wall_s=wall_s,
             was_open=was_open,
@@ -118,15 +124,47 @@ class Provenance:
 
 
 def write_provenance(directory: Path, provenance: Provenance) -> None:
-    """Write how a dataset was collected beside its data card."""
-    write_file(directory / PROVENANCE, _JSON.dump_json(provenance, indent=2) + b"\n")
+    """Write how a dataset was collected beside its data card, which is there already."""
+    document = _JSON.dump_python(provenance, mode="json") | {_CARD_HASH: entry_of_file(directory / CARD).sha256}
+    write_file(directory / PROVENANCE, _seal(document).encode())
 
 
 def read_provenance(directory: Path) -> Provenance | None:
-    """Read how a dataset was collected; None if the file is missing or damaged."""
-    with suppress(DatasetError, ValidationError):
-        return _JSON.validate_json(read_text(directory / PROVENANCE, most_bytes=_MOST_BYTES))
+    """Read how a dataset was collected; None if the file is damaged or missing."""
+    with suppress(DatasetError):
+        return _load(directory / PROVENANCE)[0]
     return None
+
+
+def find_changes(directory: Path) -> Iterator[Finding]:
+    """Find changed bytes of the provenance of a dataset and of its data card."""
+    try:
+        _, card = _load(directory / PROVENANCE)
+        if is_there(directory / CARD) and entry_of_file(directory / CARD).sha256 != card:
+            yield Finding(CARD, "", f"its bytes were changed: it has another SHA-256 than {PROVENANCE} says")
+    except DatasetError as error:
+        yield Finding.of(error.path.name if error.path else PROVENANCE, error)
+
+
+def _load(path: Path) -> tuple[Provenance, str]:
+    """Read the provenance and the hash of the data card; a changed byte of the file is an error."""
+    text = read_text(path, most_bytes=_MOST_BYTES)
+    try:
+        document = json.loads(text)
+        del document[_OWN_HASH]
+        card = str(document.pop(_CARD_HASH))
+        provenance = _JSON.validate_python(document)
+        if _seal(document | {_CARD_HASH: card}) == text:
+            return provenance, card
+    except (ValueError, LookupError, TypeError) as error:
+        raise DatasetError("is damaged", path=path) from error
+    raise DatasetError("its bytes were changed: it does not have the SHA-256 that it states", path=path)
+
+
+def _seal(document: Mapping[str, Any]) -> str:
+    """Write a document in JSON, with the SHA-256 of its text as the last line."""
+    digest = hashlib.sha256(json.dumps(document, indent=2).encode()).hexdigest()
+    return json.dumps({**document, _OWN_HASH: digest}, indent=2) + "\n"
 
 
 @cache
@@ -146,8 +184,9 @@ def _read_revision() -> str | None:
 
 
 @cache
-def _find_versions() -> Mapping[str, str]:
-    versions = {}
+def find_versions() -> Mapping[str, str]:
+    """Find the versions of the product and of the installed libraries that the data pass through."""
+    versions = {"throwcollect": __version__}
     for name in _LIBRARIES:
         # A machine that only coordinates has no engines.
         with suppress(PackageNotFoundError):

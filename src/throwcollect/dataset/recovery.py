@@ -104,8 +104,6 @@ def find_left(
 ) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, in several of them at a time if there are many episodes. Changes nothing.
 
-    If there is more than one process, they may import the program that calls this, as those of `multiprocessing` do.
-
     Yields:
         What is left of each, in order.
     """

@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
-from throwcollect.config.target_columns import TARGET_PREFIX, is_target
+from throwcollect.config.task_config import TARGET_PREFIX, is_target
 from throwcollect.config.values import column_of
 from throwcollect.dataset.directory import SOURCES, THROWS, list_shards
 from throwcollect.dataset.misses import Misses

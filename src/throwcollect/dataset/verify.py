@@ -11,49 +11,57 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import read_bag_metadata, refuse_other_directory
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, THROWS, TRIALS, config_path, shard_of
+from throwcollect.dataset.directory import (
+    CARD,
+    CONFIG,
+    MANIFEST,
+    METADATA,
+    PLAN,
+    PROVENANCE,
+    THROWS,
+    TRIALS,
+    config_path,
+    shard_of,
+)
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.manifest import find_manifest_problems
+from throwcollect.dataset.manifest import find_changed_files, list_promised_names, read_manifest
 from throwcollect.dataset.misses import read_targets
+from throwcollect.dataset.provenance import find_changes
 from throwcollect.dataset.summary_files import combine_digests, metadata_text
 from throwcollect.dataset.throws_table import ThrowsTable, read_throws
-from throwcollect.dataset.verify_plan import (
-    CheckOf,
-    find_drawing_problems,
-    find_refusal_problems,
-    find_wrong_trials,
-    read_list,
-)
 from throwcollect.dataset.verify_recording import RecordingReport, check_recording
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
-from throwcollect.files import read_text
+from throwcollect.files import is_there, read_text
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
+from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.point_file import read_points
+from throwcollect.sweep.points import Points
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
 _MOST_BYTES = 100_000_000
 
 
-def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int = 1) -> list[Finding]:
+def verify(directory: Path, *, processes: int = 1) -> list[Finding]:
     """Check a dataset.
 
-    Checked are: size and hash of every file that the manifest covers; the plan, which is drawn again from the
-    configuration; the columns of the table of throws; of each recording every byte, which is written again from its
-    episodes; of each episode its hashes, its row in the table, for which it is judged again, and whether the ball flies
-    ballistically where nothing touches it; the bag's metadata and the digest in them. Checks that need packages that
-    are not installed are left out; `find_unchecked` names them.
+    Checked are: size and hash of every file but logs; whether configuration and plan belong together; the columns of
+    the table of throws; of each recording every byte, which is written again from its episodes; of each episode its
+    hashes, its row in the table, for which it is judged again, and whether the ball flies ballistically where nothing
+    touches it; the bag's metadata and the digest in them. Checks that need packages that are not installed are left
+    out; `find_unchecked` names them.
 
     Args:
         directory: Its directory.
-        check_of: Makes the check that says which trials the plan refuses; None leaves refusals unchecked.
         processes: How many processes may check the recordings of a large dataset. If more than one, they may import the
             program that calls this, as those of `multiprocessing` do.
 
@@ -70,14 +78,10 @@ def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int =
         findings.append(Finding.of(METADATA, error))
         readable = False
     tables = _read_tables(directory)
-    # Other processes check the recordings, while this one hashes files and draws the plan again.
+    # Other processes check the recordings, while this one hashes files.
     with _checking_recordings(directory, tables, processes) as checked:
-        findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
+        findings += find_damage(directory, in_full=True)
         findings += tables.findings
-        if tables.plan is not None:
-            findings += find_drawing_problems(directory, tables.plan, tables.throws)
-            if check_of is not None and robot_is_available(tables.plan.config):
-                findings += find_refusal_problems(tables.plan, tables.wrong, check_of)
         reports = list(checked)
     findings += [finding for report in reports for finding in report.findings]
     if readable and tables.throws is not None:
@@ -87,20 +91,36 @@ def verify(directory: Path, *, check_of: CheckOf | None = None, processes: int =
 
 def find_unchecked(config: Config) -> tuple[str, ...]:
     """List what `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if nothing."""
-    return () if robot_is_available(config) else ("whether the robot can do the trials", "what came of the throws")
+    return () if robot_is_available(config) else ("what came of the throws",)
+
+
+def find_damage(directory: Path, *, in_full: bool) -> list[Finding]:
+    """Find the files of a finished dataset that are missing, changed, or not in its manifest.
+
+    Data card and provenance differ between equal collections, so they are not in the manifest; the provenance has their
+    hashes. In full, every byte of each file is read, or else only its size is compared.
+    """
+    findings = [Finding(name, "", "is missing") for name in (CARD, PROVENANCE) if not is_there(directory / name)]
+    if in_full and is_there(directory / PROVENANCE):
+        findings += find_changes(directory)
+    try:
+        entries = read_manifest(directory)
+    except DatasetError as error:
+        return [*findings, Finding.of(MANIFEST, error)]
+    covered = {entry.path for entry in entries}
+    findings += find_changed_files(directory, entries, in_full=in_full)
+    return findings + [
+        Finding(name, "", f"is not in {MANIFEST}") for name in list_promised_names(directory) if name not in covered
+    ]
 
 
 @dataclass
 class _Tables:
-    """The contents of the files beside the recordings, as far as they can be read, and what is wrong with them.
-
-    `wrong` are the trials whose values or seed in the plan do not fit their digest.
-    """
+    """The contents of the files beside the recordings, as far as they can be read, and what is wrong with them."""
 
     config: Config | None = None
     plan: Plan | None = None
     throws: pa.Table | None = None
-    wrong: frozenset[int] = frozenset()
     findings: list[Finding] = field(default_factory=list)
 
 
@@ -114,10 +134,9 @@ def _read_tables(directory: Path) -> _Tables:
         if config.sweep.file == TRIALS:
             file = TRIALS
             read_list(directory, plan)
-        for trial, digest in (wrong := find_wrong_trials(plan)).items():
+        for trial, digest in find_wrong_trials(plan).items():
             problem = f"has digest {plan.trial(trial).digest}, its values and seed give {digest}"
             tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
-        tables.wrong = frozenset(wrong)
         file = THROWS
         tables.throws = throws = read_throws(directory, plan)
         tables.findings += _find_unit_problems(throws.schema, ThrowsTable.of(plan).schema)
@@ -193,3 +212,28 @@ def _find_metadata_problems(directory: Path, throws: pa.Table, reports: list[Rec
         )
         problem = f"is {line.strip()[:200]!r}, the recordings give {wanted.strip()!r}" if number else "has another end"
         yield Finding(METADATA, f"line {number}" if number else "", problem)
+
+
+def read_list(directory: Path, plan: Plan) -> Points:
+    """Read the list of points that a dataset's own configuration names."""
+    path = directory / TRIALS
+    if not path.exists():
+        raise DatasetError("is missing", path=path)
+    try:
+        points = read_points(path, plan.config)
+    except ConfigError as error:
+        raise DatasetError(error.problems[0].message, path=path) from error
+    if points[: len(plan.trials)] != plan.trials.points:
+        raise DatasetError(f"begins with other points than those of {PLAN}", path=path)
+    return points
+
+
+def find_wrong_trials(plan: Plan) -> dict[int, str]:
+    """Find the trials of a plan that were changed since it was made, and the digests that their values and seeds give.
+
+    Every trial has its digest in the plan.
+    """
+    trials = plan.trials
+    digests = trial_digests(plan.config, trials.points, trials.seeds)
+    wrong = np.flatnonzero((digests != trials.digests).any(axis=1)).tolist()
+    return {trials.first + row: digests[row].tobytes().hex() for row in wrong}

@@ -237,8 +237,8 @@ class DatasetWriter:
         )
         # How it was run must not change the dataset, so only data card and provenance say that.
         config = self._config.without_run()
-        write_provenance(self._directory, provenance)
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
+        write_provenance(self._directory, provenance)
         write_file(self._directory / CONFIG, dump_yaml(config).encode())
         recordings = [self._recordings[number] for number in sorted(self._recordings)]
         write_description(self._directory, config.name, throws, self._channels, recordings)

@@ -14,7 +14,6 @@ import pyarrow as pa
 
 from throwcollect.config.values import column_of
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.directory import CARD, SOURCES, shard_of
 from throwcollect.dataset.manifest import FileEntry, RunningHash
@@ -114,9 +113,9 @@ def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
     provenance = Provenance.of_this_machine(
         simulations=None, wall_s=time.monotonic() - began, was_open=False, robot=channels.robot
     )
-    write_provenance(directory, provenance)
     write_file(directory / SOURCES, encode_table(_tabulate_sources(copies, sources)))
     write_file(directory / CARD, (data_card(plan.config, throws, provenance) + _describe_sources(sources)).encode())
+    write_provenance(directory, provenance)
     write_description(directory, plan.config.name, throws, channels, recordings)
     return len(copies), Dataset.open(directory).digest
 
@@ -142,8 +141,9 @@ def _read_channels(sources: Sequence[Dataset]) -> Channels:
 
 
 def _read(source: Dataset, row: Row) -> Episode:
-    with locating_damage(source, row["trial"]):
-        episode = source.episode(row["trial"])
+    throw = source.throw(row["trial"])
+    with throw.locating_damage():
+        episode = throw.read_episode()
         # The copy gets hashes of its own, which would make damage look as if it had been recorded.
         episode.chunk.check_records()
         if episode.digest != row["digest"]:

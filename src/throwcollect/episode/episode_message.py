@@ -46,11 +46,15 @@ class Episode:
     Attributes:
         header: The facts besides the samples.
         chunk: The recorded messages, with their hash.
+        result: Result of the trial in JSON; empty if no simulation has judged the episode.
+        conditions: Conditions of the episode in JSON; empty if it comes from a file.
     """
 
-    def __init__(self, header: EpisodeHeader, chunk: Chunk) -> None:
+    def __init__(self, header: EpisodeHeader, chunk: Chunk, *, result: str = "", conditions: str = "") -> None:
         self.header = header
         self.chunk = chunk
+        self.result = result
+        self.conditions = conditions
 
     @cached_property
     def header_json(self) -> str:
@@ -115,17 +119,6 @@ def _make_layout() -> MessageLayout:
     return MessageLayout(message, [f"layout.dim.{n}.{key}" for n in range(len(_PARTS)) for key in ("size", "stride")])
 
 
-class Delivery(NamedTuple):
-    """An episode that a simulation hands over, with its conditions and the result of the trial, both in JSON.
-
-    The result is empty if the simulation has not judged the episode.
-    """
-
-    episode: Episode
-    result: str
-    conditions: str
-
-
 class TrialRefusal(NamedTuple):
     """A refusal of a simulation to do a trial."""
 
@@ -133,18 +126,17 @@ class TrialRefusal(NamedTuple):
     reason: str
 
 
-def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
+def pack(handed: Episode | TrialRefusal, signer: Signer) -> bytes:
     """Encode the CDR message that carries an episode or a refusal."""
     if isinstance(handed, TrialRefusal):
         parts = [b"", handed.reason.encode(), str(handed.trial).encode(), b"", b""]
     else:
-        episode = handed.episode
         parts = [
-            episode.header_json.encode(),
+            handed.header_json.encode(),
             handed.result.encode(),
             handed.conditions.encode(),
-            bytes.fromhex(episode.chunk.records_sha256),
-            b"".join((episode.chunk.record(), *episode.message_indexes.values())),
+            bytes.fromhex(handed.chunk.records_sha256),
+            b"".join((handed.chunk.record(), *handed.message_indexes.values())),
         ]
     signature = signer.sign(*parts).encode()
     return b"".join((_encode_prefix([*map(len, parts), len(signature)]), *parts, signature))
@@ -159,7 +151,7 @@ def _encode_prefix(sizes: list[int]) -> bytes:
     return bytes(prefix)
 
 
-def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
+def unpack(message: bytes, signer: Signer) -> Episode | TrialRefusal:
     """Read the message that `pack` writes, without decompressing chunks."""
     layout = _make_layout()
     length = len(layout.template)
@@ -186,4 +178,5 @@ def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
         raise DatasetError("episode: its result or its conditions cannot be read") from error
     if len(records_hash) != _HASH_BYTES:
         raise DatasetError(f"episode: a hash of {len(records_hash)} bytes", expected=f"{_HASH_BYTES}")
-    return Delivery(Episode(header_from_json(bytes(header)), Chunk.parse_indexed(chunk, records_hash.hex())), *texts)
+    recorded = Chunk.parse_indexed(chunk, records_hash.hex())
+    return Episode(header_from_json(bytes(header)), recorded, result=texts[0], conditions=texts[1])

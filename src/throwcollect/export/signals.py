@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from throwcollect.config.target_columns import TargetColumn
+from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.trajectory_columns import name_components
 from throwcollect.units import ascii_unit, unit_of_name
 

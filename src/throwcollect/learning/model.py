@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from throwcollect.arguments import check_bounds, read_word, refuse_argument
 from throwcollect.config.loader import dump_yaml
-from throwcollect.config.target_columns import LARGEST_TARGET
+from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath

@@ -7,11 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
-from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
-from throwcollect.extras import require
+from throwcollect.extras import require, require_engine
 from throwcollect.progress_log import log_progress
 from throwcollect.replay.comparison import Comparison, compare
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
@@ -52,17 +50,18 @@ def require_simulating(engine: str) -> None:
 def _begin(directory: Path) -> Callable[[int], Comparison]:
     """Open dataset and simulation in a process, which keeps both from one trial to the next."""
     # This import needs the extra `collect`, but datasets can be verified without it.
-    from throwcollect.replay.replayer import Replayer
+    from throwcollect.sim.simulator import Simulator
 
     dataset = Dataset.open(directory)
-    replayer = Replayer(dataset.config)
+    simulator = Simulator(dataset.config)
 
     def replay(number: int) -> Comparison:
         """Simulate a trial, and compare it with the stored one."""
         # A merged dataset has numbers of its own, and episodes those of their own plans.
         trial = replace(dataset.plan.trial(number), number=number - dataset.plan.first_of_part(number))
-        again = replayer.run(trial)
-        with locating_damage(dataset, number):
-            return replace(compare(dataset.episode(number), again), trial=number)
+        again = simulator.run(trial)
+        stored = dataset.throw(number)
+        with stored.locating_damage():
+            return replace(compare(stored.read_episode(), again), trial=number)
 
     return replay

@@ -15,7 +15,7 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError
 from throwcollect.members import names_of
 from throwcollect.replay.audit import simulate_side_by_side
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 from throwcollect.wording import join_names, suggest
 
 LANDING = ("landing_x_m", "landing_y_m")
@@ -85,12 +85,12 @@ def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
     plan, own = dataset.plan, dataset.config
     config = own.model_copy(update={"sim": own.sim.model_copy(update={"engine": engine})})
     table = ThrowsTable(plan.keys, config, plan.trials.target_names)
-    replayer = Replayer(config)
+    simulator = Simulator(config)
 
     def simulate(number: int) -> Deviation:
         """Simulate a trial, and compare its row with the stored one."""
         trial = plan.trial(number)
-        result = judge_episode(with_values(config, trial.values), replayer.run(trial))
+        result = judge_episode(with_values(config, trial.values), simulator.run(trial))
         stored, again = dataset.select([number])[0].row, table.row(trial, result, None)
         # Columns of text, and numbers that only one of the two rows has, cannot be compared.
         compared = [

@@ -1,38 +1,34 @@
-"""All checks of a finished dataset in one call: files, physics, refusals of the plan, and throws simulated again."""
+"""All checks of a finished dataset in one call: its files, rows and episodes, and some throws simulated again."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 from throwcollect.arguments import check_bounds
-from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.provenance import find_versions, read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import DatasetError
+from throwcollect.extras import MissingExtraError
 from throwcollect.files import StrPath
 from throwcollect.replay.audit import replay_throws, require_simulating, select_trials
 
+SAMPLE = 10
+"""How many throws are simulated again if nobody says how many."""
 
-def verify_dataset(
-    directory: StrPath,
-    *,
-    replay: int | None = None,
-    processes: int = 1,
-) -> list[Finding]:
-    """Check a finished dataset: its files against each other, its episodes against physics, its plan against the robot.
 
-    Checks that take the robot's model are left out without the extra ``collect``; `dataset.verify.find_unchecked` names
-    them.
+def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: int = 1) -> list[Finding]:
+    """Check a finished dataset: files against the manifest, rows against plan and episodes, flights against physics.
+
+    Some throws, chosen by the seed of the dataset, are simulated again and compared bit for bit. Checks that take the
+    robot's model are left out without the extra ``collect``; `dataset.verify.find_unchecked` names them.
 
     Args:
         directory: Its directory.
-        replay: How many throws, chosen by the seed of the dataset, to simulate again and to compare bit for bit; None
-            for none.
-        processes: How many processes may check the recordings of a large dataset; if there are several, each imports
-            the main program, as processes of `multiprocessing` do.
+        replay: How many throws to simulate again; None for 10 if that can give the same bits here (`count_replayed`).
+        processes: How many processes may check the recordings of a large dataset.
 
     Returns:
         The problems, file by file; empty if there are none.
@@ -44,28 +40,41 @@ def verify_dataset(
         WorkerError: If the physics engine does not start.
     """
     check_bounds("processes", processes, least=1)
+    directory = Path(directory)
     if replay is not None:
         check_bounds("replay", replay, least=0)
-        # If the dataset cannot be opened, `verify` below reports why.
-        with suppress(DatasetError):
-            require_simulating(Dataset.open(directory).config.sim.engine)
-    directory = Path(directory)
-    findings = verify(directory, check_of=feasibility_check, processes=processes)
-    if replay is not None:
-        findings += _replay_findings(directory, replay)
+    findings = verify(directory, processes=processes)
+    try:
+        dataset = Dataset.open(directory)
+        if count := count_replayed(dataset, replay):
+            require_simulating(dataset.config.sim.engine)
+            findings += _find_different_throws(dataset, count)
+    except DatasetError as error:
+        if not findings:
+            findings.append(Finding("", "", f"cannot be replayed: {error.message}"))
     return findings
 
 
-def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
+def count_replayed(dataset: Dataset, replay: int | None) -> int:
+    """Count the throws that `verify_dataset` simulates again.
+
+    Without a wish, throws are simulated again only where engine and libraries have the versions by which the dataset
+    was collected, as others may give other bits.
+    """
+    if replay is None:
+        provenance = read_provenance(dataset.directory)
+        try:
+            require_simulating(dataset.config.sim.engine)
+        except MissingExtraError:
+            return 0
+        replay = SAMPLE if provenance is not None and provenance.libraries == find_versions() else 0
+    return min(replay, len(dataset.recorded))
+
+
+def _find_different_throws(dataset: Dataset, count: int) -> Iterator[Finding]:
     """Find throws that do not come out of the simulation as they are stored."""
-    try:
-        dataset = Dataset.open(directory)
-        shards = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["shard"].to_pylist(), strict=True))
-        for comparison in replay_throws(directory, select_trials(dataset, sample=count)):
-            if comparison.differences:
-                problem = f"comes out differently: {'; '.join(comparison.differences)}"
-                yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)
-    except DatasetError as error:
-        # The hint of the error would recommend the command that has called this function.
-        error.hint = None
-        yield Finding("", "", f"cannot be replayed: {error}")
+    shards = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["shard"].to_pylist(), strict=True))
+    for comparison in replay_throws(dataset.directory, select_trials(dataset, sample=count)):
+        if comparison.differences:
+            problem = f"comes out differently: {'; '.join(comparison.differences)}"
+            yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)

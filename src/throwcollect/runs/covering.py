@@ -18,8 +18,6 @@ from throwcollect.files import write_file
 from throwcollect.runs.preparation import prepare, resume
 from throwcollect.sweep.point_file import encode_points
 
-ROUNDS = 8
-
 
 @dataclass(frozen=True)
 class Round:
@@ -46,7 +44,7 @@ def cover(
     path: Path,
     directory: Path,
     *,
-    rounds: int = ROUNDS,
+    rounds: int,
     overrides: Sequence[str] = (),
     processes: int = 1,
     onlooker: Onlooker = SILENT,
@@ -69,9 +67,6 @@ def cover(
 
     Returns:
         The directories of the datasets, in order.
-
-    Raises:
-        ConfigError: If the configuration has no `sweep.target`, or something else that covering needs.
     """
     with load_locating_errors(path, overrides) as config:
         trials = _check(config, rounds)

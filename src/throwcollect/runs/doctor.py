@@ -14,12 +14,11 @@ from typing import Literal
 
 from throwcollect import ros_installation
 from throwcollect.build import build_digest
-from throwcollect.engine_packages import PACKAGES
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import (
+    ENGINE_PACKAGES,
     EXTRA_OF,
     MissingExtraError,
-    MissingLibraryError,
     explain_missing,
     has_wheel,
     install_command,
@@ -75,11 +74,11 @@ def _check_engine(name: str) -> Check:
 
     Of an installed one, the beginning of its build digest is shown, which two machines compare before one joins a run.
     """
-    package = PACKAGES[name]
+    package = ENGINE_PACKAGES[name]
     if is_installed(package.module):
         found = f"{version(package.distribution)}, build {build_digest(name)[:_DIGITS]}"
         return Check(package.module, "ok", found)
-    others = any(is_installed(each.module) for each in PACKAGES.values())
+    others = any(is_installed(each.module) for each in ENGINE_PACKAGES.values())
     hint = f"not installed, for sim.engine: {name}; try: {MissingExtraError(package.module).hint}"
     return Check(package.module, "note" if others else "problem", hint)
 
@@ -94,7 +93,7 @@ def _check_robot(name: str) -> Check:
             joint_model(robot)
             package = f" of example-robot-data {version('example-robot-data')}" if is_own else ""
             return Check(check, "ok", f"{robot.title}{package}, {robot.urdf_path}")
-    except (ConfigError, MemberError, MissingExtraError, MissingLibraryError) as error:
+    except (ConfigError, MemberError, MissingExtraError) as error:
         return Check(check, "problem" if is_own else "note", error.one_line)
 
 
@@ -175,7 +174,7 @@ def examine(directory: Path) -> list[Check]:
         _check_extras,
         _check_cores,
         _check_memory,
-        *(partial(_check_engine, name) for name in PACKAGES),
+        *(partial(_check_engine, name) for name in ENGINE_PACKAGES),
         *(partial(_check_robot, name) for name in names_of("robots")),
         _check_rclpy,
         _check_embedded,

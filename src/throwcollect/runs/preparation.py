@@ -72,8 +72,7 @@ def prepare(
         config: The configuration's file.
         overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
         output: Directory of the dataset, new or empty; None names one after the configuration.
-        processes: Number of processes that may check the trials of a large plan; if there are several, each imports the
-            main program, as processes of `multiprocessing` do.
+        processes: Number of processes that may check the trials of a large plan.
         onlooker: Is told what goes on.
     """
     check_bounds("processes", processes, least=1)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from throwcollect.config.schema import Config
     from throwcollect.coordinator.collection import TrialCollection
     from throwcollect.dataset.summary import Info
-    from throwcollect.replay.replayer import Replayer
+    from throwcollect.sim.simulator import Simulator
 
 _TELL_EVERY_S = 0.2
 _IDLE_S = 0.05
@@ -63,17 +63,17 @@ class InProcess:
         # These import messages of ROS, so they have to wait until the backend is chosen.
         from throwcollect.coordinator.collection import TrialCollection
         from throwcollect.dataset.inspect import info
-        from throwcollect.replay.replayer import Replayer
+        from throwcollect.sim.simulator import Simulator
 
         directory = self._place.directory
         session.event("started", simulations=1)
         with TrialCollection.open(directory, say=session.say) as collection:
             collection.warn = session.warn
-            simulation = Replayer(self._config)
+            simulator = Simulator(self._config)
             try:
-                self._simulate(collection, simulation, session)
+                self._simulate(collection, simulator, session)
             finally:
-                simulation.close()
+                simulator.close()
             if not collection.complete:
                 raise make_interruption_error(self._place)
 
@@ -89,7 +89,7 @@ class InProcess:
                 collection.finish(meanwhile=wait, say=session.say)
         return info(directory)
 
-    def _simulate(self, collection: TrialCollection, simulation: Replayer, session: Session) -> None:
+    def _simulate(self, collection: TrialCollection, simulator: Simulator, session: Session) -> None:
         """Simulate all trials, or drain."""
         handle = str(os.getpid())
         states = [NodeState(name, "running", 0, handle, None) for name in (_SIMULATION, COORDINATOR)]
@@ -99,11 +99,11 @@ class InProcess:
                 collection.drain()
             if leased := collection.lease(_SIMULATION):
                 try:
-                    delivery = simulation.delivery(collection.writer.plan.trial(leased[0]))
+                    episode = simulator.run(collection.writer.plan.trial(leased[0]))
                 except ThrowcollectError as error:
                     collection.refuse(_SIMULATION, leased[0], str(error))
                 else:
-                    collection.take_in(_SIMULATION, delivery)
+                    collection.take_in(_SIMULATION, episode)
             else:
                 collection.check_next()
             if collection.backlog:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-from throwcollect.engine_packages import PACKAGES, require_engine
 from throwcollect.errors import Interrupted
+from throwcollect.extras import ENGINE_PACKAGES, require_engine
 from throwcollect.members import load_member
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
@@ -225,7 +225,7 @@ class Runtime(ABC):
             MissingExtraError: If simulations run on this Python, and it lacks the physics engine.
         """
         require_engine(config.sim.engine)
-        if config.sim.engine not in PACKAGES:
+        if config.sim.engine not in ENGINE_PACKAGES:
             # An engine of another package may be broken. Otherwise every simulation would report that, and later.
             load_member("engines", config.sim.engine)
         return middleware

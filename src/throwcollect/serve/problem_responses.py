@@ -20,7 +20,7 @@ from throwcollect.errors import (
     ThrowcollectError,
     WorkerError,
 )
-from throwcollect.extras import MissingExtraError, MissingLibraryError
+from throwcollect.extras import MissingExtraError
 
 _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (NotFoundError, 404),
@@ -28,7 +28,6 @@ _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (ConfigError, 422),
     (DatasetError, 409),
     (MissingExtraError, 503),
-    (MissingLibraryError, 503),
     (WorkerError, 503),
 )
 """Status of each kind of error, the first that fits; that of any other is 500."""

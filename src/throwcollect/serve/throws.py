@@ -13,7 +13,7 @@ from pathlib import Path
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import PLAN, config_path
-from throwcollect.episode.episode_message import Delivery, unpack
+from throwcollect.episode.episode_message import Episode, unpack
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros import Node
 from throwcollect.ros.msg import UInt8MultiArray
@@ -31,7 +31,7 @@ _LENGTH = struct.Struct("<I")
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
-def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float]) -> bytes:
+def encode_throw(episode: Episode, simulation: str, values: Mapping[str, float]) -> bytes:
     """Encode an episode for the page, with the name of its simulation and the swept values by their dotted keys.
 
     Returns:
@@ -40,9 +40,8 @@ def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float
         all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``,
         ``landing`` and ``values``.
     """
-    episode = delivery.episode
     samples = episode.samples()
-    result = json.loads(delivery.result)
+    result = json.loads(episode.result)
     spacing_ns = int(samples.stamps_ns[1] - samples.stamps_ns[0]) if len(samples) > 1 else NS_PER_S
     landing = [result.get(key) for key in _LANDING]
     header = {
@@ -134,10 +133,10 @@ class ThrowWatch:
 
     def _hear(self, simulation: str, message: bytes) -> None:
         try:
-            delivery = unpack(message, Signer.of_key(self._run.key))
-            if not isinstance(delivery, Delivery) or not delivery.result:
+            episode = unpack(message, Signer.of_key(self._run.key))
+            if not isinstance(episode, Episode) or not episode.result:
                 return
-            frame = encode_throw(delivery, simulation, self._values.of(delivery.episode.header.trial))
+            frame = encode_throw(episode, simulation, self._values.of(episode.header.trial))
         except ThrowcollectError:
             # Another node has published something else on this topic.
             return

@@ -10,10 +10,8 @@ import time
 
 from throwcollect.units import NS_PER_S
 
-STRETCH_S = 0.5
-"""Simulated time of a stretch in a trial or in many steps: about 20 ms of real time."""
 WATCHED_STRETCH_S = 0.05
-"""Such a time while a client watches, and outside of trials: the period of feedback in ros2_controllers."""
+"""Simulated time of a stretch while a client watches, and outside of trials: as ros2_controllers send feedback."""
 
 _SHORTEST_S = 0.004
 """Real time of the shortest stretch; it is well above the millisecond of work between two stretches."""

@@ -9,6 +9,7 @@ from throwcollect.config.schema import Config
 from throwcollect.control import ErrorCode, GoalResult, GoalStatus, TrajectoryRefusal
 from throwcollect.episode.record import GoalOutcome
 from throwcollect.errors import RequestError
+from throwcollect.robots.trajectory import JointTrajectory
 
 NO_TRIAL = -1
 """Number of the trial while none is set up."""
@@ -35,25 +36,30 @@ class PresentTrial:
     Attributes:
         setup: The trial that the next reset prepares.
         begun: The trial that the last reset has prepared.
-        leased: Whether the trial belongs to a coordinator, until its episode is handed over; meanwhile no other client
-            may change anything.
+        motion: Motion of a trial that `Simulator.begin` has begun, until its episode is handed over; None for a trial
+            that a client has set up.
     """
 
     def __init__(self, config: Config) -> None:
         self.setup = self.begun = TrialSetup(NO_TRIAL, (), config)
-        self.leased = False
+        self.motion: JointTrajectory | None = None
         self._config = config
         self._goals: dict[str, GoalOutcome] = {}
 
     def set_up_nothing(self) -> None:
         """End the lease, and let the next reset go back to the configuration."""
-        self.leased = False
+        self.motion = None
         self.setup = TrialSetup(NO_TRIAL, (), self._config)
 
     def begin(self) -> None:
         """Begin the trial that is set up, and forget the goals of the previous trial."""
         self.begun = self.setup
         self._goals = {}
+
+    @property
+    def leased(self) -> bool:
+        """Whether the trial belongs to a coordinator; meanwhile, no other client may change anything."""
+        return self.motion is not None
 
     @property
     def has_all_goals(self) -> bool:

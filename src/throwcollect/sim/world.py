@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.engine_packages import require_engine
 from throwcollect.engines.as_described import check_loaded
 from throwcollect.engines.body import BodyModel
 from throwcollect.engines.engine import (
@@ -24,6 +23,7 @@ from throwcollect.engines.engine import (
     ball_of,
 )
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
+from throwcollect.extras import require_engine
 from throwcollect.members import explain_failure, load_member
 from throwcollect.robots.description import (
     Description,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target_columns import is_target
+from throwcollect.config.task_config import is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import write_file

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target_columns import LARGEST_TARGET, is_target
+from throwcollect.config.task_config import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import suggest_path

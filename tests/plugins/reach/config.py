@@ -6,8 +6,7 @@ from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
-from throwcollect.config.task_config import TaskConfig
-from throwcollect.config.until import UntilConfig, Wanted
+from throwcollect.config.task_config import TaskConfig, UntilConfig, Wanted
 
 
 class UntilReached(UntilConfig):

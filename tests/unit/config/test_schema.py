@@ -8,8 +8,7 @@ from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
 from throwcollect.config.section import any_of
 from throwcollect.config.sweep import Bins
-from throwcollect.config.until import UntilConfig, Wanted
-from throwcollect.errors import MemberError
+from throwcollect.config.task_config import UntilConfig, Wanted
 from throwcollect.tasks.throw.throw_config import ThrowConfig, UntilLanded
 
 
@@ -68,22 +67,6 @@ def test_two_tasks_may_name_their_success_alike(monkeypatch):
     monkeypatch.undo()
     for task in (ThrowConfig(), LobConfig()):
         assert list(Config().model_copy(update={"until": until, "task": task})._find_contradictions()) == []
-
-
-@pytest.mark.parametrize(("keys", "said"), [((), "none"), (("waved", "short"), "waved, short")])
-def test_the_section_until_of_a_task_has_one_key(keys, said):
-    namespace = {"__module__": __name__, "__annotations__": dict.fromkeys(keys, "Wanted")}
-    with pytest.raises(TypeError, match=f"Until should have one key, the outcome that is counted; it has {said}"):
-        type("Until", (UntilConfig,), namespace)
-
-
-def test_a_section_of_another_package_that_cannot_check_its_keys_is_named():
-    def fail(_):
-        raise KeyError("elbow")
-
-    section = type("Wave", (ThrowConfig,), {"__module__": "hand_wave.config", "_find_contradictions": fail})
-    with pytest.raises(MemberError, match=r"hand_wave\.config\.Wave of another package cannot check its keys: KeyErr"):
-        section()
 
 
 def test_task_classes_of_two_packages_may_have_the_same_name():

@@ -13,9 +13,9 @@ from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.provenance import read_provenance
-from throwcollect.episode.episode_message import Delivery
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import LossError
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.plan import Plan
 
 PLAN: Plan = make_plan(
@@ -31,6 +31,12 @@ PLAN: Plan = make_plan(
 )
 
 
+def change(episode: Episode, *, result: str | None = None, conditions: str | None = None) -> Episode:
+    return Episode(
+        episode.header, episode.chunk, result=result or episode.result, conditions=conditions or episode.conditions
+    )
+
+
 @pytest.fixture
 def collection(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TrialCollection]:
     monkeypatch.setattr(Lookahead, "count_for", lambda *_, **__: 4)
@@ -41,10 +47,10 @@ def collection(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Tria
 
 
 @pytest.fixture(scope="module")
-def deliveries() -> list[Delivery]:
-    replayer = Replayer(PLAN.config)
-    found = [replayer.delivery(trial) for trial in PLAN.trials]
-    replayer.close()
+def deliveries() -> list[Episode]:
+    simulator = Simulator(PLAN.config)
+    found = [simulator.run(trial) for trial in PLAN.trials]
+    simulator.close()
     return found
 
 
@@ -54,7 +60,7 @@ def events(directory: Path, kind: str) -> list[dict[str, Any]]:
 
 
 def test_a_simulation_that_dies_loses_only_the_trial_that_it_ran(
-    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+    collection: TrialCollection, deliveries: list[Episode], tmp_path: Path
 ) -> None:
     assert collection.lease("/sim_0") == (0, 1, 2, 3)
     assert collection.take_in("/sim_0", deliveries[0])
@@ -79,7 +85,7 @@ def test_a_simulation_that_dies_loses_only_the_trial_that_it_ran(
 
 
 def test_a_simulation_that_comes_back_has_lost_no_trial(
-    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+    collection: TrialCollection, deliveries: list[Episode], tmp_path: Path
 ) -> None:
     for _ in range(5):
         assert collection.lease("/sim_0") == (0, 1, 2, 3)
@@ -90,7 +96,7 @@ def test_a_simulation_that_comes_back_has_lost_no_trial(
 
 
 def test_the_first_episode_of_a_trial_counts_and_later_ones_are_dropped(
-    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+    collection: TrialCollection, deliveries: list[Episode], tmp_path: Path
 ) -> None:
     warnings: list[str] = []
     collection.lease("/sim_0")
@@ -110,11 +116,11 @@ def test_the_first_episode_of_a_trial_counts_and_later_ones_are_dropped(
 
 
 def test_a_wrong_episode_of_a_trial_that_its_simulation_does_not_hold_changes_nothing(
-    collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
+    collection: TrialCollection, deliveries: list[Episode], tmp_path: Path
 ) -> None:
     collection.join("/sim_1", "sim_1")
     collection.lease("/sim_0")
-    wrong = deliveries[0]._replace(conditions=deliveries[1].conditions)
+    wrong = change(deliveries[0], conditions=deliveries[1].conditions)
     assert not collection.take_in("/sim_1", wrong)
     collection.refuse("/sim_1", 0, "cannot be done")
     assert collection.lease("/sim_0") == (0, 1, 2, 3)
@@ -122,7 +128,7 @@ def test_a_wrong_episode_of_a_trial_that_its_simulation_does_not_hold_changes_no
 
 
 def test_a_simulation_gets_more_trials_once_half_of_its_lease_is_done(
-    collection: TrialCollection, deliveries: list[Delivery]
+    collection: TrialCollection, deliveries: list[Episode]
 ) -> None:
     assert collection.lease("/sim_0") == (0, 1, 2, 3)
     collection.take_in("/sim_0", deliveries[0])
@@ -132,7 +138,7 @@ def test_a_simulation_gets_more_trials_once_half_of_its_lease_is_done(
 
 
 def test_draining_leaves_each_simulation_only_the_trial_that_runs(
-    collection: TrialCollection, deliveries: list[Delivery]
+    collection: TrialCollection, deliveries: list[Episode]
 ) -> None:
     changes: list[tuple[int, ...]] = []
     collection.on_change = lambda: changes.append(collection.lease("/sim_0"))
@@ -147,13 +153,13 @@ def test_draining_leaves_each_simulation_only_the_trial_that_runs(
 
 
 def test_a_trial_without_retries_whose_episode_is_refused_is_lost(
-    collection: TrialCollection, deliveries: list[Delivery]
+    collection: TrialCollection, deliveries: list[Episode]
 ) -> None:
     said: list[str] = []
     collection.warn = said.append
     collection.lease("/sim_0")
-    assert not collection.take_in("/sim_0", deliveries[0]._replace(conditions=deliveries[1].conditions))
-    assert not collection.take_in("/sim_0", deliveries[1]._replace(result="{}"))
+    assert not collection.take_in("/sim_0", change(deliveries[0], conditions=deliveries[1].conditions))
+    assert not collection.take_in("/sim_0", change(deliveries[1], result="{}"))
     assert "trial 0 is lost: its episode is refused: ball.mass_kg was" in said[0]
     assert "trial 1 is lost: its episode is refused: result of a trial: " in said[1]
     assert not collection.backlog

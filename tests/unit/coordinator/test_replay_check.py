@@ -1,8 +1,7 @@
 """Some trials are simulated again in a fresh process, which may begin before the compared trials are known."""
 
 import json
-import os
-import subprocess
+import multiprocessing
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +10,12 @@ import pytest
 from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
-from throwcollect.coordinator import replay_check
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.throws_table import Row
 from throwcollect.errors import DatasetError, WorkerError
-from throwcollect.replay.replayer import Replayer
+from throwcollect.side_by_side import Workers
+from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.plan import Plan
 from throwcollect.trial.choice import choose_trials
 
@@ -34,48 +33,33 @@ NUMBERS = list(PLAN.trials.numbers_to_run)
 CHOSEN = choose_trials(NUMBERS, count=2, seed=PLAN.config.seed)
 
 
-TALKATIVE = """
-import os
-from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
-
-run = BallisticEngine.run
-
-def talk(*arguments):
-    print("I run", flush=True)
-    os.write(1, b"and a library of mine, too")
-    return run(*arguments)
-
-BallisticEngine.run = talk
-"""
-
-
 @pytest.fixture(scope="module")
 def rows() -> dict[int, Row]:
-    replayer = Replayer(PLAN.config)
+    simulator = Simulator(PLAN.config)
     found = {}
     for trial in PLAN.trials:
-        delivery = replayer.delivery(trial)
+        episode = simulator.run(trial)
         found[trial.number] = {
             "trial": trial.number,
-            "digest": delivery.episode.digest,
-            **json.loads(delivery.result),
+            "digest": episode.digest,
+            **json.loads(episode.result),
             **trial.values,
         }
-    replayer.close()
+    simulator.close()
     return found
 
 
 @pytest.fixture
-def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+def started(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     """The trials of each started process."""
-    found: list[list[str]] = []
-    popen = subprocess.Popen
+    found: list[list[int]] = []
+    submit = Workers.submit
 
-    def note(command: list[str], **kwargs: object) -> object:
-        found.append(command[command.index("simulate") + 2 :])
-        return popen(command, **kwargs)
+    def note(workers: Workers[int, Row], trials: list[int]) -> object:
+        found.append(trials)
+        return submit(workers, trials)
 
-    monkeypatch.setattr(replay_check.subprocess, "Popen", note)
+    monkeypatch.setattr(Workers, "submit", note)
     return found
 
 
@@ -87,40 +71,27 @@ def check(tmp_path: Path) -> Iterator[ReplayCheck]:
     check.close()
 
 
-def words(trials: list[int]) -> list[str]:
-    return [str(trial) for trial in trials]
-
-
 def compare(check: ReplayCheck, rows: dict[int, Row]) -> str | None:
     return check.compare(rows, meanwhile=lambda: time.sleep(0.01))
 
 
-def test_a_replay_check_uses_the_trials_that_were_begun_early(check, rows, started, monkeypatch) -> None:
-    # The process writes for this one, so it does not matter how the user wants to read output.
-    monkeypatch.setenv("PYTHONIOENCODING", "utf-16")
+def test_a_replay_check_uses_the_trials_that_were_begun_early(check, rows, started) -> None:
     check.begin(NUMBERS)
     assert compare(check, rows) == "2 trials simulated again in a fresh process: the same bit for bit"
-    assert started == [words(CHOSEN)]
-
-
-def test_a_replay_check_overlooks_what_parts_of_other_packages_print(check, rows, tmp_path, monkeypatch) -> None:
-    # Python imports this module when it starts, and with it the engine that prints.
-    (tmp_path / "sitecustomize.py").write_text(TALKATIVE)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
-    assert compare(check, rows) == "2 trials simulated again in a fresh process: the same bit for bit"
+    assert started == [CHOSEN]
 
 
 def test_a_replay_check_compares_the_chosen_trials_even_if_others_were_begun(check, rows, started) -> None:
     check.begin(NUMBERS)
     kept = {trial: row for trial, row in rows.items() if trial not in CHOSEN}
     compare(check, kept)
-    assert started == [words(CHOSEN), words(choose_trials(sorted(kept), count=2, seed=PLAN.config.seed))]
+    assert started == [CHOSEN, choose_trials(sorted(kept), count=2, seed=PLAN.config.seed)]
 
 
 def test_a_replay_process_begun_early_that_fails_is_replaced(check, rows, started) -> None:
     check.begin([10**6, 10**6 + 1])
     assert compare(check, rows) is not None
-    assert started == [words([10**6, 10**6 + 1]), words(CHOSEN)]
+    assert started == [[10**6, 10**6 + 1], CHOSEN]
 
 
 @pytest.mark.parametrize("early", [False, True])
@@ -143,39 +114,23 @@ def test_a_trial_that_replays_differently_is_an_error(check, rows, early, change
 
 def test_a_replay_process_that_fails_is_an_error(check, rows, tmp_path) -> None:
     (tmp_path / "data" / "plan.parquet").unlink()
-    with pytest.raises(WorkerError, match="2 trials could not be simulated again \\(exit code") as caught:
+    with pytest.raises(DatasetError, match=r"plan\.parquet"):
         compare(check, rows)
-    assert "plan.parquet" in (caught.value.evidence or "")
 
 
-def test_closing_a_replay_check_ends_its_process(check, monkeypatch) -> None:
-    begun: list[subprocess.Popen[bytes]] = []
-    popen = subprocess.Popen
-
-    def note(*arguments: object, **kwargs: object) -> object:
-        begun.append(popen(*arguments, **kwargs))
-        return begun[0]
-
-    monkeypatch.setattr(replay_check.subprocess, "Popen", note)
+def test_a_replay_process_that_is_killed_is_an_error(check, rows) -> None:
     check.begin(NUMBERS)
-    check.close()
-    assert begun[0].poll() is not None
+    for process in multiprocessing.active_children():
+        process.kill()
+    with pytest.raises(WorkerError, match="a process that simulates trials again was killed"):
+        compare(check, rows)
 
 
-def test_a_replay_process_has_its_own_session_so_ctrl_c_does_not_reach_it(check, monkeypatch) -> None:
-    sessions: list[int] = []
-    popen = subprocess.Popen
-
-    def note(*arguments: object, **kwargs: object) -> object:
-        process = popen(*arguments, **kwargs)
-        sessions.append(os.getsid(process.pid))
-        return process
-
-    monkeypatch.setattr(replay_check.subprocess, "Popen", note)
+def test_closing_a_replay_check_ends_its_process(check) -> None:
     check.begin(NUMBERS)
+    assert len(multiprocessing.active_children()) == 1
     check.close()
-    assert len(sessions) == 1
-    assert sessions != [os.getsid(0)]
+    assert multiprocessing.active_children() == []
 
 
 def test_a_replay_check_of_no_trials_starts_no_process(tmp_path, started) -> None:

@@ -16,6 +16,7 @@ from tests.unit.dataset.damage import find_stored, flip, replace_text
 from throwcollect.coordinator.resume import has_all_trials, resume
 from throwcollect.coordinator.salvage import finish_without_simulating
 from throwcollect.dataset.creation import create
+from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
@@ -178,11 +179,11 @@ def test_resume_restores_the_bytes_of_a_damaged_dataset_and_keeps_whole_episodes
 def test_finishing_without_simulating_keeps_whole_episodes_and_gives_up_the_others(
     trials: Trials, sound: Path, dataset: Path, name: str, damage: Callable[[Path], None], whole: set[int]
 ) -> None:
-    provenance = (dataset / "provenance.json").read_bytes()
+    provenance = read_provenance(dataset)
     damage(dataset / name)
     assert trials.finish(dataset) == dict.fromkeys(ALL - whole, "no whole episode of it was left")
     assert verify(dataset) == []
-    assert name == "provenance.json" or (dataset / "provenance.json").read_bytes() == provenance
+    assert name == "provenance.json" or read_provenance(dataset) == provenance
     if whole == ALL:
         assert contents(dataset) == contents(sound)
     assert trials.go_on(dataset)[0] == (None if whole == ALL else whole)

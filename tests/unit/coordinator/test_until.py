@@ -13,9 +13,10 @@ from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.verify import verify
-from throwcollect.episode.episode_message import Delivery
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import LossError
-from throwcollect.replay.replayer import Replayer
+from throwcollect.sim.simulator import Simulator
 
 LANDED = 12
 CONFIG = Config.model_validate(
@@ -35,18 +36,18 @@ CONFIG = Config.model_validate(
         "run": {"retries": 0, "replay": 0},
     }
 )
-Deliver = Callable[[int], Delivery]
+Deliver = Callable[[int], Episode]
 
 
 @pytest.fixture(scope="module")
 def deliver(tmp_path_factory: pytest.TempPathFactory) -> Deliver:
     plan = prepare(CONFIG, tmp_path_factory.mktemp("plan") / "data", sweep_directory=Path())
-    replayer = Replayer(CONFIG)
-    made: dict[int, Delivery] = {}
+    simulator = Simulator(CONFIG)
+    made: dict[int, Episode] = {}
 
-    def deliver(trial: int) -> Delivery:
+    def deliver(trial: int) -> Episode:
         if trial not in made:
-            made[trial] = replayer.delivery(plan.trial(trial))
+            made[trial] = simulator.run(plan.trial(trial))
         return made[trial]
 
     return deliver
@@ -83,6 +84,10 @@ def collect(
                 return ran
         collection.finish(meanwhile=lambda: None, say=lambda _: None)
     return ran
+
+
+def raise_interrupt(*_: object, **__: object) -> None:
+    raise KeyboardInterrupt
 
 
 def files_of(directory: Path) -> dict[str, bytes]:
@@ -130,6 +135,19 @@ def test_it_is_the_same_for_any_simulations_order_kills_and_losses(
             assert len(pq.read_table(tmp_path / "data" / "plan.parquet")) >= needed
         resume(CONFIG, tmp_path / "data", sweep_directory=Path())
     collect(tmp_path / "data", deliver, random=random, simulations=simulations)
+    assert files_of(tmp_path / "data") == files_of(undisturbed)
+
+
+def test_a_kill_after_the_plan_was_cut_loses_nothing(
+    deliver: Deliver, undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepare(CONFIG, tmp_path / "data", sweep_directory=Path())
+    with monkeypatch.context() as killed:
+        killed.setattr(DatasetWriter, "finish", raise_interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            collect(tmp_path / "data", deliver, random=Random(0))
+    assert (tmp_path / "data" / "plan.parquet").read_bytes() == (undisturbed / "plan.parquet").read_bytes()
+    assert not collect(tmp_path / "data", deliver, random=Random(0))
     assert files_of(tmp_path / "data") == files_of(undisturbed)
 
 

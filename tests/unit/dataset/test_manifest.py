@@ -20,17 +20,16 @@ from throwcollect.dataset.manifest import (
     RunningHash,
     entry_of_file,
     find_changed_files,
-    find_manifest_problems,
     list_promised_names,
     read_manifest,
 )
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.verify import verify
+from throwcollect.dataset.verify import find_damage, verify
 from throwcollect.derive.selection import filter_trials
 from throwcollect.errors import DatasetError
 
 MANIFEST = "datapackage.json"
-BESIDE = ["README.md", "config.yaml", "metadata.yaml", "plan.parquet", "provenance.json", "throws.parquet"]
+TABLES = ["config.yaml", "metadata.yaml", "plan.parquet", "throws.parquet"]
 SHARDS = [f"quick_{number:05d}.mcap" for number in range(3)]
 FLIPS_PER_CLASS = 100
 
@@ -73,7 +72,7 @@ def test_a_flipped_bit_in_any_file_is_found(derived: Path, tmp_path: Path) -> No
             byte = source.choice(source.choice(places))
             (directory / name).write_bytes(flip_bit(whole, byte, source.randrange(8)))
             flips += 1
-            assert any(find_manifest_problems(directory, "quick")), (kind, byte)
+            assert any(find_damage(directory, in_full=True)), (kind, byte)
             if not number:
                 assert verify(directory), (kind, byte)
         (directory / name).write_bytes(whole)
@@ -94,7 +93,7 @@ def test_a_flipped_bit_in_the_footer_of_a_table_is_found_in_that_file(dataset: P
 
 def test_the_manifest_lists_the_promised_files_and_no_others(dataset: Path) -> None:
     entries = read_manifest(dataset)
-    assert [entry.path for entry in entries] == sorted([*BESIDE, *SHARDS])
+    assert [entry.path for entry in entries] == sorted([*TABLES, *SHARDS])
     assert list(entries) == [entry_of_file(dataset / entry.path) for entry in entries]
     document = json.loads((dataset / MANIFEST).read_text())
     assert document["profile"] == "data-package"
@@ -127,7 +126,7 @@ def test_the_quick_check_finds_shortened_and_missing_files(dataset: Path) -> Non
     (dataset / SHARDS[1]).unlink()
     (dataset / "sources.parquet").write_bytes(b"")
     assert find_resized(dataset) == [SHARDS[0], SHARDS[1]]
-    assert "sources.parquet" in {finding.file for finding in find_manifest_problems(dataset, "quick")}
+    assert "sources.parquet" in {finding.file for finding in find_damage(dataset, in_full=True)}
 
 
 @pytest.mark.parametrize(

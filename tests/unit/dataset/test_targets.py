@@ -18,7 +18,7 @@ from tests.unit.dataset.targeted import LIST, WITHOUT_TARGETS, collect_targeted,
 
 from throwcollect.cli.dataset.info import describe
 from throwcollect.config.schema import Config
-from throwcollect.config.target_columns import TargetColumn
+from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.misses import Misses
 from throwcollect.dataset.reader import Dataset

@@ -37,6 +37,18 @@ def test_a_sound_dataset_has_no_findings(dataset: Path) -> None:
     assert verify(dataset) == []
 
 
+def test_a_flipped_bit_in_every_file_is_found(dataset: Path) -> None:
+    random = np.random.default_rng(0)
+    for path in sorted(path for path in dataset.iterdir() if path.is_file()):
+        whole = path.read_bytes()
+        for offset in random.integers(len(whole), size=5).tolist():
+            flip(path, offset, bit=1 << int(random.integers(8)))
+            # A changed hash in the manifest or the provenance is a finding of the file that it is of.
+            assert verify(dataset), (path.name, offset)
+            path.write_bytes(whole)
+    assert verify(dataset) == []
+
+
 @pytest.mark.parametrize(
     "name",
     ["README.md", "config.yaml", "datapackage.json", PLAN, "provenance.json", SHARD, THROWS],

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.engine_packages import PACKAGES
 from throwcollect.engines.engine import GROUND, BodyState, Engine, Observer, Sample, State, Steps, ball_of
+from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import physics_description, start_posture
 from throwcollect.sim.scene import physics_of, scene_of
@@ -71,9 +71,9 @@ def begin(engine: Engine) -> State:
 
 @pytest.fixture(params=names_of("engines"))
 def name(request: pytest.FixtureRequest) -> str:
-    if request.param in PACKAGES:
+    if request.param in ENGINE_PACKAGES:
         # No version of Python has wheels of all engines.
-        pytest.importorskip(PACKAGES[request.param].module)
+        pytest.importorskip(ENGINE_PACKAGES[request.param].module)
     return str(request.param)
 
 

@@ -17,7 +17,6 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import (
-    Delivery,
     Episode,
     TrialRefusal,
     header_from_json,
@@ -42,19 +41,20 @@ def encoder() -> ChunkEncoder:
 
 @pytest.fixture
 def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Episode:
-    return Episode(header, encoder.encode(make_samples(50))[0])
+    return Episode(header, encoder.encode(make_samples(50))[0], result=RESULT, conditions=CONDITIONS)
 
 
 def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
-    episode, result, conditions = unpack(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), SIGNER)
-    assert (result, conditions) == (RESULT, CONDITIONS)
+    episode = unpack(pack(sent, SIGNER), SIGNER)
+    assert isinstance(episode, Episode)
+    assert (episode.result, episode.conditions) == (RESULT, CONDITIONS)
     assert (episode.header, episode.chunk) == (sent.header, sent.chunk)
     assert episode.digest == sent.digest
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
 
 def test_the_message_of_an_episode_is_a_standard_array_that_names_its_parts(sent: Episode) -> None:
-    message = deserialize(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
+    message = deserialize(pack(sent, SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
     sizes = {part.label: part.size for part in message.layout.dim}
     assert list(sizes) == ["header", "result", "conditions", "hash", "chunk", "signature"]
     data, parts = message.data.tobytes(), {}
@@ -72,9 +72,9 @@ def test_message_indexes_come_with_an_episode_so_that_its_chunk_is_not_decompres
     sent: Episode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from_contents = Episode(sent.header, replace(sent.chunk, indexes={})).message_indexes
-    message = pack(Delivery(sent, RESULT, CONDITIONS), SIGNER)
+    message = pack(sent, SIGNER)
     monkeypatch.setattr(Chunk, "decompress", Mock(side_effect=AssertionError))
-    assert unpack(message, SIGNER).episode.message_indexes == from_contents
+    assert unpack(message, SIGNER).message_indexes == from_contents
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_an_episode_with_a_damaged_message_index_is_refused(sent: Episode, damag
     *_, last = sent.chunk.indexes
     damaged = Episode(sent.header, replace(sent.chunk, indexes={last: damage(sent.chunk.indexes[last])}))
     with pytest.raises(DatasetError, match="a message index behind it cannot be read"):
-        unpack(pack(Delivery(damaged, RESULT, CONDITIONS), SIGNER), SIGNER)
+        unpack(pack(damaged, SIGNER), SIGNER)
 
 
 def test_the_digest_covers_header_and_records_but_not_their_compression(
@@ -150,21 +150,21 @@ def test_a_header_with_a_wrong_or_missing_value_is_refused(header: EpisodeHeader
 def test_a_header_that_claims_more_samples_than_recorded_is_an_error(sent: Episode) -> None:
     claim = Episode(replace(sent.header, samples=51), sent.chunk)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
-        unpack(pack(Delivery(claim, "", ""), SIGNER), SIGNER).episode.samples()
+        unpack(pack(claim, SIGNER), SIGNER).samples()
 
 
 @pytest.mark.parametrize("length", [0, 3, 60, 100, 300, -1])
 def test_a_message_that_is_cut_off_is_refused(sent: Episode, length: int) -> None:
     with pytest.raises(DatasetError, match="episode: "):
-        unpack(pack(Delivery(sent, "", ""), SIGNER)[:length], SIGNER)
+        unpack(pack(sent, SIGNER)[:length], SIGNER)
 
 
 def test_padding_after_a_message_is_ignored(sent: Episode) -> None:
-    assert unpack(pack(Delivery(sent, "", ""), SIGNER) + bytes(3), SIGNER).episode.chunk == sent.chunk
+    assert unpack(pack(sent, SIGNER) + bytes(3), SIGNER).chunk == sent.chunk
 
 
 def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
-    message = pack(Delivery(sent, "", ""), SIGNER)
+    message = pack(sent, SIGNER)
     for wrong in (message[:-1], message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
         with pytest.raises(DatasetError, match="episode: "):
             unpack(wrong, SIGNER)
@@ -172,8 +172,9 @@ def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
 
 @pytest.fixture(scope="module")
 def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
-    episode = Episode(replace(header, samples=3), encoder.encode(make_samples(3))[0])
-    return pack(Delivery(episode, RESULT, CONDITIONS), SIGNER)
+    chunk = encoder.encode(make_samples(3))[0]
+    episode = Episode(replace(header, samples=3), chunk, result=RESULT, conditions=CONDITIONS)
+    return pack(episode, SIGNER)
 
 
 @settings(max_examples=300)
@@ -191,7 +192,7 @@ def test_a_randomly_changed_message_is_refused_with_a_dataset_error(whole: bytes
     except DatasetError:
         return
     assert bytes(message).startswith(whole)
-    assert isinstance(delivery, Delivery)
+    assert isinstance(delivery, Episode)
     assert delivery.conditions == CONDITIONS
 
 
@@ -205,21 +206,21 @@ def test_a_refusal_arrives_as_it_was_sent() -> None:
 
 
 def test_a_message_with_a_chunk_without_hash_is_refused(sent: Episode) -> None:
-    message = pack(Delivery(sent, "", ""), SIGNER)
+    message = pack(sent, SIGNER)
     without = Episode(sent.header, replace(sent.chunk, records_sha256=""))
     with pytest.raises(DatasetError, match="episode: a hash of 0 bytes"):
-        unpack(pack(Delivery(without, "", ""), SIGNER), SIGNER)
-    assert unpack(message, SIGNER).episode.digest == sent.digest
+        unpack(pack(without, SIGNER), SIGNER)
+    assert unpack(message, SIGNER).digest == sent.digest
 
 
 def test_an_episode_signed_with_another_key_is_refused(sent: Episode) -> None:
     with pytest.raises(DatasetError, match="episode: is not signed with the key of this run"):
-        unpack(pack(Delivery(sent, RESULT, CONDITIONS), Signer(b"another")), SIGNER)
+        unpack(pack(sent, Signer(b"another")), SIGNER)
 
 
 @pytest.mark.parametrize("part", [b'"trial":7', RESULT.encode(), CONDITIONS.encode()])
 def test_a_change_in_any_part_of_a_message_breaks_its_signature(sent: Episode, part: bytes) -> None:
-    message = pack(Delivery(sent, RESULT, CONDITIONS), SIGNER)
+    message = pack(sent, SIGNER)
     assert message.count(part) == 1
     with pytest.raises(DatasetError, match="signed"):
         unpack(message.replace(part, bytes(byte ^ 1 for byte in part)), SIGNER)

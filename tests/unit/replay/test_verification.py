@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.dataset.findings import Finding
 from throwcollect.errors import ConfigError
 from throwcollect.replay.verification import verify_dataset
 
@@ -36,9 +35,12 @@ def test_throws_that_come_out_differently_are_found(make_collection: type[Collec
     assert all(each.problem.startswith("comes out differently: ") for each in after[len(before) :])
 
 
-def test_a_dataset_without_an_episode_cannot_be_replayed(make_collection: type[Collection], tmp_path: Path) -> None:
-    collection = make_collection({"sim": {"engine": "ballistic"}, "trials": 1})
-    directory = collection.collect(tmp_path / "data", lost=[0])
-    assert verify_dataset(directory, replay=1)[-1] == Finding(
-        "", "", f"cannot be replayed: {directory}: no trial has an episode"
-    )
+def test_a_few_throws_are_simulated_again_where_libraries_are_those_of_the_collection(
+    make_collection: type[Collection], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # No simulation has made these throws.
+    directory = make_collection({"sim": {"engine": "ballistic"}}).collect(tmp_path / "data")
+    monkeypatch.setattr("throwcollect.replay.verification.SAMPLE", 2)
+    assert sum("comes out differently" in each.problem for each in verify_dataset(directory)) == 2
+    monkeypatch.setattr("throwcollect.replay.verification.find_versions", lambda: {"numpy": "1.0"})
+    assert verify_dataset(directory) == verify_dataset(directory, replay=0)

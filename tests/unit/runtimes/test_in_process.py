@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tests.unit.work_side_by_side import begin_long
 
 from throwcollect import load, runs
 from throwcollect.coordinator import replay_check
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.errors import Interrupted, WorkerError
-from throwcollect.replay.replayer import Replayer
 from throwcollect.runs.records import Records
+from throwcollect.sim.simulator import Simulator as OneSimulator
 from throwcollect.simulator import Simulator
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -120,7 +120,7 @@ def test_a_second_interruption_does_not_wait_for_the_replay_of_throws(
         def update(self, progress: Progress) -> None:
             asked[0] = 2 * (progress.ended == progress.total)
 
-    monkeypatch.setattr(replay_check, "make_command", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    monkeypatch.setattr(replay_check, "_begin", begin_long)
     with pytest.raises(Interrupted, match=r"the throws are in .*, the dataset is not finished"):
         collect(yaml, "run.replay=1", onlooker=Ended(), interruptions=lambda: asked[0])
 
@@ -131,14 +131,14 @@ def test_a_plan_grows_until_enough_throws_have_landed(yaml: Path) -> None:
 
 
 def test_a_trial_that_fails_in_all_retries_is_lost_with_warnings(yaml: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    simulate = Replayer.delivery
+    simulate = OneSimulator.run
 
-    def delivery(self: Replayer, trial: object) -> object:
+    def run(self: OneSimulator, trial: object) -> object:
         if trial.number == 1:  # type: ignore[attr-defined]
             raise WorkerError("no luck")
         return simulate(self, trial)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Replayer, "delivery", delivery)
+    monkeypatch.setattr(OneSimulator, "run", run)
     onlooker = Onlooker()
     summary = collect(yaml, "run.retries=1", onlooker=onlooker)
     assert summary.outcomes == {"landed": 2, "lost": 1}

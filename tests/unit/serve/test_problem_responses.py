@@ -12,7 +12,7 @@ from throwcollect.errors import (
     ThrowcollectError,
     WorkerError,
 )
-from throwcollect.extras import MissingExtraError, MissingLibraryError
+from throwcollect.extras import MissingExtraError
 from throwcollect.serve.problem_responses import answer
 
 
@@ -23,7 +23,6 @@ from throwcollect.serve.problem_responses import answer
         (ConflictError("x"), 409),
         (ConfigError("x"), 422),
         (MissingExtraError("plotly", "report"), 503),
-        (MissingLibraryError("pinocchio"), 503),
         (WorkerError("x"), 503),
         (DatasetError("x"), 409),
         (ThrowcollectError("x"), 500),

@@ -15,7 +15,7 @@ import pytest
 from tests.unit.serve.conftest import Remember
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.episode.episode_message import Delivery
+from throwcollect.episode.episode_message import Episode
 from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve import throws
@@ -68,7 +68,8 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     episode = next(iter(Dataset.open(collected).episodes()))
     samples = episode.samples()
     result = {"outcome": "landed", "landing_x_m": 1.0, "landing_y_m": -0.5, "landing_z_m": 0.02}
-    frame = encode_throw(Delivery(episode, json.dumps(result), "{}"), "sim_0", {"ball.mass_kg": 0.05})
+    judged = Episode(episode.header, episode.chunk, result=json.dumps(result))
+    frame = encode_throw(judged, "sim_0", {"ball.mass_kg": 0.05})
     size = int.from_bytes(frame[:4], "little")
     header = json.loads(frame[4 : 4 + size])
     assert header["landing"] == [1.0, -0.5, 0.02]
@@ -82,7 +83,7 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     assert np.allclose(numbers[:joints].reshape(len(samples), -1), samples.position)
     assert np.allclose(numbers[joints:].reshape(-1, 3), samples.ball_position)
     fell = json.dumps({**result, "landing_z_m": None})
-    told = encode_throw(Delivery(episode, fell, "{}"), "sim_0", {})
+    told = encode_throw(Episode(episode.header, episode.chunk, result=fell), "sim_0", {})
     assert json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])["landing"] is None
 
 

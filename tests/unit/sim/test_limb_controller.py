@@ -14,15 +14,15 @@ from throwcollect.control import (
 )
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
-from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.live import LiveSimulator
 
 ARM, HEAD = "arm_right_controller", "head_controller"
 POSTURE = start_posture(Config())
 ELBOW = TALOS.controllers[ARM].index("arm_right_4_joint")
 
 
-def simulation(**options: object) -> Simulation:
-    return Simulation(Config.model_validate({"controllers": options}))
+def simulation(**options: object) -> LiveSimulator:
+    return LiveSimulator(Config.model_validate({"controllers": options}))
 
 
 def goal(seconds: float, elbow: float = -1.0) -> TrajectoryGoal:
@@ -118,7 +118,7 @@ def test_watching_a_limb_does_not_change_its_motion() -> None:
 
 def stop_swing(**options: object) -> tuple[np.ndarray, np.ndarray]:
     """Command and measured elbow, before and after a cancelled swing of an arm that lags."""
-    world = Simulation(Config.model_validate({"controllers": options, "robot": {"effort_scale": 0.2}}))
+    world = LiveSimulator(Config.model_validate({"controllers": options, "robot": {"effort_scale": 0.2}}))
     world.submit(ARM, 1, goal(0.4, elbow=-0.3))
     world.step(150)
     before = world.observe(ARM).state(world.now_ns)
@@ -164,7 +164,7 @@ def test_a_velocity_that_would_move_a_locked_joint_is_refused_by_name() -> None:
 @pytest.mark.parametrize("far", [1e6, 1.7e308])
 def test_joints_that_are_faster_than_any_robot_brake_too(far: float) -> None:
     options = {"hold": "decelerate", "max_deceleration_radps2": 5.0}
-    world = Simulation(Config.model_validate({"controllers": options, "sim": {"engine": "ballistic"}}))
+    world = LiveSimulator(Config.model_validate({"controllers": options, "sim": {"engine": "ballistic"}}))
     world.submit(ARM, 1, goal(1.0, elbow=far))
     world.step(150)
     assert world.cancel(ARM, 1)

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target_columns import is_target
-from throwcollect.config.task_config import TaskConfig
+from throwcollect.config.task_config import TaskConfig, is_target
 from throwcollect.members import load_member, load_part, names_of
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result

@@ -8,9 +8,7 @@ from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
-from throwcollect.config.target_columns import TargetColumn
-from throwcollect.config.task_config import TaskConfig
-from throwcollect.config.until import UntilConfig, Wanted
+from throwcollect.config.task_config import TargetColumn, TaskConfig, UntilConfig, Wanted
 from throwcollect.errors import ConfigError, Problem
 
 

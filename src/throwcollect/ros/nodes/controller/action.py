@@ -10,7 +10,7 @@ from throwcollect.control import ControllerState, GoalResult, GoalStatus
 from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node
 from throwcollect.ros.action import FollowJointTrajectory
 from throwcollect.ros.nodes.controller.messages import feedback_message, read_goal
-from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.live import LiveSimulator
 
 _RESULT_TIMEOUT_S = 10
 """How long clients can ask for a result, in simulated time; rcl has the same default."""
@@ -37,7 +37,7 @@ class ControllerAction:
             being rejected.
     """
 
-    def __init__(self, node: Node, simulation: Simulation, controller: str, *, aborts_refused: bool) -> None:
+    def __init__(self, node: Node, simulation: LiveSimulator, controller: str, *, aborts_refused: bool) -> None:
         self._node = node
         self._simulation = simulation
         self._controller = controller

@@ -16,7 +16,7 @@ from throwcollect.ros.nodes.controller.parameters import COMMAND_INTERFACES, Con
 from throwcollect.ros.nodes.own_time import make_own_time
 from throwcollect.ros.srv import ListControllers, QueryTrajectoryState
 from throwcollect.sim.limb_controller import LimbController
-from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.live import LiveSimulator
 
 _SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = QoSProfile(depth=100)
@@ -34,7 +34,7 @@ class ControllerNode(Node):
         action: The action by which clients give the controller goals.
     """
 
-    def __init__(self, parent: Node, simulation: Simulation, controller: str) -> None:
+    def __init__(self, parent: Node, simulation: LiveSimulator, controller: str) -> None:
         limb = simulation.limbs[controller]
         super().__init__(limb.name, namespace=parent.get_namespace(), context=parent.context)
         make_own_time(self)
@@ -131,7 +131,7 @@ class _LogHandler(logging.Handler):
 class ControllerManager(Node):
     """Lists the controllers of a simulation, as ros2_control's controller manager does."""
 
-    def __init__(self, parent: Node, simulation: Simulation) -> None:
+    def __init__(self, parent: Node, simulation: LiveSimulator) -> None:
         super().__init__("controller_manager", namespace=parent.get_namespace(), context=parent.context)
         make_own_time(self)
         hz = simulation.config.sim.physics_hz

@@ -177,7 +177,7 @@ class Coordinator(Node):
             )
             return
         simulation = self._simulations[namespace]
-        simulation.finish(handed.trial if isinstance(handed, TrialRefusal) else handed.episode.header.trial)
+        simulation.finish(handed.trial if isinstance(handed, TrialRefusal) else handed.header.trial)
         if isinstance(handed, TrialRefusal):
             self._collection.refuse(namespace, handed.trial, handed.reason)
         elif self._collection.take_in(namespace, handed):

@@ -1,4 +1,4 @@
-"""Offers the standard services of simulators, simulation_interfaces 1.5, for a `Simulation`."""
+"""Offers the standard services of simulators, simulation_interfaces 1.5, for a `LiveSimulator`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from throwcollect.ros.msg import SimulatorFeatures as Features
 from throwcollect.ros.nodes.simulation.answers import offer
 from throwcollect.ros.nodes.simulation.entities import EntityServices
 from throwcollect.ros.srv import GetSimulationState, GetSimulatorFeatures, ResetSimulation, SetSimulationState
-from throwcollect.sim.simulation import Scope, Simulation, StateCode
+from throwcollect.sim.live import LiveSimulator, StateCode
 from throwcollect.version import __version__
 
 _FEATURES = (
@@ -24,13 +24,14 @@ _FEATURES = (
     "STEP_SIMULATION_MULTIPLE",
     "STEP_SIMULATION_ACTION",
 )
+_TIME, _STATE = ResetSimulation.Request.SCOPE_TIME, ResetSimulation.Request.SCOPE_STATE
 _WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL)
 
 
 class SimulationControl:
     """Offers services under relative names, so that they stand in the simulation's namespace."""
 
-    def __init__(self, node: Node, simulation: Simulation) -> None:
+    def __init__(self, node: Node, simulation: LiveSimulator) -> None:
         self._simulation = simulation
         # This service has no result code, unlike all others.
         node.create_service(GetSimulatorFeatures, "get_simulator_features", self._get_features)
@@ -65,11 +66,12 @@ class SimulationControl:
 
     def _reset(self, request: ResetSimulation.Request, _response: ResetSimulation.Response) -> None:
         self._simulation.trial.require_free()
-        if request.scope in _WHOLE_SCOPES:
+        scope = request.scope
+        if scope in _WHOLE_SCOPES:
             self._simulation.reset()
-            return
-        if request.scope & ~int(Scope.ALL):
-            known = ", ".join(f"{scope.value} {scope.name}" for scope in (Scope.TIME, Scope.STATE))
-            message = f"scope {request.scope} cannot be reset"
-            raise RequestError("RESULT_FEATURE_UNSUPPORTED", message, expected=f"sums of {known}; 0 or 255 for all")
-        self._simulation.reset(Scope(request.scope))
+        elif scope & ~(_TIME | _STATE):
+            message = f"scope {scope} cannot be reset"
+            expected = f"sums of {_TIME} TIME, {_STATE} STATE; 0 or 255 for all"
+            raise RequestError("RESULT_FEATURE_UNSUPPORTED", message, expected=expected)
+        else:
+            self._simulation.reset(time=bool(scope & _TIME), state=bool(scope & _STATE))

@@ -10,7 +10,7 @@ from throwcollect.ros import Node
 from throwcollect.ros.msg import EntityFilters, EntityState
 from throwcollect.ros.nodes.simulation.answers import offer
 from throwcollect.ros.srv import GetEntities, GetEntitiesStates, GetEntityState, SetEntityState
-from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.live import LiveSimulator
 from throwcollect.units import NS_PER_S
 
 _BALL = "ball"
@@ -25,7 +25,7 @@ _NORM_TOLERANCE = 1e-3
 class EntityServices:
     """Offers the services under relative names, so that they stand in the simulation's namespace."""
 
-    def __init__(self, node: Node, simulation: Simulation) -> None:
+    def __init__(self, node: Node, simulation: LiveSimulator) -> None:
         self._simulation = simulation
         self._robot = simulation.config.robot.name
         offer(node, GetEntities, "get_entities", self._list)

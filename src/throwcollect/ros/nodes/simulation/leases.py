@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from throwcollect.episode.episode_message import Delivery, TrialRefusal
+from throwcollect.episode.episode_message import Episode, TrialRefusal
 from throwcollect.errors import ThrowcollectError
-from throwcollect.sim.trial_runner import TrialRunner
+from throwcollect.sim.live import LiveSimulator
 from throwcollect.trial.lease import Lease
 
 _REMEMBERED = 1000
@@ -17,8 +17,8 @@ _REMEMBERED = 1000
 class LeaseQueue:
     """Holds the leases of a simulation and begins them one after the other."""
 
-    def __init__(self, runner: TrialRunner) -> None:
-        self._runner = runner
+    def __init__(self, simulator: LiveSimulator) -> None:
+        self._simulator = simulator
         self._running: Lease | None = None
         self._waiting: deque[Lease] = deque()
         self._done: deque[str] = deque(maxlen=_REMEMBERED)
@@ -31,14 +31,13 @@ class LeaseQueue:
             again = (lease for lease in pending if (lease.trial, lease.values) == (running.trial, running.values))
             self._running = next(again, None)
             if self._running is None:
-                self._runner.drop()
+                self._simulator.drop()
         self._waiting = deque(lease for lease in pending if lease is not self._running)
 
     def clear(self) -> None:
-        """Forget all leases; the trial that runs goes on, but its episode belongs to no lease."""
+        """Forget all leases; the trial that runs goes on."""
         self._running = None
         self._waiting.clear()
-        self._runner.release_lease()
 
     def begin_next(self) -> TrialRefusal | None:
         """Begin the next trial if none runs; return the refusal of a trial that cannot begin."""
@@ -46,26 +45,34 @@ class LeaseQueue:
             return None
         lease = self._waiting.popleft()
         try:
-            self._runner.begin(lease.trial, lease.values)
+            self._simulator.begin(lease.trial, lease.values)
         except ThrowcollectError as error:
-            self._runner.drop()
+            self._simulator.drop()
             return self._refuse(lease, error)
         self._running = lease
         return None
 
-    def hand_over(self) -> Delivery | TrialRefusal | None:
+    def fail(self, error: ThrowcollectError) -> TrialRefusal | None:
+        """Drop the trial that runs, in which the engine has failed; return its refusal, or None if no lease runs."""
+        lease, self._running = self._running, None
+        if lease is None:
+            return None
+        self._simulator.drop()
+        return self._refuse(lease, error)
+
+    def hand_over(self) -> Episode | TrialRefusal | None:
         """Return the episode of the trial that has just ended, or its refusal; None if no trial has ended."""
         try:
-            delivery = self._runner.hand_over()
+            episode = self._simulator.hand_over()
         except ThrowcollectError as error:
             # Only episodes of leased trials are judged, so only they can be refused.
             lease, self._running = self._running, None
             return self._refuse(lease, error) if lease else None
         # The episode of a trial that a client has set up by hand belongs to no lease.
-        if delivery is not None and self._running is not None:
+        if episode is not None and self._running is not None:
             self._done.append(self._running.token)
             self._running = None
-        return delivery
+        return episode
 
     def _refuse(self, lease: Lease, error: ThrowcollectError) -> TrialRefusal:
         self._done.append(lease.token)

@@ -14,7 +14,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import pack
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Recording, Topic
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.ros import (
     DurabilityPolicy,
@@ -36,9 +36,8 @@ from throwcollect.ros.nodes.simulation.control import SimulationControl
 from throwcollect.ros.nodes.simulation.leases import LeaseQueue
 from throwcollect.ros.nodes.simulation.stepping import Stepping
 from throwcollect.run_key import Signer
+from throwcollect.sim.live import LiveSimulator, StateCode
 from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
-from throwcollect.sim.simulation import Simulation, StateCode
-from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.trial.lease import LEASES, Lease, leases_from_json
 from throwcollect.units import NS_PER_S
 
@@ -81,18 +80,17 @@ class SimulationNode(Node):
         ConfigError: If another simulation has this namespace.
     """
 
-    def __init__(self, name: str, simulation: Simulation, *, namespace: str | None = None) -> None:
+    def __init__(self, name: str, simulation: LiveSimulator, *, namespace: str | None = None) -> None:
         super().__init__(name, namespace=namespace or f"/{name}")
         self._require_own_namespace()
         self._simulation = simulation
         config = simulation.config
         make_own_time(self)
-        self._runner = TrialRunner(simulation)
-        self._description = self._runner.channels.robot
-        self._publish_latched(self._runner.channels)
+        self._description = simulation.channels.robot
+        self._publish_latched(simulation.channels)
         self._declare_description()
         self._declare_parameters(config)
-        self._leases = LeaseQueue(self._runner)
+        self._leases = LeaseQueue(simulation)
         self._live = [
             (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
             for topic in Channels(_record_all_topics(config), self._description).recorded.values()
@@ -134,8 +132,14 @@ class SimulationNode(Node):
         return bool(self._listened) or any(controller.watched for controller in self._subscribed)
 
     def advance(self) -> None:
-        """Run for a stretch of time; see `TrialRunner.advance`."""
-        self._runner.advance(watched=self.watched)
+        """Run for a stretch of time; a leased trial in which an engine of another package fails is refused."""
+        try:
+            self._simulation.advance(watched=self.watched)
+        except MemberError as error:
+            if (refusal := self._leases.fail(error)) is None:
+                raise
+            self._begin_next()
+            self._episodes.publish(pack(refusal, self._signer))
 
     def follow_up(self) -> None:
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""

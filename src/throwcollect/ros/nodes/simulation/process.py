@@ -11,7 +11,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
 from throwcollect.ros.nodes.simulation.node import SimulationNode
 from throwcollect.ros.self_check import begin_to_serve
-from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.live import LiveSimulator
 
 
 def run(config: Path, *, name: str, namespace: str | None = None) -> None:
@@ -24,7 +24,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
         name: Name of the node.
         namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
     """
-    simulation = Simulation(load(config))
+    simulation = LiveSimulator(load(config))
     if namespace is None and simulation.config.run.root_namespace:
         namespace = "/"
     ros.init()

@@ -10,7 +10,7 @@ from throwcollect.ros.action import SimulateSteps
 from throwcollect.ros.msg import Result
 from throwcollect.ros.nodes.simulation.answers import refusal
 from throwcollect.ros.srv import StepSimulation
-from throwcollect.sim.simulation import Simulation, StepRequest
+from throwcollect.sim.live import LiveSimulator, StepRequest
 
 _ACTION = "simulate_steps"
 _MOST_STEPS = 100_000
@@ -24,7 +24,7 @@ class Stepping:
     meanwhile.
     """
 
-    def __init__(self, node: Node, simulation: Simulation) -> None:
+    def __init__(self, node: Node, simulation: LiveSimulator) -> None:
         self._node = node
         self._simulation = simulation
         self._awaited: list[tuple[StepRequest, Future, Any | None]] = []

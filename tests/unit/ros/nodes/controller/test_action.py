@@ -11,8 +11,8 @@ from throwcollect.config.schema import Config
 from throwcollect.ros import GoalResponse
 from throwcollect.ros.nodes.controller import action as controller_action
 from throwcollect.ros.nodes.controller.action import ControllerAction
-from throwcollect.ros.nodes.controller.messages import feedback_message, read_goal, read_trajectory
-from throwcollect.sim.simulation import Simulation
+from throwcollect.ros.nodes.controller.messages import feedback_message, read_trajectory
+from throwcollect.sim.live import LiveSimulator
 
 
 class Server:
@@ -36,19 +36,19 @@ class Handle:
 
 @pytest.fixture
 def simulation() -> Any:
-    simulation = Simulation(Config())
+    simulation = LiveSimulator(Config())
     yield simulation
-    simulation.world.close()
+    simulation.close()
 
 
 @pytest.fixture
-def action(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> ControllerAction:
+def action(simulation: LiveSimulator, monkeypatch: pytest.MonkeyPatch) -> ControllerAction:
     monkeypatch.setattr(controller_action, "ActionServer", Server)
     node: Any = SimpleNamespace(get_name=lambda: ARM, count_subscribers=lambda _topic: 1)
     return ControllerAction(node, simulation, ARM, aborts_refused=False)
 
 
-def advance(simulation: Simulation, action: ControllerAction) -> None:
+def advance(simulation: LiveSimulator, action: ControllerAction) -> None:
     """Advance by a stretch of 50 ms, and send the feedback that follows."""
     assert action.watched
     simulation.advance(watched=True)
@@ -60,7 +60,7 @@ def advance(simulation: Simulation, action: ControllerAction) -> None:
 
 @pytest.mark.parametrize("stretches_before", [0, 1, 3])
 def test_a_goal_with_a_late_handle_gets_all_its_feedback(
-    stretches_before: int, simulation: Simulation, action: ControllerAction
+    stretches_before: int, simulation: LiveSimulator, action: ControllerAction
 ) -> None:
     server: Any = action._server
     assert server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.7)) is GoalResponse.ACCEPT
@@ -73,7 +73,7 @@ def test_a_goal_with_a_late_handle_gets_all_its_feedback(
 
 
 def test_a_goal_that_ended_before_its_handle_gets_only_its_own_feedback(
-    simulation: Simulation, action: ControllerAction
+    simulation: LiveSimulator, action: ControllerAction
 ) -> None:
     server: Any = action._server
     server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.7))
@@ -88,19 +88,21 @@ def test_a_goal_that_ended_before_its_handle_gets_only_its_own_feedback(
     assert (first.told, second.told) == ([50], [52, 102])
 
 
-def test_the_result_of_a_leased_goal_is_not_that_of_a_client(simulation: Simulation, action: ControllerAction) -> None:
+def test_the_result_of_a_leased_goal_is_not_that_of_a_client(
+    simulation: LiveSimulator, action: ControllerAction
+) -> None:
     server: Any = action._server
     server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.7))
-    simulation.lease(1, simulation.config, {ARM: read_goal(goal(ARM, 0.2, arm_right_4_joint=-1.7))})
+    simulation.begin(1, {})
     for _ in range(10):
         for _, result in simulation.pop_results():
             action.finish(result)
         simulation.advance(watched=True)
-    simulation.end_lease()
+    simulation.drop()
     assert action._goals[1].result.result().error_string == "simulation was reset"
 
 
-def test_feedback_on_a_trajectory_stamped_decades_ago_can_be_serialized(simulation: Simulation) -> None:
+def test_feedback_on_a_trajectory_stamped_decades_ago_can_be_serialized(simulation: LiveSimulator) -> None:
     message = goal(ARM, 1.0).trajectory
     message.header.stamp.sec = -(2**31) + 1
     message.points = message.points[-1:]

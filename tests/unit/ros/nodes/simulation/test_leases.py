@@ -15,12 +15,11 @@ BAD = Lease.make("/sim_0", 99, {}, Signer(b""))
 
 
 class Runner:
-    """Stands in for the runner of trials: they end when a test says so."""
+    """Stands in for a simulator: its trials end when a test wants that."""
 
     def __init__(self) -> None:
         self.begun: list[int] = []
         self.dropped = 0
-        self.is_released = False
         self.yields: Any = None
 
     def begin(self, trial: int, _values: Mapping[str, float]) -> None:
@@ -30,9 +29,6 @@ class Runner:
 
     def drop(self) -> None:
         self.dropped += 1
-
-    def release_lease(self) -> None:
-        self.is_released = True
 
     def hand_over(self) -> Any:
         yields, self.yields = self.yields, None
@@ -145,6 +141,13 @@ def test_an_episode_without_a_lease_is_handed_over_as_well() -> None:
 def test_leases_that_are_cleared_are_forgotten() -> None:
     queue, runner = queue_of(A, B)
     queue.clear()
-    assert runner.is_released
     assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0], 0)
+
+
+def test_a_trial_in_which_the_engine_fails_is_dropped_and_refused() -> None:
+    queue, runner = queue_of(A, B)
+    assert queue.fail(ThrowcollectError("broken")) == TrialRefusal(A.trial, "broken")
+    assert queue.begin_next() is None
+    assert (runner.begun, runner.dropped) == ([0, 1], 1)
+    assert queue_of()[0].fail(ThrowcollectError("broken")) is None

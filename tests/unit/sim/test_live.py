@@ -11,8 +11,8 @@ from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
+from throwcollect.sim.live import LiveSimulator, StateCode
 from throwcollect.sim.present_trial import TrialSetup
-from throwcollect.sim.simulation import Scope, Simulation, StateCode
 
 CONFIG = Config()
 POSTURE = start_posture(CONFIG)
@@ -33,14 +33,14 @@ def swing() -> TrajectoryGoal:
 
 
 @pytest.fixture(scope="module")
-def shared() -> Iterator[Simulation]:
-    simulation = Simulation(CONFIG)
+def shared() -> Iterator[LiveSimulator]:
+    simulation = LiveSimulator(CONFIG)
     yield simulation
-    simulation.world.close()
+    simulation.close()
 
 
 @pytest.fixture
-def simulation(shared: Simulation) -> Simulation:
+def simulation(shared: LiveSimulator) -> LiveSimulator:
     shared.trial.setup = TrialSetup(-1, (), CONFIG)
     shared.state = StateCode.PLAYING
     shared.reset()
@@ -48,7 +48,7 @@ def simulation(shared: Simulation) -> Simulation:
     return shared
 
 
-def run(simulation: Simulation) -> None:
+def run(simulation: LiveSimulator) -> None:
     for _ in range(1000):
         if not simulation.running:
             return
@@ -56,7 +56,7 @@ def run(simulation: Simulation) -> None:
     pytest.fail("the run does not end")
 
 
-def trial(simulation: Simulation, number: int = 0) -> None:
+def trial(simulation: LiveSimulator, number: int = 0) -> None:
     simulation.trial.setup = TrialSetup(number, (ARM, TORSO), CONFIG)
     simulation.reset()
     assert simulation.submit(ARM, 1, swing()) is None
@@ -64,13 +64,13 @@ def trial(simulation: Simulation, number: int = 0) -> None:
     assert simulation.submit(TORSO, 2, goal(TORSO)) is None
 
 
-def test_the_clock_stands_still_until_every_awaited_controller_has_a_goal(simulation: Simulation) -> None:
+def test_the_clock_stands_still_until_every_awaited_controller_has_a_goal(simulation: LiveSimulator) -> None:
     trial(simulation)
     assert simulation.running
     assert simulation.now_ns == CONFIG.trial_start_ns(0)
 
 
-def test_a_trajectory_without_a_goal_waits_for_the_awaited_goals(simulation: Simulation) -> None:
+def test_a_trajectory_without_a_goal_waits_for_the_awaited_goals(simulation: LiveSimulator) -> None:
     simulation.trial.setup = TrialSetup(0, (ARM,), CONFIG)
     simulation.reset()
     assert simulation.follow(HEAD, goal(HEAD).trajectory) is None
@@ -79,28 +79,28 @@ def test_a_trajectory_without_a_goal_waits_for_the_awaited_goals(simulation: Sim
     assert simulation.running
 
 
-def test_a_trial_yields_its_episode_once_and_with_the_results_of_its_goals(simulation: Simulation) -> None:
+def test_a_trial_yields_its_episode_once_and_with_the_results_of_its_goals(simulation: LiveSimulator) -> None:
     trial(simulation, 3)
     run(simulation)
-    episode = simulation.episode()
+    episode = simulation.take_recording()
     assert episode is not None
     header, samples, states = episode
     assert (header.trial, header.end_reason, header.start_ns) == (3, "landed", CONFIG.trial_start_ns(3))
     assert [(each.controller, each.status) for each in header.goals] == [(ARM, 4), (TORSO, 4)]
     assert header.samples == len(samples.stamps_ns)
     assert states == {}
-    assert simulation.episode() is None
+    assert simulation.take_recording() is None
 
 
-def test_the_same_trial_gives_the_same_samples_however_it_is_divided(simulation: Simulation) -> None:
+def test_the_same_trial_gives_the_same_samples_however_it_is_divided(simulation: LiveSimulator) -> None:
     trial(simulation)
     run(simulation)
-    whole = simulation.episode()
+    whole = simulation.take_recording()
     trial(simulation)
     simulation.state = StateCode.PAUSED
     for steps in (1, 2, 77, 3, 400, 1000):
         simulation.step(steps)
-    divided = simulation.episode()
+    divided = simulation.take_recording()
     assert whole is not None
     assert divided is not None
     assert whole[0] == divided[0]
@@ -108,10 +108,10 @@ def test_the_same_trial_gives_the_same_samples_however_it_is_divided(simulation:
         assert np.array_equal(column, getattr(divided[1], name)), name
 
 
-def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Simulation) -> None:
+def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: LiveSimulator) -> None:
     trial(simulation)
     run(simulation)
-    episode = simulation.episode()
+    episode = simulation.take_recording()
     assert episode is not None
     samples = episode[1]
     x = np.minimum((samples.stamps_ns - samples.stamps_ns[0]) / 1e9, 1.0)
@@ -119,7 +119,7 @@ def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Sim
     assert np.abs(samples.position[:, 10] - wanted).max() < 1e-4
 
 
-def test_desired_and_measured_state_of_a_controller_are_of_the_same_instant(simulation: Simulation) -> None:
+def test_desired_and_measured_state_of_a_controller_are_of_the_same_instant(simulation: LiveSimulator) -> None:
     simulation.submit(ARM, 1, goal(ARM, 2.0, arm_right_4_joint=-0.5))
     simulation.step(500)
     state, now_ns = simulation.observe(ARM).state(simulation.now_ns), simulation.now_ns
@@ -130,24 +130,24 @@ def test_desired_and_measured_state_of_a_controller_are_of_the_same_instant(simu
     assert simulation.observe(HEAD).state(simulation.now_ns).stamp_ns == now_ns
 
 
-def test_a_goal_that_moves_a_locked_joint_is_refused_by_name(simulation: Simulation) -> None:
+def test_a_goal_that_moves_a_locked_joint_is_refused_by_name(simulation: LiveSimulator) -> None:
     refusal = simulation.submit(HEAD, 1, goal(HEAD, head_1_joint=0.2))
     assert refusal is not None
     assert refusal.text == f"{HEAD}: head_1_joint is locked at 0 rad (robot.locked) and cannot go to 0.2 rad"
     assert not simulation.running
 
 
-def test_a_locked_limb_carries_out_a_goal_that_does_not_move_it(simulation: Simulation) -> None:
+def test_a_locked_limb_carries_out_a_goal_that_does_not_move_it(simulation: LiveSimulator) -> None:
     assert simulation.submit(HEAD, 5, goal(HEAD, duration_s=0.2)) is None
     run(simulation)
     assert [(name, result.status) for name, result in simulation.pop_results()] == [(HEAD, GoalStatus.SUCCEEDED)]
 
 
-def test_without_a_trial_the_run_ends_when_limbs_and_ball_are_at_rest(simulation: Simulation) -> None:
+def test_without_a_trial_the_run_ends_when_limbs_and_ball_are_at_rest(simulation: LiveSimulator) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     run(simulation)
     assert simulation.world.end_reason == "landed"
-    assert simulation.episode() is None
+    assert simulation.take_recording() is None
     ended = simulation.now_ns
     assert simulation.submit(ARM, 2, goal(ARM, arm_right_4_joint=-1.0)) is None
     run(simulation)
@@ -158,7 +158,7 @@ def test_without_a_trial_the_run_ends_when_limbs_and_ball_are_at_rest(simulation
 @pytest.mark.parametrize("engine", ["bullet", "mujoco", "ballistic"])
 def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then(engine: str) -> None:
     config = Config.model_validate({"sim": {"engine": engine}, "ball": {"restitution": 0.5}})
-    simulation = Simulation(config)
+    simulation = LiveSimulator(config)
     # The second fall begins after the longest duration of a trial.
     for number, duration_s in enumerate((7.0, 0.02)):
         simulation.world.ball = BodyState((2.0, 0.0, 1.0))
@@ -167,10 +167,10 @@ def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then
         ball = simulation.world.ball
         assert ball.position == pytest.approx((2.0, 0.0, config.ball.radius_m), abs=2e-3)
         assert np.hypot(*ball.linear_velocity[:2]) + abs(ball.linear_velocity[2]) < 0.01
-    simulation.world.close()
+    simulation.close()
 
 
-def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_trial(simulation: Simulation) -> None:
+def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_trial(simulation: LiveSimulator) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     run(simulation)
     rolling = simulation.world.ball
@@ -179,39 +179,39 @@ def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_tri
     assert simulation.now_ns / 1e9 == pytest.approx(1.0 + CONFIG.sim.max_trial_s, abs=0.1)
 
 
-def test_after_a_trial_the_ground_stops_the_ball(simulation: Simulation) -> None:
+def test_after_a_trial_the_ground_stops_the_ball(simulation: LiveSimulator) -> None:
     trial(simulation)
     run(simulation)
-    assert simulation.episode() is not None
+    assert simulation.take_recording() is not None
     assert simulation.submit(ARM, 3, swing()) is None
     run(simulation)
     assert simulation.world.ball.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
 
 
-def test_a_motion_by_hand_leaves_no_trace_in_a_later_trial(simulation: Simulation) -> None:
+def test_a_motion_by_hand_leaves_no_trace_in_a_later_trial(simulation: LiveSimulator) -> None:
     trial(simulation)
     run(simulation)
-    fresh = simulation.episode()
+    fresh = simulation.take_recording()
     simulation.trial.setup = TrialSetup(-1, (), CONFIG)
     simulation.reset()
     assert simulation.submit(ARM, 1, swing()) is None
     run(simulation)
     trial(simulation)
     run(simulation)
-    later = simulation.episode()
+    later = simulation.take_recording()
     assert fresh is not None
     assert later is not None
     assert later[0] == fresh[0]
     assert np.array_equal(later[1].ball_position, fresh[1].ball_position)
 
 
-def test_a_run_of_a_trajectory_without_a_goal_ends(simulation: Simulation) -> None:
+def test_a_run_of_a_trajectory_without_a_goal_ends(simulation: LiveSimulator) -> None:
     assert simulation.follow(ARM, swing().trajectory) is None
     run(simulation)
     assert simulation.now_ns > 1e9
 
 
-def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: Simulation) -> None:
+def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: LiveSimulator) -> None:
     trial(simulation)
     simulation.advance(watched=True)
     simulation.reset()
@@ -222,7 +222,7 @@ def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: Simulation)
     assert not simulation.running
 
 
-def test_a_cancelled_goal_stops_the_limb_where_it_is(simulation: Simulation) -> None:
+def test_a_cancelled_goal_stops_the_limb_where_it_is(simulation: LiveSimulator) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     for _ in range(10):
         simulation.advance(watched=True)
@@ -234,13 +234,13 @@ def test_a_cancelled_goal_stops_the_limb_where_it_is(simulation: Simulation) -> 
     assert [result.status for _, result in simulation.pop_results()] == [GoalStatus.CANCELED]
 
 
-def test_while_paused_steps_advance_the_clock_exactly(simulation: Simulation) -> None:
+def test_while_paused_steps_advance_the_clock_exactly(simulation: LiveSimulator) -> None:
     simulation.set_state(StateCode.PAUSED)
     simulation.step(10)
     assert simulation.now_ns == 10 * 10**9 // CONFIG.sim.physics_hz
 
 
-def test_requested_steps_are_taken_stretch_by_stretch(simulation: Simulation) -> None:
+def test_requested_steps_are_taken_stretch_by_stretch(simulation: LiveSimulator) -> None:
     simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(60)
     assert simulation.running
@@ -255,13 +255,13 @@ def test_requested_steps_are_taken_stretch_by_stretch(simulation: Simulation) ->
     assert simulation.now_ns == 60 * 10**9 // CONFIG.sim.physics_hz
 
 
-def test_steps_are_refused_unless_the_simulation_is_paused(simulation: Simulation) -> None:
+def test_steps_are_refused_unless_the_simulation_is_paused(simulation: LiveSimulator) -> None:
     with pytest.raises(RequestError, match="paused only; it is PLAYING") as refused:
         simulation.request_steps(1)
     assert refused.value.reason == "RESULT_OPERATION_FAILED"
 
 
-def test_a_request_for_zero_steps_is_over_at_once(simulation: Simulation) -> None:
+def test_a_request_for_zero_steps_is_over_at_once(simulation: LiveSimulator) -> None:
     simulation.set_state(StateCode.PAUSED)
     assert simulation.request_steps(0).is_over
     assert not simulation.running
@@ -270,12 +270,12 @@ def test_a_request_for_zero_steps_is_over_at_once(simulation: Simulation) -> Non
 @pytest.mark.parametrize(
     ("interrupt", "reason"),
     [
-        (lambda simulation: simulation.reset(Scope.TIME), "the simulation was reset"),
-        (lambda simulation: simulation.reset(Scope.STATE), "the simulation was reset"),
+        (lambda simulation: simulation.reset(state=False), "the simulation was reset"),
+        (lambda simulation: simulation.reset(time=False), "the simulation was reset"),
         (lambda simulation: simulation.set_state(StateCode.QUITTING), "the simulation is QUITTING now"),
     ],
 )
-def test_a_reset_or_quitting_interrupts_steps(interrupt, reason: str, simulation: Simulation) -> None:
+def test_a_reset_or_quitting_interrupts_steps(interrupt, reason: str, simulation: LiveSimulator) -> None:
     simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(10**9)
     simulation.advance(watched=True)
@@ -284,29 +284,29 @@ def test_a_reset_or_quitting_interrupts_steps(interrupt, reason: str, simulation
     assert not simulation.running
 
 
-@pytest.mark.parametrize("scope", [Scope.TIME, Scope.STATE])
-def test_only_a_reset_of_time_and_state_together_begins_a_trial(scope: Scope, simulation: Simulation) -> None:
+@pytest.mark.parametrize("of_time", [True, False])
+def test_only_a_reset_of_time_and_state_together_begins_a_trial(of_time: bool, simulation: LiveSimulator) -> None:
     trial(simulation)
     simulation.advance(watched=True)
-    simulation.reset(scope)
-    assert simulation.now_ns == CONFIG.trial_start_ns(0) + (0 if Scope.TIME in scope else 50_000_000)
+    simulation.reset(time=of_time, state=not of_time)
+    assert simulation.now_ns == CONFIG.trial_start_ns(0) + (0 if of_time else 50_000_000)
     assert [result.error_string for _, result in simulation.pop_results()] == ["simulation was reset"] * 2
     assert simulation.submit(ARM, 3, swing()) is None
     assert simulation.submit(TORSO, 4, goal(TORSO)) is None
     run(simulation)
-    assert simulation.episode() is None
-    simulation.reset(Scope.TIME | Scope.STATE)
+    assert simulation.take_recording() is None
+    simulation.reset()
     assert simulation.submit(ARM, 5, swing()) is None
     assert simulation.submit(TORSO, 6, goal(TORSO)) is None
     run(simulation)
-    assert simulation.episode() is not None
+    assert simulation.take_recording() is not None
 
 
-def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: Simulation) -> None:
+def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: LiveSimulator) -> None:
     simulation.set_state(StateCode.PAUSED)
     assert simulation.submit(ARM, 1, swing()) is None
     simulation.step(250)
-    simulation.reset(Scope.TIME)
+    simulation.reset(state=False)
     before = simulation.world.joints()[0]
     ball = simulation.world.ball
     assert simulation.now_ns == 0
@@ -319,22 +319,22 @@ def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: Simulation) ->
 
 def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:
     config = Config.model_validate({"record": {"topics": ["joint_states", "ball/odometry", "controller_state"]}})
-    simulation = Simulation(config)
+    simulation = LiveSimulator(config)
     trial(simulation)
     run(simulation)
-    kept = simulation.episode()
+    kept = simulation.take_recording()
     assert kept is not None
     header, samples, states = kept
     assert len(states[ARM].position) == header.samples
     elbow = TALOS.controllers[ARM].index("arm_right_4_joint")
     assert np.abs(states[ARM].position[:, elbow] - samples.position[:, 10]).max() < 1e-4
     assert states[ARM].elapsed_ns[5] == samples.stamps_ns[5] - samples.stamps_ns[0]
-    simulation.world.close()
+    simulation.close()
 
 
 def test_a_result_that_comes_with_the_episode_is_still_reported() -> None:
     config = Config.model_validate({"record": {"topics": ["joint_states", "ball/odometry", "controller_state"]}})
-    simulation = Simulation(config)
+    simulation = LiveSimulator(config)
     trial(simulation)
     run(simulation)
     lasted_s = (simulation.now_ns - config.trial_start_ns(0)) / 1e9
@@ -344,12 +344,12 @@ def test_a_result_that_comes_with_the_episode_is_still_reported() -> None:
     simulation.submit(TORSO, 2, goal(TORSO, lasted_s + 1 / config.sim.physics_hz))
     run(simulation)
     assert [name for name, _ in simulation.pop_results()] == [ARM]
-    assert simulation.episode() is not None
+    assert simulation.take_recording() is not None
     assert [(name, result.status) for name, result in simulation.pop_results()] == [(TORSO, GoalStatus.SUCCEEDED)]
-    simulation.world.close()
+    simulation.close()
 
 
-def test_a_real_time_factor_holds_the_clock_back(simulation: Simulation) -> None:
+def test_a_real_time_factor_holds_the_clock_back(simulation: LiveSimulator) -> None:
     trial(simulation)
     simulation.real_time_factor = 1.0
     simulation.fresh_samples()
@@ -365,10 +365,10 @@ def test_a_real_time_factor_holds_the_clock_back(simulation: Simulation) -> None
 
 @pytest.mark.parametrize(("leased", "watched", "samples"), [(True, False, 12), (True, True, 1), (False, False, 1)])
 def test_a_leased_trial_without_listeners_advances_in_long_stretches(
-    simulation: Simulation, *, leased: bool, watched: bool, samples: int
+    simulation: LiveSimulator, *, leased: bool, watched: bool, samples: int
 ) -> None:
     if leased:
-        simulation.lease(0, CONFIG, {ARM: swing()})
+        simulation.begin(0, {})
     else:
         trial(simulation)
     simulation.real_time_factor = 1.0
@@ -376,10 +376,10 @@ def test_a_leased_trial_without_listeners_advances_in_long_stretches(
     simulation.advance(watched=watched)
     simulation.real_time_factor = None
     assert len(simulation.fresh_samples()) == samples
-    simulation.end_lease()
+    simulation.drop()
 
 
-def test_samples_come_one_by_one_after_steps_that_ended_between_two(simulation: Simulation) -> None:
+def test_samples_come_one_by_one_after_steps_that_ended_between_two(simulation: LiveSimulator) -> None:
     simulation.state = StateCode.PAUSED
     simulation.request_steps(3)
     simulation.advance(watched=True)
@@ -395,7 +395,7 @@ def test_samples_come_one_by_one_after_steps_that_ended_between_two(simulation: 
 
 def test_after_a_failed_reset_the_clock_stands_still_until_one_succeeds() -> None:
     config = Config.model_validate({"sim": {"engine": "ballistic"}, "tool": {"cup_floor_radius_m": 0.006}})
-    simulation = Simulation(config)
+    simulation = LiveSimulator(config)
     simulation.trial.setup = TrialSetup(0, (), config)
     simulation.reset()
     simulation.submit(ARM, 1, swing())
@@ -413,6 +413,6 @@ def test_after_a_failed_reset_the_clock_stands_still_until_one_succeeds() -> Non
     simulation.reset()
     simulation.submit(ARM, 3, swing())
     run(simulation)
-    episode = simulation.episode()
+    episode = simulation.take_recording()
     assert episode is not None
     assert [each.status for each in episode[0].goals] == [4]

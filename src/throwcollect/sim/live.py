@@ -1,0 +1,221 @@
+"""A simulator as the clients of its node drive it, without messages."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+from throwcollect.config.schema import Config
+from throwcollect.control import JointTrajectoryController, Trajectory, TrajectoryGoal, TrajectoryRefusal
+from throwcollect.episode.record import Samples
+from throwcollect.errors import RequestError
+from throwcollect.sim.pace import (
+    WATCHED_STRETCH_S,
+    Pace,
+    long_stretch_steps,
+    longest_steps,
+    stretch_steps,
+)
+from throwcollect.sim.simulator import STRETCH_S, Simulator
+from throwcollect.units import NS_PER_S
+
+
+class StateCode(IntEnum):
+    """States of simulation_interfaces/msg/SimulationState that are used here."""
+
+    STOPPED = 0
+    PLAYING = 1
+    PAUSED = 2
+    QUITTING = 3
+
+
+@dataclass
+class StepRequest:
+    """Physics steps that a client wants while the clock stands still, and how far they have come.
+
+    Attributes:
+        wanted: Number of steps that the client wants.
+        taken: Number of steps that have been taken so far.
+        interruption: Why no more steps will be taken; None if nothing has interrupted them.
+    """
+
+    wanted: int
+    taken: int = 0
+    interruption: str | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no more steps will be taken."""
+        return self.interruption is not None or self.taken >= self.wanted
+
+
+class LiveSimulator(Simulator):
+    """A simulator that clients drive, too: it plays, pauses, steps and keeps pace with real time.
+
+    Outside of trials, the clock runs while a limb or the ball moves, and stands still otherwise.
+
+    Attributes:
+        state: Whether the clock may run.
+        real_time_factor: Simulated over real time [-]; None for no limit.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.state = StateCode.PLAYING
+        self.real_time_factor = config.sim.real_time_factor
+        self._pace = Pace()
+        self._steps: StepRequest | None = None
+        self._driven_until_ns = 0
+        """Time at which a client last moved a limb [ns], or gave it something to do."""
+        self._has_start = False
+        """Whether the world has a start state to go on from, which it lacks after a reset of its state has failed."""
+        super().__init__(config)
+
+    @property
+    def running(self) -> bool:
+        """Whether there is something to `advance`: the clock runs, or steps are left to be taken."""
+        return self._steps is not None or (self._running and self._has_start and self.state == StateCode.PLAYING)
+
+    def set_state(self, state: StateCode) -> None:
+        """Play, pause, stop or quit; stopping resets everything."""
+        if state == StateCode.STOPPED:
+            self.trial.require_free()
+        self.state = state
+        self._interrupt_steps(f"the simulation is {state.name} now")
+        if state == StateCode.STOPPED:
+            self.reset()
+
+    def begin(self, number: int, values: Mapping[str, float]) -> None:
+        """Begin a trial; see `Simulator.begin`."""
+        super().begin(number, values)
+        self._begin_motion()
+
+    def reset(self, *, time: bool = True, state: bool = True) -> None:
+        """Go back to the start, in whole or in part; see `Simulator.reset`."""
+        self._interrupt_steps("the simulation was reset")
+        self._running = False
+        self._published = 0
+        self._has_start &= not state
+        super().reset(time=time, state=state)
+        self._has_start |= state
+
+    def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
+        """Give a goal to a controller, or refuse it; a run begins once all controllers that need a goal have one."""
+        if (leased := self.trial.refusal) is not None:
+            return leased
+        if (refusal := self.give(controller, goal_id, goal)) is None:
+            self._begin_motion()
+        return refusal
+
+    def cancel(self, controller: str, goal_id: Hashable) -> bool:
+        """Cancel a goal; return False if it was not being executed, or the simulation is leased."""
+        if self.trial.leased:
+            return False
+        cancelled = self.observe(controller).cancel(goal_id)
+        self._collect_results()
+        return cancelled
+
+    def follow(self, controller: str, trajectory: Trajectory) -> TrajectoryRefusal | None:
+        """Let a controller follow a trajectory that is no goal, or refuse it; a run begins unless a goal is missing."""
+        if (leased := self.trial.refusal) is not None:
+            return leased
+        limb = self.limbs[controller]
+        refusal = limb.refuse_locked(trajectory) or limb.controller.replace(trajectory, self.now_ns)
+        self._collect_results()
+        if refusal is None:
+            self._begin_motion()
+        return refusal
+
+    def advance(self, *, watched: bool) -> None:
+        """Run for a stretch of time, or until the run ends; with a real-time factor, take as much time as it says.
+
+        The stretch has to be short if a client listens (`watched`).
+        """
+        began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
+        # Long stretches cost the least. Short ones let messages be sent in between, which only watching clients need.
+        stretch_s = STRETCH_S if (self._in_trial or self._steps) and not (watched or factor) else WATCHED_STRETCH_S
+        steps = max(1, round(stretch_s * self.config.sim.physics_hz))
+        if (request := self._steps) is not None:
+            request.taken += self.step(min(steps, request.wanted - request.taken))
+            if request.is_over:
+                self._steps = None
+            return
+        if factor and self.trial.leased and not watched:
+            # Every stretch costs time besides physics, so stretches are as long as requests can wait.
+            steps = long_stretch_steps(factor, self.config.sim.physics_hz, STRETCH_S)
+        elif factor:
+            steps = stretch_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
+        self.step(steps)
+        # A trial ends when its rules say so; a motion by hand, when limbs and ball rest, or it rolls for too long.
+        if self._in_trial:
+            self._running = self.world.end_reason is None
+        elif any(limb.is_driven for limb in self.limbs.values()):
+            self._driven_until_ns = self.now_ns
+        elif self.world.rests or self.now_ns - self._driven_until_ns >= self.config.sim.max_trial_s * NS_PER_S:
+            self._running = False
+        if factor:
+            self._pace.wait(factor, began_s=began_s, since_ns=since_ns, until_ns=self.now_ns)
+
+    @property
+    def feedback_ns(self) -> int:
+        """Simulated time between two messages of feedback [ns]; 0 to send feedback after every stretch."""
+        if not self.real_time_factor or self.state != StateCode.PLAYING:
+            return 0
+        return longest_steps(self.real_time_factor, self.config.sim.physics_hz) * self._period_ns
+
+    def request_steps(self, steps: int) -> StepRequest:
+        """Have `advance` take physics steps while the clock stands still; trials may end on the way.
+
+        The request that is returned is kept up to date.
+        """
+        if self.state != StateCode.PAUSED:
+            message = f"steps are taken while the simulation is paused only; it is {self.state.name}"
+            raise RequestError("RESULT_OPERATION_FAILED", message)
+        if not self._has_start:
+            raise RequestError("RESULT_INCORRECT_STATE", "there is no start state until a reset succeeds")
+        if self._steps is not None:
+            message = f"{self._steps.taken} of {self._steps.wanted} steps of another request have been taken"
+            raise RequestError("RESULT_INCORRECT_STATE", message, hint="wait for its end")
+        request = StepRequest(steps)
+        if not request.is_over:
+            self._steps = request
+        return request
+
+    def cancel_steps(self, request: StepRequest) -> None:
+        """Take no more steps of a request."""
+        if request is self._steps:
+            self._interrupt_steps("cancelled")
+
+    def fresh_samples(self) -> Samples:
+        """Return the samples that were recorded since the last call."""
+        first, self._published = self._published, self.world.recorded
+        return self.world.samples(first)
+
+    def last_sample(self) -> Samples:
+        """Return the sample that was recorded last."""
+        return self.world.samples(self.world.recorded - 1)
+
+    def observe(self, controller: str) -> JointTrajectoryController:
+        """Return a controller after it has seen the present state of its joints, which its `state` and `query` need."""
+        limb = self.limbs[controller]
+        limb.controller.observe(limb.measure(*self.world.joints()))
+        return limb.controller
+
+    def watch(self, controllers: Iterable[str]) -> None:
+        """Keep the states of these controllers, and of no others, for `LimbController.pop_states`."""
+        self._watched = [self.limbs[name] for name in controllers]
+        for limb in self.limbs.values():
+            limb.watched = limb in self._watched
+            if not limb.watched:
+                # A client that watches this limb later must not get states from before that.
+                limb.pop_states()
+
+    def _begin_motion(self) -> None:
+        self._driven_until_ns = self.now_ns
+        self._running |= self.trial.has_all_goals
+
+    def _interrupt_steps(self, reason: str) -> None:
+        if self._steps is not None:
+            self._steps.interruption = reason
+            self._steps = None

@@ -1,0 +1,266 @@
+"""One simulator: the world, the controllers of the limbs, the clock, and the trial that it simulates.
+
+Replays, scores, the runtime in one process and Python programs call `Simulator.run`. The node of a simulation steps it
+by itself, because it answers messages between the steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping
+from weakref import finalize
+
+import numpy as np
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
+from throwcollect.control import GoalResult, TrajectoryGoal, TrajectoryRefusal
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk_encoder import ChunkEncoder
+from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples, find_infinite_columns
+from throwcollect.errors import ThrowcollectError
+from throwcollect.members import explain_failure
+from throwcollect.robots.description import full_description, robot_of, start_posture
+from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.sim.limb_controller import LimbController
+from throwcollect.sim.present_trial import PresentTrial, TrialSetup
+from throwcollect.sim.world import World
+from throwcollect.sweep.trials import Trial
+from throwcollect.tasks.task import task_of, trajectory_of
+from throwcollect.trial.conditions import Conditions, Settings, build_of
+from throwcollect.trial.goals import trial_goals
+from throwcollect.units import NS_PER_S
+
+STRETCH_S = 0.5
+"""Simulated time that is stepped in one call: about 20 ms of real time."""
+
+
+class Simulator:
+    """Simulates trials of one configuration, one after the other; an episode depends on its trial alone, bit for bit.
+
+    Attributes:
+        config: The configuration; a trial replaces some of its values.
+        channels: The topics that are recorded of a trial.
+        world: The world: engine, robot, ball and clock.
+        limbs: The controllers, by name.
+        trial: The trial that is simulated, and the one that the next reset begins.
+        close: Frees the world, as the end of this object does, too; no trial can be run afterwards.
+
+    Raises:
+        ConfigError: If the configuration does not describe a world.
+        WorkerError: If the physics engine does not start.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+        self.channels = Channels(config, full_description(config))
+        self.world = World(config)
+        self.close = finalize(self, self.world.close)
+        # This is not called when the process ends, which frees all worlds, because engines may be unloaded by then.
+        self.close.atexit = False
+        self.trial = PresentTrial(config)
+        self._period_ns = round(NS_PER_S / config.sim.physics_hz)
+        self._stride = config.sim.physics_hz // config.record.rate_hz
+        robot = robot_of(config)
+        self.limbs = {
+            name: LimbController(
+                robot, name, moving=self.world.moving, period_ns=self._period_ns, config=config.controllers
+            )
+            for name in robot.controllers
+        }
+        self._watched: list[LimbController] = []
+        """Limbs whose controllers look at the measured state in every step."""
+        self._keeps_states = "controller_state" in config.record.topics
+        self._results: list[tuple[str, GoalResult]] = []
+        self._settings = Settings(config)
+        self._encoder = ChunkEncoder(self.channels, level=config.record.zstd_level)
+        self._columns = task_of(config).columns
+        self.reset()
+
+    @property
+    def now_ns(self) -> int:
+        """Simulated time [ns]."""
+        return self.world.stamp_ns
+
+    def run(self, trial: Trial) -> Episode:
+        """Simulate a trial, which need not be in a plan; return its episode, with its result and conditions."""
+        self.begin(trial.number, trial.values)
+        steps = round(STRETCH_S * self.config.sim.physics_hz)
+        while (episode := self.hand_over()) is None:
+            self.step(steps)
+        self.pop_results()
+        return episode
+
+    def begin(self, number: int, values: Mapping[str, float]) -> None:
+        """Begin a trial: controllers are as they are configured, and get the goals that follow from the trial.
+
+        Args:
+            number: Number of the trial.
+            values: Values by dotted key, which replace the values of the configuration.
+        """
+        # If this trial cannot begin, the next episode must not be judged by what is left of an earlier trial.
+        self.trial.motion = None
+        config = with_values(self.config, values)
+        motion = trajectory_of(config)
+        goals = trial_goals(robot_of(config), motion, start_posture(config))
+        for limb in self.limbs.values():
+            limb.restore()
+        self.trial.setup = TrialSetup(number, tuple(goals), config)
+        self.reset()
+        for controller, goal in goals.items():
+            # The id of a client's goal is a number. This id is none, so that no client gets the result of this goal.
+            if (refusal := self.give(controller, ("trial", number), goal)) is not None:
+                raise ThrowcollectError(f"trial {number}: {controller} refuses its goal: {refusal}")
+        self.trial.motion = motion
+
+    def drop(self) -> None:
+        """Break off the trial that runs, and go back to the configuration."""
+        self.trial.set_up_nothing()
+        self.reset()
+
+    def reset(self, *, time: bool = True, state: bool = True) -> None:
+        """Go back to the start of the trial that is set up, in whole or in part; this aborts all goals.
+
+        Args:
+            time: Whether the clock goes to the start of the trial.
+            state: Whether world and controllers go to the start state of the trial.
+        """
+        self._in_trial = False
+        self.trial.begin()
+        setup = self.trial.setup
+        start_ns = self.now_ns
+        if time:
+            # Each trial has a slot of time of its own, so that stamps in a dataset never overlap.
+            start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
+        if state:
+            self.world.reset(setup.config, start_ns=start_ns)
+            posture = start_posture(setup.config)
+        else:
+            self.world.restart_clock(start_ns)
+            posture = self.world.posture()
+        for limb in self.limbs.values():
+            limb.reset(start_ns, posture, speed=setup.config.robot.speed_scale)
+        self._collect_results()
+        self._command = np.array([posture[joint] for joint in self.world.moving])
+        # After a reset of time or state alone, what follows is not the trial that the plan has drawn.
+        self._in_trial = setup.number >= 0 and time and state
+
+    def give(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
+        """Give a goal to a controller; return its refusal, or None if the controller accepts the goal."""
+        limb = self.limbs[controller]
+        refusal = limb.refuse_locked(goal.trajectory) or limb.controller.submit(goal_id, goal, self.now_ns)
+        self._collect_results()
+        if refusal is None:
+            self.trial.note_goal(controller)
+        return refusal
+
+    def step(self, steps: int) -> int:
+        """Take physics steps, fewer if the trial ends, or outside of trials a goal; return how many were taken."""
+        if not self._in_trial:
+            self.world.forget_samples()
+        remaining = steps
+        while remaining > 0 and not (self._in_trial and self.world.end_reason is not None):
+            remaining -= self._step_some(remaining)
+            if self._results and not self._in_trial:
+                # A client that waits for the result gets it before time goes on.
+                break
+        return steps - remaining
+
+    def hand_over(self) -> Episode | None:
+        """Return the episode of a trial that has ended, only once; None if there is none.
+
+        The episode is judged if `begin` began the trial.
+        """
+        config, motion = self.trial.begun.config, self.trial.motion
+        if (recording := self.take_recording()) is None:
+            return None
+        header, samples, states = recording
+        if motion is not None:
+            # A trial that a client sets up later starts from the configuration, and not from the values of this trial.
+            self.trial.set_up_nothing()
+        conditions = Conditions(
+            build=build_of(config),
+            settings=self._settings.digest,
+            values=self._settings.find_replaced(config),
+            trajectory=motion.digest if motion else "",
+        )
+        state, table = self._encoder.encode(samples, states)
+        # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
+        result = self._judge(config, motion, table.samples, header) if motion else ""
+        return Episode(header, state, result=result, conditions=conditions.to_json())
+
+    def take_recording(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:
+        """Return what was recorded of a trial that has ended, only once; None while there is no such recording."""
+        if not self._in_trial or (end_reason := self.world.end_reason) is None:
+            return None
+        self._in_trial, self.trial.motion = False, None
+        samples = self.world.samples()
+        header = EpisodeHeader(
+            trial=self.trial.begun.number,
+            start_ns=int(samples.stamps_ns[0]),
+            end_reason=end_reason,
+            contacts=self.world.contacts(),
+            goals=self.trial.outcomes(self.limbs),
+            samples=len(samples),
+        )
+        states = {}
+        if self._keeps_states:
+            # The last sample was recorded after controllers looked at the measured state for the last time.
+            self._look(self.limbs.values())
+            self._collect_results()
+            states = {name: limb.collect_states() for name, limb in self.limbs.items()}
+        return header, samples, states
+
+    def pop_results(self) -> list[tuple[str, GoalResult]]:
+        """Return controllers and results of the goals that have ended since the last call, oldest first."""
+        results, self._results = self._results, []
+        return results
+
+    def _judge(self, config: Config, motion: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:
+        """Judge a trial; return its result in JSON."""
+        if (infinite := next(find_infinite_columns(samples), None)) is not None:
+            raise ThrowcollectError(f"trial {header.trial}: {infinite}")
+        # Writing finds results of a wrong kind. They are a fault of the task, too, so writing stands in this block.
+        with explain_failure("tasks", config.task.name, f"judge trial {header.trial}"):
+            return self._columns.to_json(task_of(config).judge(samples, header, motion))
+
+    def _step_some(self, most: int) -> int:
+        """Take at most `most` steps, so that a controller looks at the measured state when it has to."""
+        moving = [limb for limb in self.limbs.values() if limb.is_driven]
+        free = most
+        if self._keeps_states:
+            # Every controller looks at each sample; between samples there is nothing to keep.
+            moving = list(self.limbs.values())
+            phase = self.world.steps % self._stride
+            free = min(free, self._stride - phase) if phase else 0
+        if self._watched:
+            moving += [limb for limb in self._watched if limb not in moving]
+            free = 0
+        for limb in moving:
+            free = min(free, limb.controller.next_decision())
+        if free > 0:
+            commands = np.tile(self._command, (free, 1))
+            for limb in moving:
+                limb.take(commands)
+        else:
+            self._look(moving)
+            commands = self._command[np.newaxis].copy()
+        self._command = commands[-1].copy()
+        taken = self.world.run(commands, stop_at_end=self._in_trial)
+        self._collect_results()
+        return taken
+
+    def _look(self, limbs: Iterable[LimbController]) -> None:
+        """Let controllers see the measured state, for one control period."""
+        positions, velocities = self.world.joints()
+        keeps = self._keeps_states and self.world.steps % self._stride == 0
+        for limb in limbs:
+            limb.update(self.now_ns, limb.measure(positions, velocities), self._command)
+            if keeps:
+                limb.keep_state()
+
+    def _collect_results(self) -> None:
+        for name, limb in self.limbs.items():
+            for result in limb.pop_results():
+                self._results.append((name, result))
+                self.trial.note_result(name, result)
