@@ -23,6 +23,9 @@ from throwcollect.wording import command
 
 AnySection = TypeVar("AnySection", bound=Section)
 
+Plain = bool | float | str | list[float] | None
+"""A value in a mapping of a configuration."""
+
 _TAG = "tag:yaml.org,2002:"
 _TEXT_TAGS = ("timestamp", "merge", "value")
 """Tags of scalars that are strings here, although YAML 1.1 and ruamel give them another meaning."""
@@ -91,7 +94,7 @@ class Document:
         return made
 
     def override(
-        self, given: str, *, find_default: Callable[[Location], Mapping[str, Any]] = lambda _location: {}
+        self, given: str, *, find_default: Callable[[Location], Mapping[str, Plain]] = lambda _location: {}
     ) -> None:
         """Replace one key; errors in the override are added to the problems.
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from throwcollect.config.document import Document
+from throwcollect.config.document import Document, Plain
 from throwcollect.config.problems import PARAMETERS, Location
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.values import reason_not_sweepable, with_values
@@ -90,7 +90,7 @@ def _escape_character(character: str) -> str:
     return character if plain else f"\\U{ord(character):08x}"
 
 
-def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Any]:
+def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Plain]:
     """Find the default of a mapping that is no section, such as ``task.end``; empty if there is no such mapping."""
     holder: Any = None
     if len(location) > 1:  # keys of the first level are sections or single values
