@@ -214,7 +214,7 @@ def test_a_broken_engine_is_an_error_before_a_run_begins(tmp_path: Path) -> None
 def test_broken_members_stop_only_configurations_that_name_them(tmp_path: Path) -> None:
     for family in ("robots", "tools", "tasks"):
         install(tmp_path, f"broken_{family}", family, "not_there:Member")
-    named = "trials: 3\ntask:\n  name: mine\n  speed: 1\ntool: {name: mine, size: 1}\nuntil: {waved: 3}\n"
+    named = "trials: 3\ntask:\n  name: mine\n  speed: 1\ntool: {name: mine, size: 1}\n"
     (tmp_path / "named.yaml").write_text(named)
     commands = [["config", "named.yaml"], ["init", "--task", "mine"], ["init"], ["config", "throwcollect.yaml"]]
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])

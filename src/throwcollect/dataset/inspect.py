@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.journal import measure_collected_s
@@ -16,7 +17,7 @@ from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
 from throwcollect.progress_log import log_progress
-from throwcollect.sweep.arrow_column import find_range, find_rows
+from throwcollect.sweep.arrow_column import find_range
 from throwcollect.wording import command, join_names
 
 _MOST_NAMED = 5
@@ -62,8 +63,8 @@ def summary(dataset: Dataset) -> Info:
 
 def _find_landing_area(throws: pa.Table, success: str) -> Mapping[str, tuple[float, float]] | None:
     """Find where the throws of this outcome ended; a ball that hit the robot first may cross the landing plane, too."""
-    rows = find_rows(throws["outcome"], success)
-    ranges = {axis: find_range(throws[f"landing_{axis}"], rows) for axis in ("x_m", "y_m")}
+    landed = throws.filter(pc.field("outcome") == success)
+    ranges = {axis: find_range(landed[f"landing_{axis}"]) for axis in ("x_m", "y_m")}
     found = {axis: each for axis, each in ranges.items() if each is not None}
     return found if len(found) == len(ranges) else None
 

@@ -20,7 +20,7 @@ from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import is_there
 from throwcollect.members import explain_failure
-from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_validity
+from throwcollect.sweep.arrow_column import count_values, find_range, make_table
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
@@ -238,7 +238,7 @@ def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
         if unknown := count_values(table[name]).keys() - values:
             return f"{name} is {min(map(repr, unknown))} in some row, which no row of this plan can have"
     places = ("shard", "chunk_offset", "samples", "digest")
-    shard, *rest = (read_validity(table[name].combine_chunks()) for name in places)
+    shard, *rest = (table[name].is_valid().to_numpy() for name in places)
     if not all(np.array_equal(each, shard) for each in rest):
         return "some row has only a part of the place of an episode"
     samples = find_range(table["samples"])

@@ -212,21 +212,21 @@ def check_some_left(found: Sequence[str | None]) -> None:
 
 def _read_trials(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
     """Read the trials of the table of a plan."""
-    from throwcollect.sweep.arrow_column import nan_where_null, read_numbers
+    from throwcollect.sweep.arrow_column import nan_where_null
 
     first = rows["trial"][0].as_py()
-    if not np.array_equal(read_numbers(rows["trial"]), np.arange(first, first + len(rows))):
+    if not np.array_equal(rows["trial"].to_numpy(), np.arange(first, first + len(rows))):
         raise DatasetError(_MISNUMBERED, path=path)
     digests = rows["digest"].to_pylist()
     if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:
         raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
     # The empty array gives the result its shape where no key is swept.
-    values = np.column_stack([np.empty((len(rows), 0)), *(read_numbers(rows[key]) for key in keys)])
+    values = np.column_stack([np.empty((len(rows), 0)), *(rows[key].to_numpy() for key in keys)])
     aims = Targets(targets, np.column_stack([nan_where_null(rows[name]) for name in targets])) if targets else None
     reasons = enumerate(rows["refused"].to_pylist(), first)
     return Trials(
         Points(keys, values, aims),
-        read_numbers(rows["seed"]),
+        rows["seed"].to_numpy(),
         np.frombuffer(bytes.fromhex("".join(digests)), np.uint8).reshape(-1, DIGEST_BYTES),
         first=first,
         refused={number: reason for number, reason in reasons if reason is not None},

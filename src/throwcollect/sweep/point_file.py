@@ -59,12 +59,11 @@ def encode_points(points: Points) -> bytes:
     """Encode points as Parquet for `read_points`; equal points give equal bytes."""
     import pyarrow as pa
 
-    from throwcollect.sweep.arrow_column import make_column, null_where_nan
+    from throwcollect.sweep.arrow_column import null_where_nan
 
     columns: dict[str, Any] = {key: points.values[:, column] for column, key in enumerate(points.keys)}
     if (targets := points.targets) is not None:
-        values = map(null_where_nan, targets.values.T)
-        columns |= {name: make_column(each, pa.float64()) for name, each in zip(targets.names, values, strict=True)}
+        columns |= dict(zip(targets.names, map(null_where_nan, targets.values.T), strict=True))
     return encode_table(pa.table(columns))
 
 

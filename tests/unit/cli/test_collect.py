@@ -38,7 +38,7 @@ def submitted(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("submitted")
 @pytest.mark.parametrize(
     ("options", "name"),
-    [({"check": True}, "--check"), ({"simulations": "4"}, "-n"), ({"runtime": "docker"}, "--runtime")],
+    [({"simulate": False}, "--no-simulate"), ({"simulations": "4"}, "-n"), ({"runtime": "docker"}, "--runtime")],
 )
 def test_resume_of_a_submitted_dataset_refuses_options_that_array_tasks_do_not_use(
     options: dict[str, Any], name: str, tmp_path: Path

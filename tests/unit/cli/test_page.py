@@ -48,7 +48,11 @@ def test_the_page_on_commands_has_every_command_with_its_options() -> None:
             continue
         # Options in the line of a group, such as `ros topic|param ... [--run RUN]`, belong to all its commands.
         named = set().union(*(told.get(path[:length], ()) for length in range(1, len(path) + 1)))
-        options = [each.opts for each in found.params if each.param_type_name == "option" and each.name != "help"]
+        options = [
+            each.opts + each.secondary_opts
+            for each in found.params
+            if each.param_type_name == "option" and each.name != "help"
+        ]
         known = {name for names in options for name in names}
         wrong += [f"{' '.join(path)}: has no {name}" for name in sorted(told[path] - known)]
         wrong += [f"{' '.join(path)}: {names[0]} is missing" for names in options if not named & set(names)]
