@@ -19,7 +19,7 @@ def test_a_collection_without_contacts_can_be_verified_replayed_and_collected_ag
     options = ("--set", "sim.engine=ballistic", "--set", "run.replay=3")
     first = collect(config, directory, 2, *options)
     assert first["outcomes"] == {"landed": 6}
-    verified = call_here("dataset", "verify", directory, "--replay")
+    verified = call_here("dataset", "verify", directory, "--replay", "6")
     assert verified.returncode == 0, verified.stderr
     assert "leaves the tool when the tool would have to pull it" in (directory / "README.md").read_text()
     again = collect_here(directory / "config.yaml", tmp_path / "again")
@@ -31,7 +31,7 @@ def test_mujoco_collects_the_same_files_in_nodes_and_in_one_process(tmp_path: Pa
     mujoco = ("--set", "sim.engine=mujoco")
     first = collect(config, directory, 2, *mujoco)
     assert first["outcomes"] == {"landed": 6}
-    verified = call_here("dataset", "verify", directory, "--replay")
+    verified = call_here("dataset", "verify", directory, "--replay", "6")
     assert verified.returncode == 0, verified.stderr
     assert "Simulated with MuJoCo: rigid bodies" in (directory / "README.md").read_text()
     assert f"| mujoco-core | {version('mujoco-core')} |" in (directory / "README.md").read_text()
