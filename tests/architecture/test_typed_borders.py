@@ -10,7 +10,7 @@ from tests.architecture.parsing import parse
 
 SOURCE = Path(__file__).parents[2] / "src"
 LOOSE = {f"{kind}[str, {value}]" for kind in ("dict", "Mapping") for value in ("Any", "object")}
-DOCUMENTS = {"as_dict", "to_yaml", "bag_information", "Qos.profile", "ValueShape.node"}
+DOCUMENTS = {"as_dict", "to_yaml", "bag_information", "Qos.profile", "ValueShape.node", "Document.override"}
 """Functions whose result becomes JSON or YAML at once, so that it may be a dictionary of anything."""
 
 

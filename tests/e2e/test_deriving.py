@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from tests.e2e.collection import collect_here, fingerprints
+from tests.e2e.collection import collect_here
 from throwcollect.cli.main import app
 from throwcollect.dataset.verify import verify
 
@@ -48,8 +48,6 @@ record:
   zstd_level: 3
 run: {replay: 0}
 """
-OF_DERIVED_ONLY = {"sources.parquet"}
-"""The file that differs in a derived dataset: the table of sources."""
 
 
 @pytest.fixture(scope="module")
@@ -76,25 +74,6 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
                     done = CliRunner().invoke(app, [command, *arguments])
                 assert done.exit_code == 0, done.output
     return directory / "datasets"
-
-
-def collect_anew(derived: Path, directory: Path) -> dict[str, str]:
-    collect_here(derived / "config.yaml", directory)
-    return as_derived(directory)
-
-
-def as_derived(directory: Path) -> dict[str, str]:
-    return {name: digest for name, digest in fingerprints(directory).items() if name not in OF_DERIVED_ONLY}
-
-
-def test_a_merged_dataset_equals_a_collection_of_its_trials(home: Path, tmp_path: Path) -> None:
-    assert verify(home / "both") == []
-    assert as_derived(home / "both") == collect_anew(home / "both", tmp_path / "anew")
-
-
-def test_a_filtered_dataset_equals_a_collection_of_its_trials(home: Path) -> None:
-    assert len(fingerprints(home / "short")) > 1
-    assert as_derived(home / "short") == as_derived(home / "again")
 
 
 def test_verify_finds_nothing_wrong_in_derived_datasets(home: Path) -> None:

@@ -206,7 +206,7 @@ def test_a_finished_dataset_whose_recording_was_cut_goes_on_to_the_same_files(
     config: Path, reference: Path, tmp_path: Path
 ) -> None:
     directory = Path(shutil.copytree(reference, tmp_path / "data"))
-    said = call_here("resume", directory, "--check")
+    said = call_here("resume", directory, *INPROCESS)
     assert (said.returncode, "every trial has ended, nothing is left to do" in said.stderr) == (0, True)
     shard = directory / "small_00000.mcap"
     size = shard.stat().st_size

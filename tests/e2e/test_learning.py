@@ -153,7 +153,7 @@ def test_a_score_measures_hits_in_the_own_and_in_another_world(place: Path) -> N
         ),
         (
             ["aim", "model", "--targets", "throws.yaml"],
-            "throws.yaml:1: the first line should hold the names of the columns, separated",
+            "throws.yaml:1: no column landing_x_m and landing_y_m",
         ),
         (["aim", "data", "--at", "1,0"], "data: holds no model: there is no model.json\n  try: throwcollect fit "),
         (["fit", "data", "-o", "data"], "exists"),

@@ -50,7 +50,7 @@ def test_a_genuine_subscriber_misses_no_episode(endpoint: str, robot: Robot) -> 
     robot.node.destroy_subscription(subscription)
     heard = [sample.payload.to_bytes() for sample in samples]
     assert heard == ours
-    headers = [unpack(message, signer()).episode.header for message in heard]
+    headers = [unpack(message, signer()).header for message in heard]
     assert [header.trial for header in headers] == list(range(TRIALS))
     assert [header.start_ns for header in headers] == [CONFIG.trial_start_ns(number) for number in range(TRIALS)]
     attachments = [attachment.unpack(sample.attachment.to_bytes()) for sample in samples]

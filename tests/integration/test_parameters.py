@@ -149,7 +149,7 @@ def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(rob
     assert [robot.outcome(handle)[1] for handle in (first, second)] == [0, 0]
     (message,) = heard
     parts = [each.label for each in deserialize(message, message_class("std_msgs/msg/UInt8MultiArray")).layout.dim]
-    assert parts == ["header", "result", "conditions", "hashes", "chunk", "signature"]
+    assert parts == ["header", "result", "conditions", "hash", "chunk", "signature"]
     episode = unpack(message, signer()).episode
     episode.chunk.check_records()
     header = episode.header

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter, Range
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
+from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.aiming import aim
@@ -67,7 +68,7 @@ class Grid:
         numbers = {
             "distance_m": np.sqrt(columns["landing_x_m"] ** 2 + columns["landing_y_m"] ** 2),
             "hit_angle_rad": columns["hit_angle_rad"],
-            "height_m": columns.get(LANDING_HEIGHT, np.empty(0)),
+            "height_m": columns.get(column_of(LANDING_HEIGHT), np.empty(0)),
         }
         places: Array = (np.column_stack([numbers[name] for name in self.names]) - self._low) / self._width
         return places
@@ -117,7 +118,7 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
         raise ConfigError("sweep.target is missing", expected="the cells that throws should land in")
     parameters, grid = config.sweep.parameters, Grid(config.sweep.target)
     axes = _list_axes(config)
-    values = np.concatenate([np.column_stack([each.throws[axis.key] for axis in axes]) for each in datasets])
+    values = np.concatenate([np.column_stack([each.throws[column_of(axis.key)] for axis in axes]) for each in datasets])
     outcomes = np.concatenate([each.throws["outcome"].to_numpy() for each in datasets])
     landed = outcomes == config.task.success
     if not any(axis.role is KeyRole.PARAMETER for axis in axes) or landed.sum() < count_needed_throws(len(axes)):
@@ -125,7 +126,7 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
             f"{landed.sum()} throws have landed",
             expected=f"at least {count_needed_throws(len(axes))}, and a key of the task that is swept",
         )
-    names = ("landing_x_m", "landing_y_m", "hit_angle_rad", LANDING_HEIGHT, EFFORT)
+    names = ("landing_x_m", "landing_y_m", "hit_angle_rad", column_of(LANDING_HEIGHT), EFFORT)
     columns = {
         name: np.concatenate([each.throws[name].to_numpy() for each in datasets])[landed]
         for name in names
