@@ -120,7 +120,7 @@ def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
         if running.process.poll() is not None:
             return
         launcher = psutil.Process(running.process.pid)
-        parties = [launcher, *launcher.children(), *running.nodes()]
+        parties = [launcher, *launcher.children(recursive=True)]
         victim, number = source.choice(parties), source.choice(SIGNALS)
         try:
             name = " ".join(words_of(victim)[-1:])

@@ -2,6 +2,7 @@
 
 from rclzenoh.action.client import (
     ActionClient,
+    get_action_client_names_and_types_by_node,
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )
@@ -45,6 +46,7 @@ __all__ = [
     "Time",
     "deserialize_message",
     "get_action",
+    "get_action_client_names_and_types_by_node",
     "get_action_names_and_types",
     "get_action_server_names_and_types_by_node",
     "get_message",

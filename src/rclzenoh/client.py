@@ -149,7 +149,8 @@ class Client(Receiver):
             return
         future, convert = self._pending.pop(attachment.sequence)
         future.call_back_through(self.mailbox)
-        future.set_result(convert(response))
+        if not future.cancelled():
+            future.set_result(convert(response))
 
     def destroy(self) -> None:
         """Withdraw the client; pending futures stay pending. See `Node.destroy_client`."""

@@ -73,10 +73,10 @@ class Executor:
             self.spin_once()
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Call callbacks until a future is done, ``timeout_sec`` at most; None or negative is no limit."""
+        """Call callbacks until a future is done or cancelled, ``timeout_sec`` at most; None or negative is no limit."""
         future.add_done_callback(lambda _: self.wake())
         deadline = deadline_after(timeout_sec)
-        while self.context.ok() and not (future.done() or self._is_shutdown):
+        while self.context.ok() and not (future.done() or future.cancelled() or self._is_shutdown):
             self._spin_once(deadline, future)
             if time.monotonic() >= deadline:
                 return
@@ -100,7 +100,7 @@ class Executor:
             self._timer_was_last = False
             if not queued:
                 left = deadline - time.monotonic()
-                if left <= 0 or self._is_shutdown or (until is not None and until.done()):
+                if left <= 0 or self._is_shutdown or (until is not None and (until.done() or until.cancelled())):
                     return
                 wait = min(wait, left)
             try:

@@ -11,6 +11,7 @@ from rclzenoh.exceptions import (
     InvalidParameterValueException,
     ParameterAlreadyDeclaredException,
     ParameterNotDeclaredException,
+    ParameterUninitializedException,
 )
 from rclzenoh.interfaces.msg import (
     FloatingPointRange,
@@ -47,18 +48,28 @@ class NodeParameters:
         self._on_set: list[OnSet] = []
         self._post_set: list[PostSet] = []
 
-    def declare_parameter(self, name: str, value: Any, descriptor: ParameterDescriptor | None = None) -> Parameter:
-        """Declare a parameter with a default value, whose type it keeps."""
+    def declare_parameter(
+        self, name: str, value: Any = None, descriptor: ParameterDescriptor | None = None
+    ) -> Parameter:
+        """Declare a parameter with a default value, or only with a type.
+
+        Without a descriptor, the parameter keeps the type that it is declared with.
+        """
         if name in self._parameters:
             raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
         # The descriptor is copied, because name and type are set here, and the caller may use it for other parameters.
         described = ParameterDescriptor() if descriptor is None else copy.copy(descriptor)
-        parameter = Parameter(name, value=value)
-        described.name, described.type = name, parameter.type_.value
-        result = self._set([parameter], {name: described})
+        described.name = name
+        if isinstance(value, ParameterKind):
+            described.type, value = value.value, None
+        else:
+            described.type = ParameterKind.from_parameter_value(value).value
+        if described.type == ParameterKind.NOT_SET.value and not described.dynamic_typing:
+            raise ValueError(f"parameter {name!r}: give a default value, a type, or a descriptor with dynamic_typing")
+        result = self._set([Parameter(name, value=value)], {name: described})
         if not result.successful:
             raise InvalidParameterValueException(f"parameter {name!r} cannot be {value!r}: {result.reason}")
-        return parameter
+        return self._parameters[name]
 
     def has_parameter(self, name: str) -> bool:
         """Whether a parameter is declared."""
@@ -66,8 +77,18 @@ class NodeParameters:
 
     def get_parameter(self, name: str) -> Parameter:
         """A parameter with its value."""
-        self.describe_parameter(name)
-        return self._parameters[name]
+        descriptor = self.describe_parameter(name)
+        parameter = self._parameters[name]
+        if parameter.type_ is ParameterKind.NOT_SET and not descriptor.dynamic_typing:
+            raise ParameterUninitializedException(f"parameter {name!r} has no value yet")
+        return parameter
+
+    def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
+        """A parameter, or an alternative if it is not declared or has no value."""
+        parameter = self._parameters.get(name)
+        if parameter is not None and parameter.type_ is not ParameterKind.NOT_SET:
+            return parameter
+        return Parameter(name) if alternative_value is None else alternative_value
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Descriptor of a parameter."""
@@ -129,11 +150,20 @@ class NodeParameters:
             if not result.successful:
                 return result
         event = ParameterEvent()
-        changes = event.changed_parameters if declared is None else event.new_parameters
         for parameter in parameters:
-            self._descriptors[parameter.name] = descriptors[parameter.name]
-            self._parameters[parameter.name] = parameter
-            changes.append(parameter.to_parameter_msg())
+            name, message = parameter.name, parameter.to_parameter_msg()
+            # As in rclpy, setting a parameter to no value undeclares it.
+            if declared is None and parameter.type_ is ParameterKind.NOT_SET:
+                self._parameters.pop(name, None)
+                self._descriptors.pop(name, None)
+                event.deleted_parameters.append(message)
+                continue
+            is_new = self.get_parameter_or(name).type_ is ParameterKind.NOT_SET
+            (event.new_parameters if is_new else event.changed_parameters).append(message)
+            self._descriptors[name] = descriptors[name]
+            if self._descriptors[name].dynamic_typing:
+                self._descriptors[name].type = parameter.type_.value
+            self._parameters[name] = parameter
         self._announce(event)
         for post in list(self._post_set):
             post(parameters)
@@ -144,9 +174,12 @@ def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared:
     """Check whether a parameter may get a new value (its first one, if it is not declared yet); if not, say why."""
     if is_declared and descriptor.read_only:
         return _refuse(f"Trying to set a read-only parameter: {parameter.name}.")
-    if parameter.type_.value != descriptor.type:
-        expected = ParameterKind(descriptor.type).name
-        return _refuse(f"Wrong parameter type of {parameter.name}, expected {expected}, got {parameter.type_.name}")
+    if not descriptor.dynamic_typing:
+        if is_declared and parameter.type_ is ParameterKind.NOT_SET:
+            return _refuse("Static parameter cannot be undeclared")
+        if parameter.type_ is not ParameterKind.NOT_SET and parameter.type_.value != descriptor.type:
+            expected = ParameterKind(descriptor.type).name
+            return _refuse(f"Wrong parameter type of {parameter.name}, expected {expected}, got {parameter.type_.name}")
     if parameter.type_ is ParameterKind.INTEGER and len(descriptor.integer_range):
         return _check_integer(parameter, descriptor.integer_range[0])
     if parameter.type_ is ParameterKind.DOUBLE and len(descriptor.floating_point_range):

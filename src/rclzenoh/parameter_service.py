@@ -39,7 +39,9 @@ def offer_parameters(node: NodeEndpoints, parameters: NodeParameters) -> None:
             return []
 
     def find_type(name: str) -> int:
-        return int(parameters.get_parameter(name).type_.value)
+        # `describe_parameter` raises an error if the parameter is not declared. One without a value is no error.
+        parameters.describe_parameter(name)
+        return int(parameters.get_parameter_or(name).type_.value)
 
     def find_value(name: str) -> ParameterValue:
         return parameters.get_parameter(name).get_parameter_value()

@@ -8,17 +8,24 @@ from __future__ import annotations
 import inspect
 import threading
 from collections.abc import Callable, Coroutine, Generator
+from enum import Enum
 from functools import partial
 from typing import Any
 
 from rclzenoh.mailbox import Mailbox
 
 
+class _State(Enum):
+    PENDING = "pending"
+    CANCELLED = "cancelled"
+    FINISHED = "finished"
+
+
 class Future:
     """An outcome that will be known later; callbacks can await it."""
 
     def __init__(self) -> None:
-        self._done = False
+        self._state = _State.PENDING
         self._result: Any = None
         self._exception: BaseException | None = None
         self._callbacks: list[Callable[[Any], Any]] = []
@@ -27,13 +34,17 @@ class Future:
         self._mailbox: Mailbox | None = None
 
     def __await__(self) -> Generator[Future, None, Any]:
-        while not self._done:
+        while self._state is _State.PENDING:
             yield self
         return self.result()
 
     def done(self) -> bool:
         """Whether there is a result or an exception."""
-        return self._done
+        return self._state is _State.FINISHED
+
+    def cancelled(self) -> bool:
+        """Whether the future was cancelled."""
+        return self._state is _State.CANCELLED
 
     def result(self) -> Any:
         """The result; None as long as there is none."""
@@ -47,16 +58,21 @@ class Future:
 
     def set_result(self, result: Any) -> None:
         """Set the outcome."""
-        self._finish(result=result)
+        self._finish(_State.FINISHED, result=result)
 
     def set_exception(self, exception: BaseException) -> None:
         """Set an exception as the outcome."""
-        self._finish(exception=exception)
+        self._finish(_State.FINISHED, exception=exception)
+
+    def cancel(self) -> None:
+        """Give up; does nothing if the outcome is known already."""
+        if self._state is _State.PENDING:
+            self._finish(_State.CANCELLED)
 
     def add_done_callback(self, callback: Callable[[Any], Any]) -> None:
         """Call back with this future once the outcome is known, or now if it is."""
         with self._lock:
-            if not self._done:
+            if self._state is _State.PENDING:
                 self._callbacks.append(callback)
                 return
         self._call(callback)
@@ -64,7 +80,7 @@ class Future:
     def resume_when_done(self, task: Task) -> None:
         """Continue a task once the outcome is known."""
         with self._lock:
-            if not self._done:
+            if self._state is _State.PENDING:
                 self._waiting.append(task)
                 return
         task.schedule()
@@ -73,9 +89,9 @@ class Future:
         """Let the thread that spins call done callbacks, instead of the thread that sets the outcome."""
         self._mailbox = mailbox
 
-    def _finish(self, *, result: Any = None, exception: BaseException | None = None) -> None:
+    def _finish(self, state: _State, *, result: Any = None, exception: BaseException | None = None) -> None:
         with self._lock:
-            self._result, self._exception, self._done = result, exception, True
+            self._result, self._exception, self._state = result, exception, state
             callbacks, self._callbacks = self._callbacks, []
             waiting, self._waiting = self._waiting, []
         # This happens after the lock is released, because a callback may use this future.
@@ -111,7 +127,7 @@ class Task(Future):
 
     def run(self) -> bool:
         """Carry on until the task ends or awaits something; returns whether there was anything to do."""
-        if self.done():
+        if self.done() or self.cancelled():
             return False
         try:
             if not isinstance(self._work, Coroutine):
@@ -132,6 +148,12 @@ class Task(Future):
             else:
                 self.schedule()
         return True
+
+    def cancel(self) -> None:
+        """End the coroutine at the point where it waits."""
+        if isinstance(self._work, Coroutine) and not self.done():
+            self._work.close()
+        super().cancel()
 
 
 def submit(mailbox: Mailbox, work: Callable[[], Any] | Coroutine[Any, Any, Any]) -> Task:

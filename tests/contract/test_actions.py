@@ -13,6 +13,7 @@ from throwcollect.ros import (
     GoalResponse,
     QoSProfile,
     get_action,
+    get_action_client_names_and_types_by_node,
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
     get_message,
@@ -234,3 +235,5 @@ def test_actions_are_found_in_the_graph(rig, controller, client):
     assert rig.sees(lambda: get_action_names_and_types(node) == expected)
     assert rig.sees(lambda: get_action_server_names_and_types_by_node(node, "server", "/") == expected)
     assert get_action_server_names_and_types_by_node(node, "client", "/") == []
+    client.send_goal_async(goal("a"), feedback_callback=print)
+    assert rig.spin(lambda: get_action_client_names_and_types_by_node(node, "client", "/") == expected)

@@ -105,6 +105,22 @@ def test_an_exception_in_a_task_reaches_its_result_and_the_spinning_caller(node,
         task.result()
 
 
+def test_a_cancelled_task_goes_no_further(rig, node, executor):
+    future, reached = Future(), []
+
+    async def wait():
+        await future
+        reached.append(1)
+
+    task = executor.create_task(wait)
+    rig.rest(0.02)
+    task.cancel()
+    future.set_result(None)
+    rig.rest(0.02)
+    assert task.cancelled()
+    assert reached == []
+
+
 def test_waiting_messages_follow_a_node_to_another_executor(rig, node, executor):
     heard = []
     node.create_subscription(String, "t", heard.append, 10)

@@ -42,6 +42,22 @@ def test_declaring_twice_and_using_undeclared_parameters_is_refused(node):
         node.set_parameters([Parameter("b", value=1)])
 
 
+def test_a_parameter_has_a_type_or_is_typed_dynamically(node):
+    # rclpy only warns of a declaration without a type, as that is deprecated.
+    with pytest.warns(match="deprecated") if ON_RCLPY else pytest.raises(ValueError, match="dynamic_typing"):
+        node.declare_parameter("no_type")
+    node.declare_parameter("a", descriptor=ParameterDescriptor(dynamic_typing=True))
+    assert node.set_parameters([Parameter("a", value=1), Parameter("a", value="x")])[1].successful
+    node.declare_parameter("b", Parameter.Type.INTEGER)
+    with pytest.raises(
+        ex.ParameterUninitializedException,
+        match=choose_words(embedded="no value yet", rclpy="'b' is not initialized"),
+    ):
+        node.get_parameter("b")
+    assert node.set_parameters([Parameter("b", value=3)])[0].successful
+    assert node.get_parameter("b").value == 3
+
+
 def plain(value):
     """Turn an array of numbers, as rclpy returns it, into a list."""
     return list(value) if isinstance(value, array) else value
@@ -97,8 +113,8 @@ def test_read_only_and_static_parameters_keep_value_and_type(node):
     assert "read-only" in node.set_parameters([Parameter("fixed", value=2)])[0].reason
     wrong_type = choose_words(embedded="expected INTEGER, got DOUBLE", rclpy="expected .*INTEGER.* got .*DOUBLE")
     assert re.search(wrong_type, node.set_parameters([Parameter("typed", value=2.0)])[0].reason)
-    assert not node.set_parameters([Parameter("typed")])[0].successful
-    assert node.get_parameter("typed").value == 1
+    undeclared = choose_words(embedded="cannot be undeclared", rclpy="cannot be undeclared")
+    assert re.search(undeclared, node.set_parameters([Parameter("typed")])[0].reason)
 
 
 def test_parameters_are_set_atomically_or_not_at_all(node):

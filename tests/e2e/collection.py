@@ -91,8 +91,9 @@ class Running:
     directory: Path
 
     def nodes(self) -> list[psutil.Process]:
-        """Nodes of the run: the children of the process that has imported their libraries."""
-        return [node for server in psutil.Process(self.process.pid).children() for node in server.children()]
+        """Nodes of the run: children of the launcher. A new one has the command line of the launcher for a moment."""
+        children = psutil.Process(self.process.pid).children()
+        return [child for child in children if not {"router", "sim", "coordinator"}.isdisjoint(words_of(child))]
 
     def node(self, *words: str) -> psutil.Process:
         """The node whose command line ends with these words."""

@@ -71,8 +71,8 @@ def test_the_commands_of_the_page_work_in_their_order(tmp_path: Path, monkeypatc
         if "measured.csv" in line:
             # With a real robot, people write this file from their measurements.
             throws = throwcollect.load("datasets/aimed")
-            keys = [*throws.parameters.names, "landing_x_m", "landing_y_m"]
-            rows = [",".join(repr(float(throw[key])) for key in keys) for throw in throws]
+            keys = [*throws.plan.keys, "landing_x_m", "landing_y_m"]
+            rows = [",".join(repr(float((throw.row | throw.parameters)[key])) for key in keys) for throw in throws]
             Path("measured.csv").write_text("\n".join([",".join(keys), *rows]))
         inner = re.search(r"\$\((throwcollect .*?)\)", line)
         whole = line.replace(inner[0], call_here(*shlex.split(inner[1])[1:]).stdout) if inner else line

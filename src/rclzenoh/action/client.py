@@ -183,6 +183,13 @@ def get_action_server_names_and_types_by_node(
     return _list_actions(node.get_publisher_names_and_types_by_node(remote_node_name, remote_node_namespace))
 
 
+def get_action_client_names_and_types_by_node(
+    node: NodeGraph, remote_node_name: str, remote_node_namespace: str
+) -> NamesAndTypes:
+    """Actions that one node has clients of."""
+    return _list_actions(node.get_subscriber_names_and_types_by_node(remote_node_name, remote_node_namespace))
+
+
 def _list_actions(topics: NamesAndTypes) -> NamesAndTypes:
     return group_types(
         (name.removesuffix(_TOPIC), type_name.removesuffix(_TYPE))

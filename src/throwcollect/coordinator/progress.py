@@ -1,4 +1,4 @@
-"""The progress of a collection, as the coordinator publishes it (see `shown_topics`)."""
+"""The progress of a collection, as the coordinator publishes it (see `ros.nodes.coordinator.showing`)."""
 
 from __future__ import annotations
 

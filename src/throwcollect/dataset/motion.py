@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.named_array import unknown_name
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ball:
@@ -86,7 +84,7 @@ class Joints:
     def __getitem__(self, name: str) -> Joint:
         """Return one joint; its arrays are columns of the arrays of all joints."""
         if name not in self.names:
-            raise unknown_name("joint", name, self.names)
+            raise KeyError(f"no joint {name!r}; there are {', '.join(self.names)}")
         which = self.names.index(name)
         return Joint(name, self.time_s, self.position[:, which], self.velocity[:, which], self.effort[:, which])
 

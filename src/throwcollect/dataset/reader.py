@@ -13,17 +13,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import check_bounds
 from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
-from throwcollect.config.sweep import Range
-from throwcollect.config.values import column_of
 from throwcollect.dataset.bag import find_next_command, read_bag_metadata
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS, list_shards, path_of_part
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, unknown_name
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws
@@ -35,7 +31,7 @@ from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import count_values, find_range, find_trial
+from throwcollect.sweep.arrow_column import count_values, find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
 
@@ -43,8 +39,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 pd = lazily("pandas")
-
-_LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
 class UnfinishedDatasetWarning(UserWarning):
@@ -117,16 +111,10 @@ class Dataset(Sequence[Throw]):
             TypeError: If it is none of these.
         """
         if isinstance(which, str):
-            if which not in self.throws.column_names:
-                raise unknown_name("column", which, self.throws.column_names)
-            return read_column(self.throws[which])
+            return _read_column(self.throws[which])
         if isinstance(which, slice):
             return replace(self, throws=self.throws.take(pa.array(range(len(self))[which], pa.int64())))
-        if not isinstance(which, int | np.integer):
-            raise TypeError(f"a position, a slice or the name of a column, not {type(which).__name__}; see select(...)")
-        if not -len(self) <= which < len(self):
-            raise IndexError(f"{self.directory}: no throw {which} of {len(self)}")
-        position = int(which) % len(self)
+        position = range(len(self))[which]
         return Throw(self.throws, position, self.plan.keys, self._stored[position], str(self.directory))
 
     def __contains__(self, column: object) -> bool:
@@ -142,42 +130,8 @@ class Dataset(Sequence[Throw]):
 
     @property
     def config(self) -> Config:
-        """Its configuration; that of a single trial has `Throw.parameters` in it."""
+        """Its configuration; that of a single throw is `config_of`."""
         return self.plan.config
-
-    @property
-    def parameters(self) -> NamedArray:
-        """Swept values of all throws, in the units of their keys; the names are dotted configuration keys.
-
-        The bounds are those that the sweep draws between, or else the smallest and largest value of the plan.
-        """
-        swept = self.config.sweep.parameters
-        bounds: list[Bounds] = []
-        for index, key in enumerate(self.plan.keys):
-            # A list of points has keys, and no ranges.
-            match swept.get(key):
-                case Range(min=low, max=high):
-                    bounds.append((low, high))
-                case _:
-                    values = self.plan.trials.values[:, index]
-                    bounds.append((values.min(), values.max()))
-        columns = self.throws.select([*map(column_of, self.plan.keys)])
-        return NamedArray.of(columns.rename_columns(list(self.plan.keys)), self.plan.keys, bounds)
-
-    @property
-    def landings(self) -> NamedArray:
-        """Where the ball of each throw crossed the landing plane, x, y and z of its centre in world [m]; else NaN.
-
-        A ball that touched robot or tool after its release may cross it, too; the column `outcome` tells. The bounds
-        are the smallest and largest of all these throws.
-
-        Raises:
-            ConfigError: If nothing lands in the task.
-        """
-        if not set(_LANDING) <= set(self.throws.column_names):
-            raise ConfigError(f"nothing lands in the task {self.config.task.name}", expected="a column of `throws`")
-        limits: list[Any] = [find_range(self.throws[name]) or (None, None) for name in _LANDING]
-        return NamedArray.of(self.throws, _LANDING, limits)
 
     def to_pandas(self) -> DataFrame:
         """Convert the table of throws to a DataFrame, one row a throw, with the number of the trial as its index.
@@ -222,16 +176,28 @@ class Dataset(Sequence[Throw]):
         """The throws that have a trajectory: all but the refused and the lost."""
         return replace(self, throws=self.throws.filter(self.throws["shard"].is_valid()))
 
+    def throw(self, trial: int) -> Throw:
+        """Return the throw of a trial by its number.
+
+        Raises:
+            DatasetError: If the trial is not among the throws.
+        """
+        position = find_trial(self.throws["trial"], trial)
+        if position < 0:
+            raise DatasetError(f"no trial {trial}", path=self.directory)
+        return self[position]
+
     def episode(self, trial: int) -> Episode:
         """Read the episode of a trial by its number, with everything that was recorded.
 
         Raises:
             DatasetError: If the trial is not among the throws, has no episode, or it is not where the table says.
         """
-        position = find_trial(self.throws["trial"], trial)
-        if position < 0:
-            raise DatasetError(f"no trial {trial}", path=self.directory)
-        return self[position].read_episode()
+        return self.throw(trial).read_episode()
+
+    def config_of(self, throw: Throw) -> Config:
+        """Make the configuration that one of its throws was simulated with."""
+        return self.plan.config_of(self.plan.trial(throw.trial))
 
     def robot_description(self) -> str | None:
         """Read the URDF text of the robot from the first recording; None if there is no recording.
@@ -286,12 +252,9 @@ class Dataset(Sequence[Throw]):
             threads: How many threads read; None for one for each core, up to 4.
 
         Raises:
-            ConfigError: If there is no such column or joint, columns or joints are no list of names, or `threads` is no
-                whole number above 0.
+            ConfigError: If there is no such column or joint.
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
-        if threads is not None:
-            check_bounds("threads", threads, least=1)
         trials, known = self.throws["trial"].to_pylist(), self.joints
         chosen = known if joints is None else tuple(joints)
         for joint in chosen:
@@ -367,6 +330,15 @@ def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
         # An episode whose records are damaged can be saved, and not read in place.
         for found in (each for each in episodes.values() if each.run is not None):
             yield table.row(plan.trial(found.trial), found.result, found.place)
+
+
+def _read_column(column: pa.ChunkedArray) -> NDArray[Any]:
+    """Copy a column of a table into an array, one value a row; a number that is missing is NaN, a text None."""
+    if pa.types.is_string(column.type):
+        return np.array(column.to_pylist(), dtype=object)
+    if column.null_count:
+        column = column.cast(pa.float64()).fill_null(np.nan)
+    return np.array(column.to_numpy())
 
 
 def _find_custom(bag: Mapping[str, Any], name: str) -> object:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of
 from throwcollect.dataset.motion import Ball, Joints
-from throwcollect.dataset.named_array import unknown_name
 from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.dataset.trajectory_columns import (
     BALL_COLUMNS,
@@ -27,9 +27,11 @@ from throwcollect.dataset.trajectory_columns import (
     name_components,
 )
 from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.trajectory_rows import JOINT_COLUMNS, STAMPS, trajectory_rows
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
+from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -147,8 +149,6 @@ class Throw:
         Raises:
             KeyError: If there is no such column.
         """
-        if column not in self._table.column_names:
-            raise unknown_name("column", column, self._table.column_names)
         return self.row[column]
 
     def __contains__(self, column: object) -> bool:
@@ -218,6 +218,29 @@ class Throw:
         """
         episode = self._require_episode()
         return episode.read() if isinstance(episode, StoredThrow) else episode
+
+    def read_samples(self) -> tuple[EpisodeHeader, Samples]:
+        """Read the header of its episode, and its samples.
+
+        Raises:
+            DatasetError: If it has none, or it is damaged; the error names the dataset and the trial.
+        """
+        with self.locating_damage():
+            episode = self.read_episode()
+            joints = self._episode.joints if isinstance(self._episode, StoredThrow) else None
+            return episode.header, episode.samples(joints)
+
+    @contextmanager
+    def locating_damage(self) -> Iterator[None]:
+        """Add dataset, trial and a command that finds more to an error that its episode raises without them."""
+        try:
+            yield
+        except DatasetError as error:
+            if error.path is not None:
+                raise
+            located = error.locate(Path(self._source), f"trial {self.trial}")
+            located.hint = located.hint or command("dataset", "verify", self._source)
+            raise located from error
 
     def _require_episode(self) -> StoredThrow | Episode:
         if self._episode is None:

@@ -12,7 +12,6 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.named_array import unknown_name
 from throwcollect.dataset.trajectory_columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
 from throwcollect.errors import ConfigError
 from throwcollect.wording import format_count, suggest
@@ -66,14 +65,8 @@ class Trajectories:
             TypeError: If it is neither.
         """
         if isinstance(which, str):
-            if which not in self.columns:
-                raise unknown_name("column", which, self.columns)
             return self.columns[which]
-        if not isinstance(which, int | np.integer):
-            raise TypeError(f"a position or the name of a column, not {type(which).__name__}")
-        if not -len(self) <= which < len(self):
-            raise IndexError(f"no throw {which} of {len(self)}")
-        number = int(which) % len(self)
+        number = range(len(self))[which]
         rows = slice(self.offsets[number], self.offsets[number + 1])
         return {name: column[rows] for name, column in self.columns.items()}
 

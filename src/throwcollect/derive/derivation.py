@@ -14,7 +14,6 @@ import pyarrow as pa
 
 from throwcollect.config.values import column_of
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.directory import CARD, SOURCES, shard_of
 from throwcollect.dataset.manifest import FileEntry, RunningHash
@@ -142,8 +141,9 @@ def _read_channels(sources: Sequence[Dataset]) -> Channels:
 
 
 def _read(source: Dataset, row: Row) -> Episode:
-    with locating_damage(source, row["trial"]):
-        episode = source.episode(row["trial"])
+    throw = source.throw(row["trial"])
+    with throw.locating_damage():
+        episode = throw.read_episode()
         # The copy gets hashes of its own, which would make damage look as if it had been recorded.
         episode.chunk.check_records()
         if episode.digest != row["digest"]:

@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
@@ -99,10 +98,9 @@ def statistics(directory: StrPath) -> Statistics:
     """
     dataset = Dataset.open(directory)
     moments, left_out = None, 0
-    trials = dataset.recorded.throws["trial"].to_pylist()
-    for trial, episode in zip(trials, log_progress(dataset.episodes(), len(trials), "episode", "read"), strict=True):
-        with locating_damage(dataset, trial):
-            rows = _stack_signals(episode.samples(dataset.joints))
+    recorded = dataset.recorded
+    for throw in log_progress(recorded, len(recorded), "episode", "read"):
+        rows = _stack_signals(throw.read_samples()[1])
         finite = rows[np.isfinite(rows).all(axis=1)]
         left_out += len(rows) - len(finite)
         if len(finite):
@@ -112,7 +110,7 @@ def statistics(directory: StrPath) -> Statistics:
         trials=len(dataset.throws),
         outcomes=count_outcomes(dataset.throws),
         columns=dict(_summarise_columns(dataset.throws)),
-        episodes=len(dataset.recorded),
+        episodes=len(recorded),
         samples=moments.count if moments else 0,
         samples_not_finite=left_out,
         signals=_summarise_signals(moments, dataset.joints) if moments else {},

@@ -46,7 +46,7 @@ def describe(source: ExportSource) -> Layout:
 import h5py
 
 file = h5py.File("throws.hdf5")
-ball_position_m = file["data/demo_{source.entries[0].trial}/obs/ball_position_m"][:]
+ball_position_m = file["data/demo_{source.throws[0].trial}/obs/ball_position_m"][:]
 {measure} = file["throws/{measure}"][:]""",
         notes=(
             "The layout is that of robomimic. Each group of a throw has `obs/` with what is measured, `next_obs/`, the "
@@ -74,14 +74,16 @@ def write(source: ExportSource, directory: Path) -> None:
         file.attrs["digest_of_dataset"] = source.dataset.digest
         file.attrs["rate_hz"] = source.rate_hz
         data = file.create_group("data")
-        data.attrs["total"] = sum(entry.samples for entry in source.entries)
+        data.attrs["total"] = sum(map(source.count_samples, source.throws))
         data.attrs["env_args"] = json.dumps({"env_name": config.name, "type": _GYM, "env_kwargs": {}})
         file.attrs["config"] = config.model_dump_json()
-        for throw in source.throws(source.entries):
-            _add_throw(data.create_group(f"demo_{throw.trial}"), throw, source)
+        succeeded = []
+        for throw in source.read(source.throws):
+            name = f"demo_{throw.throw.trial}"
+            _add_throw(data.create_group(name), throw, source)
+            succeeded += [name] * throw.succeeded
             output.check()
             let_through()
-        succeeded = [f"demo_{entry.trial}" for entry in source.entries if entry.succeeded]
         file[f"mask/{config.task.success}"] = np.array(succeeded, dtype="S")
         _add_table(file.create_group("throws"), source.table, h5py.string_dtype())
 
@@ -124,7 +126,7 @@ class _Output(io.FileIO):
 
 def _add_throw(group: Any, throw: ThrowSeries, source: ExportSource) -> None:
     group.attrs["num_samples"] = len(throw)
-    group.attrs["trial"] = throw.trial
+    group.attrs["trial"] = throw.throw.trial
     group.attrs[source.dataset.config.task.success] = throw.succeeded
     group["dones"] = throw.done.astype(np.int64)
     group["rewards"] = throw.done * throw.succeeded

@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
+from throwcollect.dataset.throw import Throw
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.lerobot_statistics import Frames, summarise_all, summarise_episode
 from throwcollect.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
@@ -130,13 +131,13 @@ def write(source: ExportSource, directory: Path) -> None:
         closing(ParquetSeries(directory / "data")) as data,
         closing(ParquetSeries(directory / "meta" / "episodes")) as meta,
     ):
-        throws = source.throws(source.entries)
+        throws = source.read(source.throws)
         episodes = table.filter(table["episode_index"].is_valid())
         first = 0
         for start in range(0, len(episodes), _EPISODES_PER_GROUP):
             rows = []
             for number, throw in enumerate(islice(throws, _EPISODES_PER_GROUP), start=start):
-                task = _say_task(source, throw.target)
+                task = _say_task(source, throw.throw)
                 index = tasks.setdefault(task, len(tasks))
                 frames = _compute_frames(throw, source, features, episode=number, first=first, task=index)
                 # This comes before the frames are appended, and says in which file they will be.
@@ -156,7 +157,7 @@ def write(source: ExportSource, directory: Path) -> None:
 
 def _number_episodes(source: ExportSource) -> pa.Table:
     """Add the number of each trial's episode to the table of throws, behind the number of the trial."""
-    numbers = {entry.trial: number for number, entry in enumerate(source.entries)}
+    numbers = {trial: number for number, trial in enumerate(source.throws["trial"].tolist())}
     field = pa.field(
         "episode_index", pa.int64(), metadata={"description": "Number of its episode; null if it has none."}
     )
@@ -178,7 +179,10 @@ def _compute_frames(
         ),
         "observation.effort": signals["joint_effort_nm"][:, moving],
         "observation.environment_state": np.hstack(
-            [signals[name] for name in ("ball_position_m", "ball_velocity_mps", *throw.target)]
+            [
+                signals[name]
+                for name in ("ball_position_m", "ball_velocity_mps", *(each.name for each in source.targets))
+            ]
         ),
         "action": throw.find_actions(source.rate_hz),
         "next.reward": done * throw.succeeded,
@@ -245,7 +249,7 @@ def _read_feature(paths: Sequence[Path], name: str) -> Iterator[Frames]:
 def _describe_dataset(
     source: ExportSource, features: dict[str, Feature], *, frames: int, tasks: int
 ) -> dict[str, object]:
-    episodes = len(source.entries)
+    episodes = len(source.throws)
     return {
         "codebase_version": _VERSION,
         "fps": source.rate_hz,
@@ -263,11 +267,11 @@ def _describe_dataset(
     }
 
 
-def _say_task(source: ExportSource, target: Mapping[str, float]) -> str:
+def _say_task(source: ExportSource, throw: Throw) -> str:
     """Say in words what the robot is to do, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
     task = source.dataset.config.task
     said = "Throw the ball" if task.throws else task.name.replace("_", " ").capitalize()
-    goal = [f"{each.word} {target[each.name]:.2f} {unit_of(each.name)}" for each in source.targets]
+    goal = [f"{each.word} {throw[each.name]:.2f} {unit_of(each.name)}" for each in source.targets]
     return f"{said} to {', '.join(goal)}." if goal else f"{said}."
 
 

@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from throwcollect.arguments import refuse_argument
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.task_config import TaskConfig
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throw import Throw
 from throwcollect.errors import DatasetError
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
-from throwcollect.export.throw_source import ExportableThrow, ExportSource, ThrowSeries, read_metadata
+from throwcollect.export.throw_source import ExportSource, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.quintic_curve import sample_quintic
@@ -103,13 +105,8 @@ def write(source: ExportSource, directory: Path) -> None:
     units = {field.name: read_metadata(field).get("unit", "") for field in source.table.schema}
     _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.dataset.digest})
     (directory / "trajectories").mkdir()
-    landings = {
-        row["trial"]: (row["landing_x_m"], row["landing_y_m"], row["hit_angle_rad"])
-        for row in source.table.select(["trial", "landing_x_m", "landing_y_m", "hit_angle_rad"]).to_pylist()
-    }
-    for shard, entries in source.shards.items():
-        throws = _gather_throws(source, entries, landings)
-        recording = {"robot_throws": throws, "digest_of_dataset": source.dataset.digest}
+    for shard, throws in source.shards.items():
+        recording = {"robot_throws": _gather_throws(source, throws), "digest_of_dataset": source.dataset.digest}
         _save(directory / "trajectories" / f"{shard}.mat", recording)
 
 
@@ -141,19 +138,14 @@ def _make_cell(values: Sequence[Any]) -> NDArray[np.object_]:
     return cell
 
 
-def _gather_throws(
-    source: ExportSource, entries: Sequence[ExportableThrow], landings: Mapping[int, tuple[float | None, ...]]
-) -> dict[str, Any]:
-    plan = source.dataset.plan
+def _gather_throws(source: ExportSource, throws: Dataset) -> dict[str, Any]:
     moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
     paths, motions, targets, measured, balls = [], [], [], [], []
-    goals: list[Mapping[str, float]] = []
-    for throw in source.throws(entries):
-        config = plan.config_of(plan.trial(throw.trial))
+    for throw in source.read(throws):
+        config = source.dataset.config_of(throw.throw)
         paths.append(_sample_path(throw.trajectory, source.rate_hz))
         motions.append((throw.trajectory, config.task))
-        targets.append(_measure_target(landings[throw.trial], config))
-        goals.append(throw.target)
+        targets.append(_measure_target(throw.throw, config))
         measured.append(
             _stack_signals(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving)
         )
@@ -166,20 +158,20 @@ def _gather_throws(
         },
         "qPath": _make_cell(paths),
         "targets": np.array(targets),
-        **_list_goals(source, goals),
+        **_list_goals(source, throws),
         "DMP": _make_cell(_describe_primitives(motions, source.rate_hz)),
-        "trial": np.array([[float(entry.trial)] for entry in entries]),
+        "trial": throws["trial"].astype(np.float64)[:, np.newaxis],
         "measured": _make_cell(measured),
         "ball": _make_cell(balls),
     }
 
 
-def _list_goals(source: ExportSource, goals: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+def _list_goals(source: ExportSource, throws: Dataset) -> dict[str, Any]:
     """List the fields with the targets that throws were aimed at; none if they were aimed at none."""
     if not source.targets:
         return {}
     names = [each.name for each in source.targets]
-    return {"wanted": np.array([[each[name] for name in names] for each in goals]), "wanted_names": _make_cell(names)}
+    return {"wanted": np.column_stack([throws[name] for name in names]), "wanted_names": _make_cell(names)}
 
 
 def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:
@@ -192,7 +184,8 @@ def _stack_signals(throw: ThrowSeries, *names: str, of: Sequence[int]) -> NDArra
     return np.column_stack([throw.signals["time_s"], *(throw.signals[name][:, of] for name in names)])
 
 
-def _measure_target(landing: tuple[float | None, ...], config: Config) -> tuple[float, ...]:
+def _measure_target(throw: Throw, config: Config) -> tuple[float, ...]:
+    landing = (throw["landing_x_m"], throw["landing_y_m"], throw["hit_angle_rad"])
     x, y, angle = (np.nan if value is None else value for value in landing)
     return float(np.hypot(x, y)), config.scene.landing_height_m, angle
 

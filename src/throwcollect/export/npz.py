@@ -13,9 +13,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.dataset.reader import Dataset
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import ExportableThrow, ExportSource
+from throwcollect.export.throw_source import ExportSource
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """A fixed date for the members of archives, so that the same data give the same bytes."""
@@ -23,7 +24,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
-    shard, trial = next(iter(source.shards)), source.entries[0].trial
+    shard, trial = next(iter(source.shards)), source.throws[0].trial
     return Layout(
         files={
             "throws.npz": "one array a column, one element a trial; NaN, -1 or an empty string where there is nothing.",
@@ -63,10 +64,10 @@ def to_array(column: pa.ChunkedArray) -> NDArray[Any]:
     return array
 
 
-def _write_shard(source: ExportSource, entries: tuple[ExportableThrow, ...], path: Path) -> None:
-    offsets = np.concatenate([[0], np.cumsum([entry.samples for entry in entries])])
+def _write_shard(source: ExportSource, throws: Dataset, path: Path) -> None:
+    offsets = np.concatenate([[0], np.cumsum([source.count_samples(throw) for throw in throws])])
     names: Mapping[str, NDArray[Any]] = {
-        "trial": np.array([entry.trial for entry in entries]),
+        "trial": throws["trial"],
         "offsets": offsets,
         "joints": np.array(source.dataset.joints),
         "moving_joints": np.array(source.dataset.moving_joints),
@@ -80,7 +81,7 @@ def _write_shard(source: ExportSource, entries: tuple[ExportableThrow, ...], pat
             shape = (int(offsets[-1]), *signal.shape)
             header = {"descr": "<f8", "fortran_order": False, "shape": shape}
             np.lib.format.write_array_header_1_0(files[signal.name], header)
-        for throw in source.throws(entries):
+        for throw in source.read(throws):
             for name, file in files.items():
                 file.write(throw.signals[name].astype("<f8").tobytes())
     with zipfile.ZipFile(path, "w") as archive:

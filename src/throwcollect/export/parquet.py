@@ -80,7 +80,7 @@ def describe(source: ExportSource) -> Layout:
 import pandas as pd
 
 throws = pd.read_parquet("{THROWS}")
-samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.entries[0].trial})])""",
+samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.throws[0].trial})])""",
         notes=(
             "Without `filters` these are the samples of all throws. Units and descriptions are also in the metadata of "
             "the fields.",
@@ -103,11 +103,11 @@ def write(source: ExportSource, directory: Path) -> None:
     (directory / THROWS).write_bytes(encode_table(table))
     schema = _make_schema(source).with_metadata(facts)
     (directory / _TRAJECTORIES).mkdir()
-    for shard, entries in source.shards.items():
+    for shard, throws in source.shards.items():
         path = directory / _TRAJECTORIES / f"{shard}.parquet"
         with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
             group: list[pa.RecordBatch] = []
-            for throw in source.throws(entries):
+            for throw in source.read(throws):
                 group.append(_make_batch(throw, source, schema))
                 if sum(map(len, group)) >= _ROWS_PER_GROUP:
                     writer.write_table(pa.Table.from_batches(group))
@@ -125,7 +125,7 @@ def _make_schema(source: ExportSource) -> pa.Schema:
 
 
 def _make_batch(throw: ThrowSeries, source: ExportSource, schema: pa.Schema) -> pa.RecordBatch:
-    columns = [np.full(len(throw), throw.trial)]
+    columns = [np.full(len(throw), throw.throw.trial)]
     for signal in source.signals:
         # One transposed copy is faster than columns one by one, whose numbers lie far apart in the recorded messages.
         columns += list(np.ascontiguousarray(throw.signals[signal.name].T.reshape(-1, len(throw))))

@@ -47,7 +47,7 @@ def render_card(source: ExportSource, layout: Layout) -> str:
         f"# {config.name}",
         "",
         f"{len(source.table)} simulated {config.task.subject} by {robot_of(config).introduction}; "
-        f"{len(source.entries)} of them have time series, at {source.rate_hz} Hz. "
+        f"{len(source.throws)} of them have time series, at {source.rate_hz} Hz. "
         f"Exported by throwcollect {__version__} from the dataset with the digest `{source.dataset.digest}`.",
         "",
         *outcome_lines(source.table),

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.config.task_config import TargetColumn
-from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throw import Throw
 from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.export.signals import Signal, list_signals
@@ -35,31 +36,20 @@ Signals = Mapping[str, NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
-class ExportableThrow:
-    """A throw that can be exported, before it is read; `samples` is the number of samples in the export."""
-
-    trial: int
-    samples: int
-    succeeded: bool
-
-
-@dataclass(frozen=True)
 class ThrowSeries:
-    """One throw with its time series.
+    """Time series of one throw.
 
     Attributes:
-        trial: Number of its trial.
+        throw: The throw.
         succeeded: Whether it succeeded.
         signals: Each signal of the source by name, ``(n_samples, ...)``.
         trajectory: The trajectory that the controllers were sent.
-        target: Where it should end, by column of targets of the source.
     """
 
-    trial: int
+    throw: Throw
     succeeded: bool
     signals: Signals
     trajectory: JointTrajectory
-    target: Mapping[str, float]
 
     def __len__(self) -> int:
         return len(self.signals["time_s"])
@@ -90,7 +80,7 @@ class ExportSource:
         targets: Columns of targets that all of its throws have: a policy cannot be conditioned on a target that some
             throws lack.
         signals: Quantities of each throw over time.
-        shards: Throws of each recording, by the name of its file without ending; all in order of trials.
+        throws: The throws that have an episode, in order of trials.
         table: One row a trial, with ``description`` and ``unit`` in the metadata of each column.
         progress: Logs how many of its trials have been exported.
     """
@@ -99,7 +89,7 @@ class ExportSource:
     rate_hz: int
     targets: tuple[TargetColumn, ...]
     signals: tuple[Signal, ...]
-    shards: Mapping[str, tuple[ExportableThrow, ...]]
+    throws: Dataset
     table: pa.Table
     progress: ProgressLog
 
@@ -111,56 +101,48 @@ class ExportSource:
         if rate_hz is not None and not 1 <= index(rate_hz) <= recorded_hz:
             expected = f"1 to {recorded_hz}, at which {directory} was recorded"
             raise refuse_argument("rate_hz", f"{rate_hz} samples per second", expected=expected)
-        if not len(dataset.recorded):
+        throws = dataset.recorded
+        if not len(throws):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
         rate_hz = rate_hz or recorded_hz
-        targets = _list_targets(dataset)
+        targets = _list_targets(throws)
         return cls(
             dataset,
             rate_hz,
             targets,
             list_signals(dataset.joints, dataset.moving_joints, targets),
-            _list_entries(dataset, rate_hz),
+            throws,
             dataset.throws.drop_columns(list(_PLACES)),
             ProgressLog(len(dataset.throws), "trial", "exported"),
         )
 
     @property
-    def entries(self) -> tuple[ExportableThrow, ...]:
-        """All throws."""
-        return tuple(entry for entries in self.shards.values() for entry in entries)
+    def shards(self) -> dict[str, Dataset]:
+        """Throws of each recording, by the name of its file without ending."""
+        # The name becomes the name of a file of the export, so it must not lead to another directory.
+        return {Path(name).stem: self.throws.select(pc.field("shard") == name) for name in self.throws.shards}
 
-    def throws(self, entries: Iterable[ExportableThrow]) -> Iterator[ThrowSeries]:
-        """Read throws with their time series, one at a time, as all of them may not fit into memory."""
-        dataset = self.dataset
-        for entry in entries:
-            header, recorded = read_samples(dataset, entry.trial)
-            samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
-            planned = dataset.plan.trial(entry.trial)
-            trajectory = trajectory_of(dataset.plan.config_of(planned))
+    def count_samples(self, throw: Throw) -> int:
+        """Count the samples that a throw has in the export."""
+        return count_resampled(throw["samples"], recorded_hz=self.dataset.config.record.rate_hz, rate_hz=self.rate_hz)
+
+    def read(self, throws: Iterable[Throw]) -> Iterator[ThrowSeries]:
+        """Read the time series of throws, one throw at a time, as all of them may not fit into memory."""
+        config = self.dataset.config
+        for throw in throws:
+            header, recorded = throw.read_samples()
+            samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
+            trajectory = trajectory_of(self.dataset.config_of(throw))
             signals = _compute_signals(samples, trajectory, header.start_ns)
-            target = {column.name: planned.target[column.name] for column in self.targets}
-            signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}
-            yield ThrowSeries(entry.trial, entry.succeeded, signals, trajectory, target)
-            self.progress.note(entry.trial + 1)
+            signals |= {each.name: np.full((len(samples), 1), throw[each.name]) for each in self.targets}
+            yield ThrowSeries(throw, throw.outcome == config.task.success, signals, trajectory)
+            self.progress.note(throw.trial + 1)
 
 
-def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[ExportableThrow, ...]]:
-    shards: dict[str, list[ExportableThrow]] = {}
-    for row in dataset.throws.select(["trial", "outcome", "shard", "samples"]).to_pylist():
-        if row["shard"] is not None:
-            count = count_resampled(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
-            entry = ExportableThrow(row["trial"], count, row["outcome"] == dataset.config.task.success)
-            # The name becomes the name of a file of the export, so it must not lead to another directory.
-            shards.setdefault(Path(row["shard"]).stem, []).append(entry)
-    return {shard: tuple(entries) for shard, entries in shards.items()}
-
-
-def _list_targets(dataset: Dataset) -> tuple[TargetColumn, ...]:
-    """List the columns of targets that every throw with an episode has, in the order of the task."""
-    throws = dataset.recorded.throws
-    columns = [each for each in dataset.config.task.target_columns if each.name in throws.column_names]
-    return tuple(each for each in columns if not throws[each.name].null_count)
+def _list_targets(throws: Dataset) -> tuple[TargetColumn, ...]:
+    """List the columns of targets that every throw has, in the order of the task."""
+    columns = [each for each in throws.config.task.target_columns if each.name in throws.throws.column_names]
+    return tuple(each for each in columns if not throws.throws[each.name].null_count)
 
 
 def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> dict[str, NDArray[np.float64]]:

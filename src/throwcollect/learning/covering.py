@@ -26,6 +26,9 @@ _NOWHERE = -1
 _STARTS = 200
 """Number of throws, chosen at random for each batch, from which the search for new ones may start. With fewer, throws
 into the same cell differ more; with more, a cell is found to be in reach more often."""
+_NOISE = 0.3
+"""Standard deviation of the distance between such a throw and the start, along each parameter, whose range has the
+length 2: without it, most throws would be nearly the same as another one."""
 _NEIGHBOURS = 8
 """Number of trials near a throw that show whether it is likely to fail."""
 _RISK = 0.5
@@ -207,7 +210,10 @@ def _aim(
         if (heights := grid.find_heights(goals)) is not None:
             context[:, [axis.key for axis in learned.axes_of(KeyRole.CONTEXT)].index(LANDING_HEIGHT)] = heights
         starts = randomness.permutation(len(learned.values))[:_STARTS]
-        aims = aim(_start_from(learned, starts), goals, learned.scale(KeyRole.CONTEXT, context))
+        # Later batches are for cells at the edge, which only what is known for sure leads to.
+        spread_out = 0.0 if found else _NOISE
+        noise = spread_out * randomness.standard_normal((len(starts), len(learned.axes_of(KeyRole.PARAMETER))))
+        aims = aim(_start_from(learned, starts, noise), goals, learned.scale(KeyRole.CONTEXT, context))
         values = np.hstack([learned.unscale(KeyRole.PARAMETER, aims.parameters), context])
         predicted, safe = grid.find_cells(aims.predicted) == cells, tried.find_promising(values)
         for cell, inside, sure, row in zip(cells.tolist(), predicted.tolist(), safe.tolist(), values, strict=True):
@@ -241,8 +247,13 @@ def _find_near_cells(grid: Grid, places: Array) -> NDArray[np.bool_]:
     return np.array([((places - centre) ** 2).sum(axis=1).min() <= _NEAR_BINS**2 for centre in centres])
 
 
-def _start_from(learned: LearnedMap, throws: NDArray[np.intp]) -> LearnedMap:
-    """The same map, with which aiming starts from some of the throws."""
-    return replace(
-        learned, values=learned.values[throws], outputs=learned.outputs[throws], efforts=learned.efforts[throws]
-    )
+def _start_from(learned: LearnedMap, throws: NDArray[np.intp], noise: Array) -> LearnedMap:
+    """The same map, with which aiming starts near some of the throws; the noise is scaled, ``(n, n_parameters)``."""
+    columns = learned.columns_of(KeyRole.PARAMETER)
+    parameters = np.clip(learned.inputs[throws, columns] + noise, -1.0, 1.0)
+    context = learned.inputs[throws, learned.columns_of(KeyRole.CONTEXT)]
+    values = learned.values[throws].copy()
+    values[:, columns] = learned.unscale(KeyRole.PARAMETER, parameters)
+    # Where nothing has moved, the map says nothing better than what was measured.
+    outputs = learned.predict(parameters, context) if noise.any() else learned.outputs[throws]
+    return replace(learned, values=values, outputs=outputs, efforts=learned.efforts[throws])

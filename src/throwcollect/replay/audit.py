@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require, require_engine
@@ -61,7 +60,8 @@ def _begin(directory: Path) -> Callable[[int], Comparison]:
         # A merged dataset has numbers of its own, and episodes those of their own plans.
         trial = replace(dataset.plan.trial(number), number=number - dataset.plan.first_of_part(number))
         again = simulator.run(trial)
-        with locating_damage(dataset, number):
-            return replace(compare(dataset.episode(number), again), trial=number)
+        stored = dataset.throw(number)
+        with stored.locating_damage():
+            return replace(compare(stored.read_episode(), again), trial=number)
 
     return replay

@@ -23,6 +23,7 @@ from rclpy.action import (
     ActionServer,
     CancelResponse,
     GoalResponse,
+    get_action_client_names_and_types_by_node,
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )

@@ -33,9 +33,8 @@ from throwcollect.robots.description import (
     robot_of,
     start_posture,
 )
-from throwcollect.sim.contact_log import ContactLog
 from throwcollect.sim.motors import Motors
-from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, SampleLog, to_samples
+from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, ContactLog, SampleLog, to_samples
 from throwcollect.sim.scene import drag_of, physics_of, scene_of
 from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S

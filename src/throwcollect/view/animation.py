@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throw import Throw
 from throwcollect.engines.bullet.renderer import Renderer
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.urdf import PACKAGE
 from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
 from throwcollect.view.shown_throws import choose_throws
@@ -74,10 +75,8 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
         )
     require("PIL")
     dataset = Dataset.open(directory)
-    row = choose_throws(dataset, None if trial is None else [trial])[0].row
-    config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
-    _, samples = read_samples(dataset, row["trial"])
-    pictures = _draw_all(config, dataset.joints, samples, row, slow)
+    throw = choose_throws(dataset, None if trial is None else [trial])[0]
+    pictures = _draw_all(throw, dataset.config_of(throw), slow)
     if kind == "GIF":
         pictures = _reduce_colours(pictures)
     times = [_FRAME_MS] * (len(pictures) - 1) + [_LAST_FRAME_MS]
@@ -87,18 +86,18 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
     )
     write_file(output, buffer.getvalue())
     shown_s = (len(pictures) - 1) * _FRAME_MS / 1000
-    return Animation(output, row["trial"], len(pictures), shown_s, len(buffer.getvalue()))
+    return Animation(output, throw.trial, len(pictures), shown_s, len(buffer.getvalue()))
 
 
-def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: dict[str, Any], slow: float) -> list[Any]:
+def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
-    robot = draw_robot_of(config)
+    (_, samples), landing = throw.read_samples(), throw.events.landing
+    robot, joints = draw_robot_of(config), robot_of(config).joints
     urdf = robot.urdf.replace(PACKAGE, f"{robot.share}/")
     times_s = samples.seconds_since(samples.stamps_ns[0])
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
-    released_s = row.get("release_time_s")
+    released_s = throw.row.get("release_time_s")
     released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
-    landing = None if row.get("landing_x_m") is None else np.array([row[f"landing_{axis}_m"] for axis in "xyz"])
     with Renderer(urdf, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA) as renderer:
         points = [samples.ball_position]
         for number in shown:
@@ -115,7 +114,7 @@ def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: di
             _place(renderer, joints, samples, number)
             picture = ground.picture()
             ball = samples.ball_position[: number + 1]
-            ground.mark(picture, ball[-1], landing if number == shown[-1] else None)
+            ground.mark(picture, ball[-1], landing.position if landing and number == shown[-1] else None)
             ground.trace(picture, ball[: released + 1], _HELD)
             ground.trace(picture, ball[released:], _FLOWN)
             seen = renderer.draw(*ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)

@@ -67,7 +67,7 @@ def throw_markers(throw: ShownThrow) -> Any:
     markers = [marker(header=make_header(WORLD, stamp), action=marker.DELETEALL), ball]
     markers.append(_make_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
     for point in ("release", "apex", "landing"):
-        markers += _make_point(point, throw.row, stamp)
+        markers += _make_point(point, throw.throw.row, stamp)
     return array(markers=markers)
 
 
@@ -105,14 +105,14 @@ def path_cloud(throw: ShownThrow) -> Any:
 def _make_path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
     """A line, grey while the ball was held, with the colour of the outcome from its release on."""
     point, color = get_message("geometry_msgs/msg/Point"), get_message("std_msgs/msg/ColorRGBA")
-    rate, released, last = throw.config.record.rate_hz, throw.row.get("release_time_s"), len(throw.path) - 1
+    rate, released, last = throw.config.record.rate_hz, throw.throw.row.get("release_time_s"), len(throw.path) - 1
     chosen = [*range(0, last, max(1, rate // _POINTS_PER_S)), last]
     release = math.inf if released is None else released * rate
-    flown = _SUCCEEDED if throw.row["outcome"] == throw.config.task.success else _FAILED
+    flown = _SUCCEEDED if throw.throw["outcome"] == throw.config.task.success else _FAILED
     colors = {held: color(r=r, g=g, b=b, a=a * alpha) for held, (r, g, b, a) in ((True, _HELD), (False, flown))}
     marker = get_message("visualization_msgs/msg/Marker")
     line = _make_marker(
-        namespace, marker.LINE_STRIP, (*flown[:3], alpha), (width, 0.0, 0.0), stamp_ns, number=throw.row["trial"]
+        namespace, marker.LINE_STRIP, (*flown[:3], alpha), (width, 0.0, 0.0), stamp_ns, number=throw.throw["trial"]
     )
     line.points = [point(x=x, y=y, z=z) for x, y, z in throw.path[chosen].tolist()]
     line.colors = [colors[sample < release] for sample in chosen]

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.bag import BAG_SECTION, bag_information, to_yaml
-from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.frames import WORLD
@@ -94,9 +93,8 @@ def _schedule(dataset: Dataset, throws: Dataset) -> Iterator[tuple[ShownThrow, S
     """Schedule throws one after another with a pause, regardless of their times in the dataset."""
     start = _FIRST_NS
     for throw in throws:
-        _, samples = read_samples(dataset, throw.trial)
-        config = dataset.plan.config_of(dataset.plan.trial(throw.trial))
-        yield ShownThrow(throw.row, config, start, samples.ball_position.copy()), samples
+        _, samples = throw.read_samples()
+        yield ShownThrow(throw, dataset.config_of(throw), start, samples.ball_position.copy()), samples
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
 
 

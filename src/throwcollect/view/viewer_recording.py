@@ -187,7 +187,7 @@ def _make_facts(throw: ShownThrow) -> Any:
 
     Its only status is OK if the trial succeeded, else a warning.
     """
-    row = throw.row
+    row = throw.throw.row
     status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
     shown = status(
         level=status.OK if row["outcome"] == throw.config.task.success else status.WARN,

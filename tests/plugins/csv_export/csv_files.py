@@ -24,12 +24,12 @@ def describe(source: ExportSource) -> Layout:
 def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as text; see `Exporter.write`."""
     write_csv(source.table, directory / "throws.csv")
-    for throw in source.throws(source.entries):
+    for throw in source.read(source.throws):
         columns: dict[str, pa.Array] = {}
         for signal in source.signals:
             rows = throw.signals[signal.name].reshape(len(throw), -1)
             columns |= dict(zip(signal.columns, map(pa.array, rows.T), strict=True))
-        write_csv(pa.table(columns), directory / f"trial_{throw.trial}.csv")
+        write_csv(pa.table(columns), directory / f"trial_{throw.throw.trial}.csv")
 
 
 CSV = Exporter(describe, write)

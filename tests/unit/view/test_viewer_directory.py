@@ -252,19 +252,18 @@ def test_a_throw_that_was_not_released_has_no_points(make_collection: Any, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("trials", "error", "message"),
+    ("trials", "message"),
     [
-        ([0, 7], ConfigError, r"no trial 7\n  expected: trials from 0 to 6"),
-        ([1, 2], DatasetError, "trial 2 has no episode: lost: two simulations were lost"),
+        ([0, 7], "no trial 7 among the 7 throws"),
+        ([1, 2], "trial 2 has no episode: lost: two simulations were lost"),
     ],
 )
 def test_only_trials_with_an_episode_can_be_chosen(
-    collection: Any, tmp_path: Path, trials: list[int], error: type[Exception], message: str
+    collection: Any, tmp_path: Path, trials: list[int], message: str
 ) -> None:
     dataset = collection.collect(tmp_path / "dataset", lost=[2])
-    with pytest.raises(error) as caught:
+    with pytest.raises(DatasetError, match=message):
         view(dataset, tmp_path / "view", trials)
-    assert re.search(message, str(caught.value))
     assert not (tmp_path / "view").exists()
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
 from throwcollect.progress_log import log_progress
 from throwcollect.report.outcomes import LANDED, Outcomes
@@ -48,9 +47,9 @@ def measure_residuals(dataset: Dataset) -> Residuals:
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
     distances = []
     for trial in log_progress(chosen.tolist(), len(chosen), "flight", "compared"):
-        header, samples = read_samples(dataset, trial)
-        config = dataset.plan.config_of(dataset.plan.trial(trial))
-        distance = flight_residual(samples, header, config=config)
+        throw = dataset.throw(trial)
+        header, samples = throw.read_samples()
+        distance = flight_residual(samples, header, config=dataset.config_of(throw))
         if distance is not None:
             distances.append(distance)
     return Residuals(len(trials), len(chosen), np.array(distances))

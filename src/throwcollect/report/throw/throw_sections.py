@@ -136,7 +136,7 @@ def _show_examples(dataset: Dataset, throws: Sequence[Throw], *, height_m: float
         Panel("above", "The ball from above", above),
     )
     middle = _choose_middle(throws)
-    release, trajectory = middle.events.release, trajectory_of(dataset.plan.config_of(dataset.plan.trial(middle.trial)))
+    release, trajectory = middle.events.release, trajectory_of(dataset.config_of(middle))
     note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
     note += "; the vertical line is the release." if release is not None else "."
     commanded = dict(zip(trajectory.joints, sample_positions(trajectory, middle.joints.time_s).T, strict=True))

@@ -1,4 +1,4 @@
-"""Columns, parameters and landings of a dataset as NumPy arrays and pandas tables."""
+"""Columns, throws and joints of a dataset as NumPy arrays and pandas tables."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 
 import throwcollect
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError
 
 
 @pytest.fixture(scope="module")
@@ -25,32 +24,6 @@ def with_gaps(collection: Any, tmp_path: Path) -> Dataset:
     """Trial 2 was refused, trial 4 lost."""
     collection.refuse(2, "an elbow needs 30 Nm")
     return throwcollect.load(collection.collect(tmp_path / "dataset", [0, 1, 3, 4, 5, 6], lost=[4]))
-
-
-def test_parameters_are_bounded_by_the_sweep(loaded: Dataset) -> None:
-    parameters = loaded.parameters
-    assert parameters.names == ("task.duration_s",)
-    assert parameters.bounds.tolist() == [[0.8, 1.2]]
-    assert np.asarray(parameters).shape == parameters.values.shape == (7, 1)
-    assert parameters["task.duration_s"].tolist() == loaded.throws["task_duration_s"].to_pylist()
-    assert np.array_equal(loaded[2:4].parameters.values, parameters.values[2:4])
-    assert np.array_equal(loaded[2:4].parameters.bounds, parameters.bounds)
-
-
-def test_parameters_of_a_list_are_bounded_by_their_values(collection: Any, tmp_path: Path) -> None:
-    points = tmp_path / "points.csv"
-    points.write_text("task.duration_s,ball.mass_kg\n1.0,0.03\n0.9,0.05\n1.1,0.04\n")
-    config = {"trials": 3, "sweep": {"sampler": "list", "file": str(points)}}
-    listed = type(collection)(config).collect(tmp_path / "dataset")
-    assert throwcollect.load(listed).parameters.bounds.tolist() == [[0.9, 1.1], [0.03, 0.05]]
-
-
-def test_landings_are_nan_where_nothing_landed(with_gaps: Dataset) -> None:
-    landings = with_gaps.landings
-    assert landings.names == ("landing_x_m", "landing_y_m", "landing_z_m")
-    assert np.flatnonzero(np.isnan(landings.values).any(axis=1)).tolist() == [2, 4]
-    assert landings.values[0].tolist() == with_gaps[0].events.landing.position.tolist()
-    assert np.array_equal(landings.bounds, np.column_stack([np.nanmin(landings, axis=0), np.nanmax(landings, axis=0)]))
 
 
 def test_a_column_of_a_dataset_is_an_array_with_nan_for_missing_numbers(with_gaps: Dataset) -> None:
@@ -96,24 +69,8 @@ def test_a_joint_is_found_by_its_name(loaded: Dataset) -> None:
         joints["arm_right_4"]
 
 
-def test_an_unknown_column_is_an_error_that_names_all(loaded: Dataset) -> None:
-    for look in (loaded.__getitem__, loaded[0].__getitem__, loaded.landings.__getitem__):
-        with pytest.raises(KeyError, match=r"no column 'landing_x'; there are .*landing_x_m"):
-            look("landing_x")
-
-
-def test_what_is_no_position_is_an_error_and_a_pickled_dataset_still_has_its_throws(loaded: Dataset) -> None:
-    with pytest.raises(TypeError, match=r"the name of a column, not ndarray; see select\(\.\.\.\)"):
-        loaded[np.arange(3)]
-    with pytest.raises(TypeError):
-        iter(loaded.parameters)
+def test_a_pickled_dataset_still_has_its_throws(loaded: Dataset) -> None:
     assert pickle.loads(pickle.dumps(loaded))[0].trial == 0  # noqa: S301
-
-
-def test_landings_are_an_error_for_a_task_in_which_nothing_lands(loaded: Dataset) -> None:
-    without = Dataset(loaded.directory, loaded.plan, loaded.throws.drop_columns(["landing_z_m"]), {})
-    with pytest.raises(ConfigError, match=r"^nothing lands in the task throw"):
-        _ = without.landings
 
 
 def test_a_number_of_numpy_is_a_position_in_a_dataset(loaded: Dataset) -> None:
