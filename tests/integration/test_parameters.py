@@ -150,7 +150,7 @@ def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(rob
     (message,) = heard
     parts = [each.label for each in deserialize(message, message_class("std_msgs/msg/UInt8MultiArray")).layout.dim]
     assert parts == ["header", "result", "conditions", "hash", "chunk", "signature"]
-    episode = unpack(message, signer()).episode
+    episode = unpack(message, signer())
     episode.chunk.check_records()
     header = episode.header
     assert (header.trial, header.start_ns, header.end_reason) == (5, start_ns, "landed")

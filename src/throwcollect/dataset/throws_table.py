@@ -20,7 +20,7 @@ from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import is_there
 from throwcollect.members import explain_failure
-from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_validity
+from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_numbers, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
@@ -188,9 +188,9 @@ class RowsByTrial(Mapping[int, Row]):
 
     def __init__(self, table: pa.Table, *, recorded: bool = False) -> None:
         self._table = table
-        places = np.flatnonzero(table["digest" if recorded else "trial"].is_valid().to_numpy())[::-1]
+        places = np.flatnonzero(read_validity(table["digest" if recorded else "trial"].combine_chunks()))[::-1]
         # Of the rows of one trial in a damaged table, the last one counts.
-        self._trials, first = np.unique(table["trial"].fill_null(-1).to_numpy()[places], return_index=True)
+        self._trials, first = np.unique(read_numbers(table["trial"].combine_chunks())[places], return_index=True)
         self._places = places[first]
         self._start = 0
         self._piece: list[Row] = []
