@@ -36,8 +36,6 @@ from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
 
 _NO_EPISODE = "no whole episode of it was left"
-_MUCH_BYTES = 50_000_000
-"""Size of recordings from which on the search is announced: a core takes a second to look through so many bytes."""
 
 
 def resume(

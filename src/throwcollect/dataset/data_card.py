@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pyarrow as pa
 
@@ -14,16 +13,12 @@ from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.provenance import Provenance
-from throwcollect.files import read_text
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.arrow_column import count_values, find_range
 from throwcollect.units import unit_of_name
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 _MORE = "1M<n<10M"
-_MOST_BYTES = 10_000_000
-HEADER = "---\n"
-"""How a data card begins and its header ends."""
 
 
 def count_outcomes(throws: pa.Table) -> dict[str, int]:
@@ -52,7 +47,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "configs": [{"config_name": "throws", "data_files": "throws.parquet"}],
     }
     lines = [
-        HEADER + to_yaml(header) + HEADER,
+        "---\n" + to_yaml(header) + "---\n",
         f"# {config.name}",
         "",
         f"{episodes} simulated {config.task.subject} by {robot_of(config).introduction}, each with the joint states of "
@@ -84,11 +79,6 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "",
     ]
     return "\n".join(lines)
-
-
-def read_card(path: Path) -> str:
-    """Read a data card, which people may have edited."""
-    return read_text(path, most_bytes=_MOST_BYTES)
 
 
 _RIGID_BODIES = {"bullet": "Bullet", "mujoco": "MuJoCo"}

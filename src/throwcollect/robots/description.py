@@ -125,11 +125,6 @@ def _write_full(robot: Robot, tool: Tool) -> str:
     return to_text(description)
 
 
-def touchable_bodies(config: Config) -> frozenset[str]:
-    """List the names under which contacts of the ball are recorded: the tool, ``ground``, and the robot's links."""
-    return frozenset({tool_of(config).name, "ground", *robot_of(config).description.links})
-
-
 @lru_cache(maxsize=4)
 def joint_model(robot: Robot) -> pinocchio.Model:
     """Build a model of all joints of a robot, without a tool; callers must not change it.

@@ -73,13 +73,6 @@ class Plan:
         """Return the number of the first trial of the joined plan that a trial belongs to."""
         return max((first for first in accumulate(self.joined, initial=0) if first <= number), default=0)
 
-    def part_from(self, first: int) -> Plan:
-        """Return the joined plan whose first trial has this number, with trials from 0 on, as it was collected."""
-        count = dict(zip(accumulate(self.parts, initial=0), self.parts, strict=False))[first]
-        trials = self.trials[first : first + count]
-        refused = {number - first: reason for number, reason in trials.refused.items()}
-        return Plan(self.config, Trials(trials.points, trials.seeds, trials.digests, refused=refused))
-
     def slice_of(self, wanted: Slice) -> Plan:
         """Cut a slice out of the plan."""
         numbers = wanted.trials_of(len(self.trials), trials_per_shard=self.config.record.trials_per_shard)

@@ -16,8 +16,6 @@ from throwcollect.pinocchio_library import pinocchio
 
 Positive = Annotated[float, Field(gt=0)]
 _Numbers = tuple[float, ...]
-_ORTHOGONAL = 1e-6
-"""Largest difference between the identity matrix and a rotation matrix times its transpose."""
 
 
 @dataclass(frozen=True)
