@@ -156,7 +156,7 @@ def _load(path: Path) -> tuple[Provenance, str]:
         provenance = _JSON.validate_python(document)
         if _seal(document | {_CARD_HASH: card}) == text:
             return provenance, card
-    except (ValueError, LookupError, TypeError) as error:
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise DatasetError("is damaged", path=path) from error
     raise DatasetError("its bytes were changed: it does not have the SHA-256 that it states", path=path)
 

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.covering import Grid, choose_throws
@@ -44,7 +45,7 @@ def throw(points: Points) -> Dataset:
     time = (up + np.sqrt(up**2 + 2 * 9.81 * (1.3 - height))) / 9.81
     failed = (swing < 0.2) & (late > 0.7)
     columns = {
-        **dict(zip(points.keys, points.values.T, strict=True)),
+        **dict(zip(map(column_of, points.keys), points.values.T, strict=True)),
         "outcome": np.where(failed, "self_hit", "landed"),
         # The last digits depend on the processor.
         "landing_x_m": np.round(0.6 * level * time, 9),
