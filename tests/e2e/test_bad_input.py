@@ -272,7 +272,8 @@ def test_a_closed_output_pipe_is_no_error(arguments: list[str], small: Path) -> 
     )
     os.close(writing)
     assert said.returncode == 0
-    assert said.stderr.removesuffix("2 trials; 0 refused\n") == ""
+    # On a slow machine, the progress of the plan is printed, too.
+    assert [line for line in said.stderr.splitlines() if "trials" not in line] == []
 
 
 @pytest.mark.parametrize("lost", ["both", "messages"])
