@@ -83,7 +83,9 @@ def test_the_history_of_a_topic_is_announced_as_advanced_publishers_do(rig):
     node.create_publisher(String, "t", LATCHED)
     key = data_key(node.context.get_domain_id(), "/t", String.TYPE, type_hash(String.TYPE))
     session = rig.context().session
-    assert len(list(session.liveliness().get(f"{key}/@adv/pub/{node.context.session.zid()}/*/_"))) == 1
+    announced = f"{key}/@adv/pub/{node.context.session.zid()}/*/_"
+    # The token travels over the router, so it may arrive after the first look.
+    assert rig.spin(lambda: len(list(session.liveliness().get(announced))) == 1)
 
 
 def test_inputs_are_handled_in_order_of_arrival_across_topics(rig):
