@@ -141,7 +141,7 @@ def find_changes(directory: Path) -> Iterator[Finding]:
     try:
         _, card = _load(directory / PROVENANCE)
         if is_there(directory / CARD) and entry_of_file(directory / CARD).sha256 != card:
-            yield Finding(CARD, "", f"its bytes were changed: it has another SHA-256 than {PROVENANCE} says")
+            yield Finding(CARD, "", f"its bytes were changed: its SHA-256 is not the one in {PROVENANCE}")
     except DatasetError as error:
         yield Finding.of(error.path.name if error.path else PROVENANCE, error)
 

@@ -16,6 +16,7 @@ import pyarrow.compute as pc
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.errors import DatasetError
+from throwcollect.wording import suggest
 
 _EXAMPLE = "such as: outcome == 'landed' and landing_x_m > 1.5"
 
@@ -88,7 +89,7 @@ def _evaluate(node: ast.expr, table: pa.Table) -> Any:
             return pa.scalar(float(value))
         case ast.Name() | ast.Attribute():
             if (name := ast.unparse(node)) not in table.column_names:
-                raise ValueError(f"no column {name}; there are {', '.join(table.column_names)}")
+                raise ValueError(f"no column {name}{suggest(name, table.column_names, 'docs/dataset.md')}")
             column = table[name]
             return column.cast(pa.float64(), safe=False) if pa.types.is_integer(column.type) else column
         case ast.BoolOp():

@@ -16,7 +16,7 @@ from throwcollect.files import StrPath
 from throwcollect.replay.audit import replay_throws, require_simulating, select_trials
 
 SAMPLE = 10
-"""How many throws are simulated again if nobody says how many."""
+"""Number of throws that are simulated again by default."""
 
 
 def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: int = 1) -> list[Finding]:
@@ -47,7 +47,6 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: 
     try:
         dataset = Dataset.open(directory)
         if count := count_replayed(dataset, replay):
-            require_simulating(dataset.config.sim.engine)
             findings += _find_different_throws(dataset, count)
     except DatasetError as error:
         if not findings:

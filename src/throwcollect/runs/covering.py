@@ -62,7 +62,7 @@ def cover(
         rounds: Number of rounds, 2 or more.
         overrides: Keys to change: ``key=value`` pairs.
         processes: Number of processes that may check the trials of a large plan.
-        onlooker: Is told what goes on.
+        onlooker: Receives the progress.
         interruptions: How often the user has asked to stop.
 
     Returns:

@@ -1,7 +1,7 @@
 """One simulator: the world, the controllers of the limbs, the clock, and the trial that it simulates.
 
-Replays, scores, the runtime in one process and Python programs call `Simulator.run`. The node of a simulation steps it
-by itself, because it answers messages between the steps.
+Replays, scores, the runtime in one process and Python programs call `Simulator.run`. The node of a simulation calls
+`begin`, `step` and `hand_over` instead, because it answers messages between the steps.
 """
 
 from __future__ import annotations

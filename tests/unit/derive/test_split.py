@@ -126,7 +126,7 @@ def test_a_split_by_wrong_fractions_is_refused_with_a_reason(
         (f"landing_x_m=0.{'0' * 400}1", "the width of cells should be above 0"),
         (f"landing_x_m={'1' * 400}", "should be an expression and the width of cells, such as landing_x_m=0.05"),
         (f"landing_x_m={'1' * 5000}", "should be an expression and the width of cells, such as landing_x_m=0.05"),
-        ("landing_x=0.1", ".* no column landing_x; there are "),
+        ("landing_x=0.1", ".* no column landing_x; did you mean .landing_x_m"),
         ("outcome=1", "'outcome' is no number, but string"),
     ],
 )
