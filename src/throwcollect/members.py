@@ -27,7 +27,11 @@ from throwcollect.extras import explain_missing
 
 _OWN = MappingProxyType(
     {
-        "robots": {"talos": "throwcollect.robots.talos:TALOS"},
+        "robots": {
+            "talos": "throwcollect.robots.talos:TALOS",
+            "panda": "throwcollect.robots.example_robots:PANDA",
+            "ur5": "throwcollect.robots.example_robots:UR5",
+        },
         "tools": {"spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig"},
         "engines": {
             "bullet": "throwcollect.engines.bullet.bullet_engine:BulletEngine",
@@ -147,7 +151,7 @@ def list_origins(family: str, name: str) -> list[str]:
 
 def load_part(family: str, name: str, path: str) -> Any:
     """Import the object ``module:name`` that a member names."""
-    return _load_own(path) if is_own(family, name) else _import(path, f"{_describe(family, name)}: {path}")
+    return import_own(path) if is_own(family, name) else _import(path, f"{_describe(family, name)}: {path}")
 
 
 @contextmanager
@@ -189,7 +193,7 @@ def _load(path: str) -> Any:
 
 
 @cache
-def _load_own(path: str) -> Any:
+def import_own(path: str) -> Any:
     """Import an object of our own, only once, because parts are asked for several times in every trial."""
     return _load(path)
 

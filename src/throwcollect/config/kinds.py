@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
 from pydantic_core import CoreSchema
 
-from throwcollect.members import load_member, usable_names
+from throwcollect.members import import_own, usable_names
 from throwcollect.wording import suggest
 
 
@@ -25,6 +25,19 @@ class ContradictionError(ValueError):
         super().__init__("; ".join(f"{key}: {sentence}" for key, sentence in self.sentences.items()))
 
 
+def find_robot(section: Any) -> Any:
+    """Find the robot of a section, or of a name: a `throwcollect.robots.robot.Robot`.
+
+    It is imported when it is asked for, because configurations are read without the libraries of simulations.
+    """
+    return import_own("throwcollect.robots.described:find_robot")(section)
+
+
+def complete_robot(section: Any) -> Any:
+    """Complete the section of a robot that only names it or its URDF (see `throwcollect.robots.described.complete`)."""
+    return import_own("throwcollect.robots.described:complete")(section)
+
+
 def unknown_joint(name: str, robot: Any) -> str:
     """Make the sentence for a name that is no joint of a robot."""
     return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"
@@ -32,16 +45,14 @@ def unknown_joint(name: str, robot: Any) -> str:
 
 def all_joints() -> tuple[str, ...]:
     """List the joints of all robots that can be loaded, each once."""
-    robots = [load_member("robots", name) for name in usable_names("robots")]
+    robots = [find_robot(name) for name in usable_names("robots")]
     return tuple(dict.fromkeys(joint for robot in robots for joint in robot.joints))
 
 
 def _require_joint(name: str, info: ValidationInfo) -> str:
-    # The context is the name of the robot, which only the loader passes. Without it, `Config` checks the joints later.
-    if info.context is not None:
-        robot = load_member("robots", info.context)
-        if name not in robot.joints:
-            raise ValueError(unknown_joint(name, robot))
+    # The context is the robot, which only the loader passes. Without it, `Config` checks the joints later.
+    if info.context is not None and name not in info.context.joints:
+        raise ValueError(unknown_joint(name, info.context))
     return name
 
 

@@ -14,11 +14,13 @@ from pydantic import ValidationError
 
 from throwcollect.config.document import Document, Plain
 from throwcollect.config.problems import PARAMETERS, Location
+from throwcollect.config.kinds import complete_robot
+from throwcollect.config.robot_config import AnyRobot, DescribedRobotConfig
 from throwcollect.config.schema import Config, Range
+from throwcollect.config.section import Section
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
 from throwcollect.files import StrPath
-from throwcollect.members import names_of
 
 _PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 # Without quotes, these words are no text: the first three in YAML 1.2, the others for readers of YAML 1.1.
@@ -54,7 +56,8 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     document = Document(path)
     for override in overrides:
         document.override(override, find_default=partial(_find_default, document.values))
-    config = document.validate(Config, context=_find_robot(document.values))
+    robot = _find_robot(document, path.parent)
+    config = document.validate(Config, context=robot)
     if wrong := [document.problem(*each) for each in _find_sweep_problems(config)]:
         raise ConfigError(wrong)
     try:
@@ -106,10 +109,27 @@ def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Pl
     return holder if isinstance(holder, dict) else {}
 
 
-def _find_robot(values: dict[str, Any]) -> str | None:
-    """Find the name of the robot whose joints the values may name; None if there is no such robot."""
-    name = _read_name(values, "robot")
-    return Config().robot.name if name is None else name if name in names_of("robots") else None
+def _find_robot(document: Document, directory: Path) -> Any:
+    """Find the robot whose joints the values may name, and complete its section; None if its keys are wrong.
+
+    Paths in the section are relative to the directory of the file.
+    """
+    given = document.values.get("robot", {})
+    try:
+        section = _RobotOnly.model_validate({"robot": given}, strict=True).robot
+    except ValidationError:
+        return None
+    if isinstance(section, DescribedRobotConfig):
+        section = section.below(directory)
+    try:
+        document.values["robot"] = section = complete_robot(section)
+    except ConfigError as error:
+        raise ConfigError([document.place(problem) for problem in error.problems], hint=error.hint) from error
+    return section.find()
+
+
+class _RobotOnly(Section):
+    robot: AnyRobot
 
 
 def _read_name(values: dict[str, Any], section: str) -> Any:

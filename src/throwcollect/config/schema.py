@@ -16,8 +16,9 @@ from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
+from throwcollect.config.kinds import ContradictionError, Name
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
+from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
@@ -71,14 +72,12 @@ def _make_until_type() -> Any:
 
 
 if TYPE_CHECKING:
-    RobotName = str
     EngineName = str
     AnyTool = ToolConfig
     AnyTask = TaskConfig
     AnyUntil = UntilConfig
 else:
     # The members are known only when the program runs, so type checkers see their common base instead.
-    RobotName = Literal[names_of("robots")]
     EngineName = Literal[names_of("engines")]
     AnyTool = _make_section_type("tools")
     AnyTask = _make_section_type("tasks")
@@ -88,33 +87,6 @@ SLOWEST, FASTEST = 0.001, 1000
 """Bounds of real-time factors: with slower ones, one step of the physics sleeps for minutes or overflows the clock."""
 _BETWEEN_TRIALS_S = 10
 """Simulated time between the slots of two trials: results of a trial's goals expire before the next one."""
-
-
-class RobotConfig(Section):
-    """The robot and how its motors follow commands."""
-
-    name: RobotName = "talos"
-    """Robot model, with its base fixed: Talos of PAL Robotics is `talos_reduced` of example-robot-data. Packages may
-    add others."""
-    base_height_m: Annotated[float, Field(ge=0.5, le=2.0)] = 1.01927
-    """Height of the fixed base link above the ground."""
-    posture: dict[Joint, Angle] = {}
-    """Joint angles that replace angles of the robot's posture at rest (for Talos: half-sitting), for joints that the
-    task does not move."""
-    locked: Literal["auto", "none"] | list[Joint] = "auto"
-    """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all, or a list."""
-    position_gain_per_s: Annotated[float, Field(gt=0, le=1000), Key(swept=True)] = 100.0
-    """Velocity commanded per radian of position error; with Bullet, its position gain is this times the time step."""
-    velocity_gain: Annotated[float, Field(gt=0, le=1), Key(swept=True)] = 1.0
-    """Share of the velocity error that a motor removes in one step [-]."""
-    effort_scale: Annotated[float, Field(gt=0, le=10), Key(swept=True)] = 1.0
-    """Factor on the effort limits of all joints [-]."""
-    joint_offsets: Annotated[dict[Joint, Angle], Key(swept=True)] = {}
-    """Errors of the joints' zeros: the true angle of such a joint minus the angle that is commanded and measured."""
-    speed_scale: Annotated[float, Field(gt=0.5, lt=2), Key(swept=True)] = 1.0
-    """Speed of the clock by which controllers follow trajectories [-]: below 1, motions take longer than planned."""
-    motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0
-    """Time constant with which motors follow their commands; 0: at once."""
 
 
 class BallConfig(Section):
@@ -205,7 +177,7 @@ class Config(Section):
     `until` ten trials for each throw that should land."""
     until: Annotated[AnyUntil | None, Key(Effect.PLAN)] = None
     """Ends the dataset with the trial at which enough throws have landed, or when `trials` are used up."""
-    robot: Annotated[RobotConfig, Key(Effect.PHYSICS)] = RobotConfig()
+    robot: Annotated[AnyRobot, Key(Effect.PHYSICS)] = RobotConfig()
     """The robot."""
     tool: Annotated[AnyTool, Key(Effect.PHYSICS)] = load_member("tools", "spoon")()
     """The tool in its hand."""
@@ -254,7 +226,7 @@ class Config(Section):
             yield "run.root_namespace", f"should be left out, as {several} cannot share a namespace"
 
     def _find_unknown_joints(self) -> Iterator[tuple[str, str]]:
-        robot = load_member("robots", self.robot.name)
+        robot = self.robot.find()
         named = {
             "robot.posture": self.robot.posture,
             "robot.locked": self.robot.locked if isinstance(self.robot.locked, list) else (),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -60,11 +61,35 @@ class Mesh:
         extents = np.linalg.svd(np.unique(corners - corners.mean(axis=0), axis=0), compute_uv=False)
         return bool(len(extents) < 3 or extents[2] <= _LEAST_THICKNESS * extents[0])
 
+    def find_hull(self, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> pinocchio.coal.CollisionGeometry:
+        """Compute the convex hull, as which the mesh collides in every engine, with coordinates times these factors."""
+        if self.is_flat:
+            raise ConfigError(f"{self.path}: the mesh is flat, so nothing can collide with it")
+        corners = self.triangles.reshape(-1, 3).astype(np.float64) * scale
+        points = pinocchio.coal.StdVec_Vec3s()
+        points.extend(list(np.unique(corners, axis=0)))
+        try:
+            return pinocchio.coal.Convex.convexHull(points, True, "Qt")
+        except RuntimeError as error:
+            reason = str(error).splitlines()[-1]
+            raise ConfigError(f"{self.path}: has no usable convex hull: {reason}") from error
+
     def encode(self) -> bytes:
         """Encode the triangles as binary STL."""
-        records = np.zeros(len(self.triangles), STL)
-        records["corners"] = self.triangles
-        return bytes(80) + len(records).to_bytes(4, "little") + records.tobytes()
+        return encode(self.triangles)
+
+    def encode_hull(self) -> bytes:
+        """Encode the convex hull as binary STL."""
+        hull = self.find_hull()
+        corners = [[hull.polygons(index)[corner] for corner in range(3)] for index in range(hull.num_polygons)]
+        return encode(np.asarray(hull.points(), np.float32)[corners])
+
+
+def encode(triangles: Triangles) -> bytes:
+    """Encode triangles as binary STL."""
+    records = np.zeros(len(triangles), STL)
+    records["corners"] = triangles
+    return bytes(80) + len(records).to_bytes(4, "little") + records.tobytes()
 
 
 def _read_stl(path: Path) -> Triangles:

@@ -12,7 +12,7 @@ from throwcollect.engines.body import LinkShape
 from throwcollect.errors import ConfigError
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clear_postures import ClearPostures, find_reaches
-from throwcollect.robots.description import joint_model, pose_of
+from throwcollect.robots.joint_model import joint_model, mount_of, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool
 
@@ -53,7 +53,7 @@ class Clearance:
         self._robot, self._model = robot, model
         self._data = model.createData()
         # Copies share the shapes and have pairs of their own.
-        geometry = self.geometry = pinocchio.GeometryModel(_read_shapes(robot))
+        geometry = self.geometry = pinocchio.GeometryModel(read_shapes(robot))
         self._links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
         for pair in list(geometry.collisionPairs):
             names = self._links[pair.first], self._links[pair.second]
@@ -127,9 +127,9 @@ class Clearance:
     def _add_tool(self, tool: Tool) -> None:
         frame = self._model.getFrameId(self._robot.hand, pinocchio.BODY)
         hand = self._model.frames[frame]
-        others = [number for number, name in enumerate(self._links) if not name.startswith(self._robot.holding)]
+        others = [number for number, name in enumerate(self._links) if not self._robot.holds(name)]
         for number, box in enumerate(tool.boxes):
-            placement = hand.placement * tool.mount * box.placement
+            placement = hand.placement * mount_of(self._robot, tool) * box.placement
             shape = pinocchio.GeometryObject(
                 f"{tool.name}_{number}", hand.parentJoint, frame, placement, pinocchio.coal.Box(*box.size)
             )
@@ -140,7 +140,7 @@ class Clearance:
 
 
 @lru_cache(maxsize=4)
-def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
+def read_shapes(robot: Robot) -> pinocchio.GeometryModel:
     """Read the shapes of a robot's links, and the pairs that must stay apart; callers must not change the result.
 
     The result is cached, because reading meshes takes a third of a second, and some programs check several datasets.
@@ -155,7 +155,9 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
             joint = model.frames[frame].parentJoint
             geometry.addGeometryObject(pinocchio.GeometryObject(f"{link.name}_{number}", joint, frame, pose, solid))
     geometry.addAllCollisionPairs()
-    pinocchio.removeCollisionPairs(model, geometry, str(robot.srdf_path), False)
+    # While a robot is imported, there is no SRDF yet.
+    if robot.srdf_path.is_file():
+        pinocchio.removeCollisionPairs(model, geometry, str(robot.srdf_path), False)
     return geometry
 
 
@@ -166,14 +168,6 @@ def _make_solid(where: str, shape: LinkShape) -> pinocchio.coal.CollisionGeometr
         kinds = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "capsule": coal.Capsule}
         return kinds[shape.kind](*shape.size)
     try:
-        if shape.mesh.is_flat:
-            raise ConfigError(f"{shape.mesh.path}: the mesh is flat, so nothing can collide with it")
-        corners = shape.mesh.triangles.reshape(-1, 3).astype(np.float64) * shape.size
-        points = coal.StdVec_Vec3s()
-        points.extend(list(np.unique(corners, axis=0)))
-        return coal.Convex.convexHull(points, True, "Qt")
+        return shape.mesh.find_hull(shape.size)
     except ConfigError as error:
         raise ConfigError(f"{where}: {error.message}") from error
-    except RuntimeError as error:
-        reason = str(error).splitlines()[-1]
-        raise ConfigError(f"{where}: {shape.mesh.path}: has no usable convex hull: {reason}") from error

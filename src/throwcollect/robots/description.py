@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -24,14 +23,11 @@ from throwcollect.engines.body import (
 )
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import MissingExtraError, is_installed
-from throwcollect.members import load_member
-from throwcollect.native_reading import reading_natively
 from throwcollect.pinocchio_library import pinocchio
+from throwcollect.robots.described import find_robot
+from throwcollect.robots.joint_model import joint_model, lock_joints, mount_of, placement_of, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool, tool_of
-
-_ROUNDING = 1e-6
-"""Share by which the largest moment of inertia may exceed the sum of the others, as numbers in files are rounded."""
 
 _written: dict[tuple[Robot, str], str] = {}
 """The latest full descriptions, by robot and configuration of the tool. They are kept, because everything that looks at
@@ -56,8 +52,7 @@ class Description:
 
 def robot_of(config: Config) -> Robot:
     """Look up the robot that a configuration names."""
-    robot: Robot = load_member("robots", config.robot.name)
-    return robot
+    return find_robot(config.robot)
 
 
 def is_available(config: Config) -> bool:
@@ -114,7 +109,7 @@ def _write_full(robot: Robot, tool: Tool) -> str:
     _ = robot.description
     # The tree is copied, because writing the text indents each element, perhaps in another thread.
     description = copy.deepcopy(robot.xml)
-    link, joint = _hold(tool, robot.hand, tool.mount)
+    link, joint = _hold(tool, robot.hand, mount_of(robot, tool))
     held, *_ = made = list(BodyModel("", (link,), (joint,)).to_xml())
     visuals = copy.deepcopy(held.findall("collision"))
     for visual in visuals:
@@ -123,45 +118,6 @@ def _write_full(robot: Robot, tool: Tool) -> str:
     held[1:1] = visuals
     description.extend(made)
     return to_text(description)
-
-
-@lru_cache(maxsize=4)
-def joint_model(robot: Robot) -> pinocchio.Model:
-    """Build a model of all joints of a robot, without a tool; callers must not change it.
-
-    It is cached, because each trial with other locked joints or another tool needs it.
-    """
-    source = robot.description.model
-    _ = robot.rest_posture
-    # Pinocchio gets the links and joints alone: it would take other things from the file than the strict reader.
-    bare = replace(source, links=tuple(replace(link, shapes=()) for link in source.links))
-    with reading_natively(str(robot.urdf_path)):
-        try:
-            model = pinocchio.buildModelFromXML(bare.write_urdf())
-        except (ValueError, RuntimeError) as error:
-            raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
-    _check_inertias(robot, model)
-    return model
-
-
-def _check_inertias(robot: Robot, model: pinocchio.Model) -> None:
-    """Make sure that there can be the bodies that joints move: engines would change others, or drop them."""
-    # Pinocchio's first joint is the universe.
-    for joint, body in zip(model.names[1:], model.inertias[1:], strict=True):
-        where = f"{robot.urdf_path}: link {robot.description.joints[joint].child}, which {joint} moves,"
-        if body.mass <= 0:
-            raise ConfigError(f"{where} has no mass", hint="give it an <inertial> with <mass> and <inertia> in a copy")
-        _check_moments(where, body)
-
-
-def _check_moments(where: str, body: pinocchio.Inertia) -> None:
-    least, middle, most = np.linalg.eigvalsh(body.inertia)
-    if least <= 0 or least + middle < most * (1 - _ROUNDING):
-        raise ConfigError(
-            f"{where} has principal moments of inertia of {least:.4g}, {middle:.4g} and {most:.4g} kg m², "
-            "which no body can have: they are above 0, and none is larger than the sum of the others",
-            hint="correct its <inertia> in a copy of the URDF",
-        )
 
 
 def physics_description(config: Config) -> Description:
@@ -182,11 +138,11 @@ def physics_description(config: Config) -> Description:
         for number, name in enumerate(names)
     ]
     merged = [
-        replace(joint, parent=names[model.parents[number]], placement=_placement_of(model.jointPlacements[number]))
+        replace(joint, parent=names[model.parents[number]], placement=placement_of(model.jointPlacements[number]))
         for number, joint in enumerate(joints, start=1)
     ]
     hand = model.frames[model.getFrameId(robot.hand, pinocchio.BODY)]
-    held, mount = _hold(tool, names[hand.parentJoint], hand.placement * tool.mount)
+    held, mount = _hold(tool, names[hand.parentJoint], hand.placement * mount_of(robot, tool))
     whole = BodyModel(source.model.name or robot.name, links=(*links, held), joints=(*merged, mount))
     moving = tuple(joint for joint in robot.joints if joint not in locked)
     return Description(model=whole, moving=moving, locked=locked)
@@ -202,15 +158,6 @@ def check_name_of_tool(robot: Robot, tool: Tool) -> None:
         )
 
 
-def lock_joints(model: pinocchio.Model, locked: Mapping[str, float]) -> pinocchio.Model:
-    """Make a model in which some joints are fixed at angles [rad]; the given model stays as it is."""
-    configuration = pinocchio.neutral(model)
-    numbers = [model.getJointId(joint) for joint in locked]
-    for number, angle in zip(numbers, locked.values(), strict=True):
-        configuration[model.idx_qs[number]] = angle
-    return pinocchio.buildReducedModel(model, numbers, configuration)
-
-
 def _collect_shapes(robot: Robot, model: pinocchio.Model, joint: int) -> tuple[LinkShape, ...]:
     """Collect the collision shapes of all links that move with a joint, placed in the frame of the joint."""
     shapes = []
@@ -218,7 +165,7 @@ def _collect_shapes(robot: Robot, model: pinocchio.Model, joint: int) -> tuple[L
         frame = model.frames[model.getFrameId(link.name, pinocchio.BODY)]
         if frame.parentJoint == joint:
             shapes += [
-                replace(shape, placement=_placement_of(frame.placement * pose_of(shape.placement)))
+                replace(shape, placement=placement_of(frame.placement * pose_of(shape.placement)))
                 for shape in link.shapes
             ]
     return tuple(shapes)
@@ -226,20 +173,11 @@ def _collect_shapes(robot: Robot, model: pinocchio.Model, joint: int) -> tuple[L
 
 def _hold(tool: Tool, hand: str, mount: pinocchio.SE3) -> tuple[BodyLink, BodyJoint]:
     """Describe a tool, and the joint that fixes it to a link."""
-    boxes = tuple(LinkShape("box", box.size, _placement_of(box.placement)) for box in tool.boxes)
-    joint = BodyJoint(f"{tool.name}_joint", "fixed", hand, tool.link, _placement_of(mount))
+    boxes = tuple(LinkShape("box", box.size, placement_of(box.placement)) for box in tool.boxes)
+    joint = BodyJoint(f"{tool.name}_joint", "fixed", hand, tool.link, placement_of(mount))
     return BodyLink(tool.link, _inertia_of(tool.inertia), boxes), joint
 
 
 def _inertia_of(body: pinocchio.Inertia) -> LinkInertia:
     moments = tuple(float(body.inertia[place]) for place in INERTIA.values())
-    return LinkInertia(float(body.mass), _placement_of(pinocchio.SE3(np.eye(3), body.lever)), moments)
-
-
-def pose_of(placement: Placement) -> pinocchio.SE3:
-    """Convert a placement of a URDF."""
-    return pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*placement.rpy), np.array(placement.xyz))
-
-
-def _placement_of(pose: pinocchio.SE3) -> Placement:
-    return Placement(tuple(pose.translation.tolist()), tuple(pinocchio.rpy.matrixToRpy(pose.rotation).tolist()))
+    return LinkInertia(float(body.mass), placement_of(pinocchio.SE3(np.eye(3), body.lever)), moments)

@@ -14,12 +14,11 @@ from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import (
     check_name_of_tool,
     find_locked_joints,
-    joint_model,
     joint_offsets,
-    lock_joints,
     robot_of,
     start_posture,
 )
+from throwcollect.robots.joint_model import joint_model, lock_joints, mount_of
 from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.robot import Robot
@@ -151,7 +150,7 @@ class Feasibility:
         pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
         tool, radius = self._tool_of(config), config.ball.radius_m
         # The last row of a rotation into world is the vertical of the world, along the axes of the frame.
-        up = (self._data.oMi[self._hand] * self._hand_placement * tool.mount).rotation[2]
+        up = (self._data.oMi[self._hand] * self._hand_placement * mount_of(self._robot, tool)).rotation[2]
         slope = tool.way_out(radius, up)
         if slope >= _LOWEST_WAY_OUT_RAD:
             return None
@@ -231,6 +230,7 @@ class Dynamics:
         # Columns of `Robot.joints` that are not locked, in the order of the model.
         self._columns = np.array([robot.joints.index(name) for name in list(self._model.names)[1:]], dtype=np.intp)
         hand = self._model.frames[self._model.getFrameId(robot.hand, pinocchio.BODY)]
+        self._robot = robot
         self._hand, self._hand_placement = hand.parentJoint, hand.placement.copy()
         self._bare_hand = self._model.inertias[self._hand].copy()
         self._damping = joint_limits(robot).damping[self._columns]
@@ -247,7 +247,9 @@ class Dynamics:
         ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)
         load = tool.inertia + pinocchio.SE3(np.eye(3), seat).act(ball)
         # The sum begins with the bare hand, because the model still holds the load of the previous trial.
-        self._model.inertias[self._hand] = self._bare_hand + (self._hand_placement * tool.mount).act(load)
+        self._model.inertias[self._hand] = self._bare_hand + (self._hand_placement * mount_of(self._robot, tool)).act(
+            load
+        )
         self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
         positions, velocities, accelerations = (np.ascontiguousarray(array[:, self._columns]) for array in motion)
         rows = zip(positions, velocities, accelerations, strict=True)

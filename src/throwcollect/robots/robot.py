@@ -10,9 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
+from throwcollect.engines.body import HERE, Placement
 from throwcollect.errors import ConfigError
 from throwcollect.members import explain_failure
-from throwcollect.robots.urdf import Urdf, locate_mesh, read_urdf, read_xml
+from throwcollect.robots.urdf import PACKAGE, Urdf, locate_mesh, read_urdf, read_xml
 
 
 # Robots are keys of caches. With `eq`, a robot would be hashed by its fields, but mappings among them have no hash.
@@ -29,13 +30,17 @@ class Robot:
             names are such as ROS allows for nodes.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings this directory is not installed.
+        package: Package of ``package://`` paths whose files lie in that directory itself.
         urdf: Path of the URDF in that directory, or an absolute path.
         srdf: Path of the SRDF in that directory, or an absolute path. The SRDF says which links may overlap, and holds
             the posture at rest.
         rest: Name of the SRDF's posture that joints have unless a configuration says otherwise.
-        hand: Link that the tool is fixed to: the spoon's handle lies along -z of it, and the cup opens along +x.
+        hand: Link that the tool is fixed to: the spoon's handle lies along -z of `tool_pose` in it, and the cup opens
+            along +x.
         open_hand: Prefix of the names of links that have no collision shapes, because the tool reaches into them.
-        holding: Prefixes of the names of links that hold the tool and are not checked for collisions with it.
+        tool_pose: Pose of the hand's frame, in which the tool is mounted, in that link.
+        holding: Links that hold the tool and are not checked for collisions with it: names, or prefixes of names that
+            end with ``_``.
         rigid: For each group of links that only mimic joints move, the prefix of the links' names. Links of a group are
             not checked for collisions with each other.
         ros1_names: Name of each controller in the robot's ROS 1 software; empty if the names are the same.
@@ -54,7 +59,9 @@ class Robot:
     srdf: str
     rest: str
     hand: str
+    package: str = ""
     kind: str = ""
+    tool_pose: Placement = HERE
     open_hand: str = ""
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
@@ -83,6 +90,20 @@ class Robot:
             if joint in joints:
                 return controller
         raise KeyError(joint)
+
+    def holds(self, link: str) -> bool:
+        """Say whether a link holds the tool."""
+        return any(link == each or (each.endswith("_") and link.startswith(each)) for each in self.holding)
+
+    def locate(self, url: str) -> Path:
+        """Find the file of a mesh by its path or URL in the URDF.
+
+        Raises:
+            ConfigError: If it is a URL of another scheme than ``file`` and ``package``.
+        """
+        if self.package and url.startswith(own := f"{PACKAGE}{self.package}/"):
+            return self.directory / url.removeprefix(own)
+        return locate_mesh(url, self.urdf_path.parent, self.directory)
 
     def graph_name(self, controller: str, naming: str) -> str:
         """Return the name of a controller in the ROS graph, by the naming ``ros2`` or ``ros1``."""
@@ -144,7 +165,7 @@ class Robot:
             ConfigError: If it is not a URDF of this robot, or contradicts itself.
         """
         path = self.urdf_path
-        urdf = read_urdf(self.xml, str(path), find_mesh=lambda name: locate_mesh(name, path.parent, self.directory))
+        urdf = read_urdf(self.xml, str(path), find_mesh=self.locate)
         if missing := [name for name in self.joints if name not in urdf.joints]:
             raise ConfigError(f"{path}: joint {missing[0]} is missing")
         if self.hand not in urdf.links:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
-from throwcollect.robots.description import joint_model, joint_offsets, robot_of
+from throwcollect.robots.description import joint_offsets, robot_of
+from throwcollect.robots.joint_model import joint_model, mount_of
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import tool_of
 
@@ -23,7 +24,9 @@ class ToolMotion:
 
     def __init__(self, config: Config) -> None:
         tool = tool_of(config)
-        self._seat = tool.mount * pinocchio.SE3(np.eye(3), np.array(tool.ball_seat(config.ball.radius_m)))
+        self._seat = mount_of(robot_of(config), tool) * pinocchio.SE3(
+            np.eye(3), np.array(tool.ball_seat(config.ball.radius_m))
+        )
         self._model = _model_of(robot_of(config))
         self._offsets = joint_offsets(config)
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])

@@ -1,0 +1,25 @@
+"""Arms that example-robot-data describes; their controllers have the names of their makers' ROS 2 drivers."""
+
+from __future__ import annotations
+
+from throwcollect.config.robot_config import DescribedRobotConfig
+
+PANDA = DescribedRobotConfig(
+    name="panda",
+    urdf="example-robot-data:panda_description/urdf/panda.urdf",
+    flange="panda_link8",
+    # moveit_resources_panda_moveit_config, and Franka's own franka_bringup for its example controllers.
+    controllers={"panda_arm_controller": [f"panda_joint{number}" for number in range(1, 8)]},
+)
+UR5 = DescribedRobotConfig(
+    name="ur5",
+    urdf="example-robot-data:ur_description/urdf/ur5_robot.urdf",
+    flange="tool0",
+    # ur_robot_driver, config/ur_controllers.yaml.
+    controllers={
+        "scaled_joint_trajectory_controller": [
+            *("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"),
+            *("wrist_1_joint", "wrist_2_joint", "wrist_3_joint"),
+        ]
+    },
+)

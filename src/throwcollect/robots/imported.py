@@ -1,0 +1,86 @@
+"""Robots that have been imported: a directory of files, and the section of a configuration that belongs to it."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache, partial
+from pathlib import Path
+
+from throwcollect.config.robot_config import DescribedRobotConfig
+from throwcollect.engines.body import Placement
+from throwcollect.errors import ConfigError
+from throwcollect.robots.robot import Robot
+
+URDF, SRDF = "robot.urdf", "robot.srdf"
+"""Names of an imported robot's files; its meshes have names made of their digests."""
+HOME = "home"
+"""Name of the posture at rest in the SRDF of an imported robot."""
+_NAME = 16
+"""Length of the names of meshes."""
+_KEYS = {"name", "urdf", "srdf", "flange", "tool_pose", "controllers", "holding", "sha256"}
+"""Keys that the robot depends on."""
+
+
+def make_robot(section: DescribedRobotConfig) -> Robot:
+    """Make the robot of a complete section."""
+    return _make_robot(section.model_dump_json(include=_KEYS))
+
+
+# Robots are keys of caches, so that equal sections need to have the same one.
+@lru_cache(maxsize=16)
+def _make_robot(keys: str) -> Robot:
+    section = DescribedRobotConfig.model_validate_json(keys)
+    controllers = section.controllers or {}
+    return Robot(
+        name=section.name,
+        title=section.name,
+        kind="the robot",
+        controllers={name: tuple(joints) for name, joints in controllers.items() if isinstance(joints, list)},
+        share=partial(_check_directory, Path(section.urdf).parent, section.sha256),
+        package=package_of(section.name),
+        urdf=URDF,
+        srdf=SRDF,
+        rest=HOME,
+        hand=section.flange,
+        tool_pose=Placement(_as_vector(section.tool_pose.position_m), _as_vector(section.tool_pose.rpy_rad)),
+        holding=tuple(section.holding or ()),
+    )
+
+
+def _as_vector(numbers: list[float]) -> tuple[float, float, float]:
+    x, y, z = numbers
+    return x, y, z
+
+
+def package_of(name: str) -> str:
+    """Name the package of ``package://`` URLs in the description of an imported robot."""
+    return f"{name.replace('-', '_')}_description"
+
+
+def list_files(directory: Path) -> list[Path]:
+    """List the files of an imported robot that its description needs, by name."""
+    return sorted(path for path in directory.iterdir() if path.name in (URDF, SRDF) or len(path.stem) == _NAME)
+
+
+def hash_files(directory: Path) -> str:
+    """Hash the files of an imported robot with their names; SHA-256, in hexadecimal."""
+    digest = hashlib.sha256()
+    for path in list_files(directory):
+        content = path.read_bytes()
+        digest.update(f"{path.name}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=16)
+def _check_directory(directory: Path, sha256: str | None) -> Path:
+    """Make sure that the files of a robot are those that its section was written for; None is any files."""
+    try:
+        found = hash_files(directory) if sha256 else sha256
+    except OSError as error:
+        raise ConfigError(f"{directory}: the files of the robot cannot be read: {error.strerror}") from error
+    if found != sha256:
+        raise ConfigError(
+            f"{directory}: the files of the robot are not those of robot.sha256",
+            hint="import the robot again: throwcollect robot import",
+        )
+    return directory
