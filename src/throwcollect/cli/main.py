@@ -9,7 +9,17 @@ from typing import Annotated, Any
 
 import typer
 
-from throwcollect.cli import cluster_commands, collect, image_commands, learning, node_commands, runs, serve, show
+from throwcollect.cli import (
+    cluster_commands,
+    collect,
+    image_commands,
+    learning,
+    node_commands,
+    robot_commands,
+    runs,
+    serve,
+    show,
+)
 from throwcollect.cli.dataset import derive, info, replay, verify_command, writing
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
@@ -27,6 +37,7 @@ image_app = typer.Typer(help="Make the image that containers are made from.", no
 app.add_typer(dataset_app, name="dataset")
 app.add_typer(image_app, name="image")
 app.add_typer(ros_app, name="ros")
+app.add_typer(robot_commands.app, name="robot")
 
 
 def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool = False) -> None:

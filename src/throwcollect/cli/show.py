@@ -9,6 +9,7 @@ import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import format_number, print_json, print_json_list, print_result, tell
+from throwcollect.cli.robot_commands import FlangeOption, read_robot, write_robot
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
@@ -16,27 +17,52 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
+    from throwcollect.config.robot_config import RobotConfig
     from throwcollect.sweep.plan import Plan
+    from throwcollect.tasks.starter import Beginning
 
 
 def init(
-    robot: Annotated[str, typer.Option("--robot", metavar="NAME", help="The robot: robot.name.")] = "talos",
+    robot: Annotated[
+        str,
+        typer.Option(
+            "--robot", metavar="ROBOT", help="The robot: its name, a robot.yaml or its directory, or a URDF (--flange)."
+        ),
+    ] = "talos",
+    flange: FlangeOption = None,
     task: Annotated[str, typer.Option("--task", metavar="NAME", help="What it does: task.name.")] = "throw",
     sampler: Annotated[
         str, typer.Option("--sampler", metavar="NAME", help="How trials are drawn: sweep.sampler.")
     ] = "sobol",
 ) -> None:
-    """Write a commented throwcollect.yaml, for `throwcollect up`."""
-    from throwcollect.files import write_file
-    from throwcollect.tasks.starter import make_starter
+    """Write a commented throwcollect.yaml, for `throwcollect up`.
 
-    texts = make_starter(robot, task, sampler)
+    For a robot without a default motion, it searches a throw that lands.
+    """
+    from throwcollect.files import write_file
+    from throwcollect.tasks.starter import begin_at_default, check_choices, make_starter
+
+    check_choices(task, sampler)
+    section = read_robot(robot, flange)
+    beginning = begin_at_default(section.name, task) if robot == section.name else None
+    texts = make_starter(task, sampler, beginning or _search_beginning(robot, section, task))
     if existing := [name for name in texts if Path(name).exists()]:
         raise ConfigError(f"{existing[0]}: is there already", hint="move it away, or go to another directory")
     for name, text in texts.items():
         write_file(Path(name), text.encode())
     typer.echo(f"{' and '.join(texts)}: written. Look at the trials with {command('plan')}, and collect them with:")
     typer.echo(f"  {command('up')}")
+
+
+def _search_beginning(robot: str, section: RobotConfig, task: str) -> Beginning:
+    from throwcollect.extras import is_installed
+    from throwcollect.learning.first_throw import find_first_throw
+    from throwcollect.tasks.starter import Beginning
+
+    engine = "bullet" if is_installed("pybullet") else "mujoco"
+    found = find_first_throw(section, task, engine, say=tell)
+    tell(f"found a throw of {found.distance_m:.2f} m; {found.landed:.0%} of the trials about it land")
+    return Beginning(write_robot(robot, section), found.start, found.end, found.duration_s, found.ranges)
 
 
 def config(

@@ -39,17 +39,24 @@ _UNREADABLE = (YAMLError, RecursionError, ValueError, LookupError, OverflowError
 class Document:
     """Values of a configuration file and of overrides, with the line of each.
 
+    Args:
+        path: The file; None if there are only overrides.
+
     Attributes:
         values: Plain dictionaries, lists, strings, numbers, truth values and None.
         problems: Keys that are there twice, and wrong overrides.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | None) -> None:
         self.problems: list[Problem] = []
         self._path = path
         self._count = 0
         self._in_file = True
         self._lines: dict[Location, int | None] = {}
+        if path is None:
+            self.values: dict[str, Any] = {}
+            self._in_file = False
+            return
         try:
             node = compose(_read_text(path))
             self.values = {} if node is None else self._make_plain(node, ())

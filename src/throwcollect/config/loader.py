@@ -13,9 +13,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from throwcollect.config.document import Document, Plain
-from throwcollect.config.problems import PARAMETERS, Location
 from throwcollect.config.kinds import complete_robot
-from throwcollect.config.robot_config import AnyRobot, DescribedRobotConfig
+from throwcollect.config.problems import PARAMETERS, Location
+from throwcollect.config.robot_config import AnyRobot, DescribedRobotConfig, RobotConfig
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.section import Section
 from throwcollect.config.values import reason_not_sweepable, with_values
@@ -126,6 +126,22 @@ def _find_robot(document: Document, directory: Path) -> Any:
     except ConfigError as error:
         raise ConfigError([document.place(problem) for problem in error.problems], hint=error.hint) from error
     return section.find()
+
+
+def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> RobotConfig:
+    """Read and complete the section `robot` of a file, or the one that overrides alone make.
+
+    Raises:
+        ConfigError: If the file cannot be read, the section is wrong, or its robot cannot be imported.
+    """
+    document = Document(path)
+    for override in overrides:
+        document.override(override)
+    document.values = {"robot": document.values.get("robot", {})}
+    if _find_robot(document, Path() if path is None else path.parent) is None:
+        document.validate(_RobotOnly)
+    section: RobotConfig = document.values["robot"]
+    return section
 
 
 class _RobotOnly(Section):

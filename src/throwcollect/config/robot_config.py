@@ -50,6 +50,10 @@ class RobotConfig(Section):
     motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0
     """Time constant with which motors follow their commands; 0: at once."""
 
+    def without_place(self) -> RobotConfig:
+        """Make a section that is the same wherever the robot's files lie."""
+        return self
+
     def find(self) -> Any:
         """Find the robot, a `throwcollect.robots.robot.Robot`."""
         return find_robot(self)
@@ -123,6 +127,14 @@ class DescribedRobotConfig(RobotConfig):
     before it."""
     sha256: str | None = None
     """Digest of the files of an imported robot; it is written with a dataset."""
+
+    def without_place(self) -> RobotConfig:
+        """Make a section that is the same wherever the robot's files lie."""
+        return (
+            self
+            if self.sha256 is None
+            else self.model_copy(update={"urdf": "robot/robot.urdf", "srdf": "robot/robot.srdf"})
+        )
 
     def below(self, directory: Path) -> Self:
         """Make paths that are relative to a directory absolute."""

@@ -246,7 +246,12 @@ class Config(Section):
     def without_run(self) -> Config:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""
         return self.model_copy(
-            update={"run": RunConfig(), "containers": ContainersConfig(), "cluster": ClusterConfig()}
+            update={
+                "run": RunConfig(),
+                "containers": ContainersConfig(),
+                "cluster": ClusterConfig(),
+                "robot": self.robot.without_place(),
+            }
         )
 
     def run_as(self, other: Config) -> Config:

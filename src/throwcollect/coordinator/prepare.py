@@ -9,14 +9,18 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-from throwcollect.config.schema import Config, RobotConfig
+from throwcollect.config.key import key_of_field
+from throwcollect.config.robot_config import DescribedRobotConfig, RobotConfig
+from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.creation import create, refuse_many_files, refuse_taken
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.feasibility import Feasibility
+from throwcollect.robots.oddities import find_placeholders
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.plan import Check, Plan, check_some_left, make_trials, refusal
 from throwcollect.sweep.point_file import read_points
@@ -78,6 +82,8 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     if sentence := find_sunken_robot(config):
         onlooker.warn(sentence)
+    for sentence in find_placeholders(robot_of(config)):
+        onlooker.warn(f"warning: {sentence}")
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
     ThrowsTable((), config)
     refuse_many_files(config, len(points.values))
@@ -112,7 +118,7 @@ def find_sunken_robot(config: Config) -> str | None:
     Such trials are not refused: the robot's base is fixed, and the ground stops none of its links.
     """
     height_m = config.robot.base_height_m
-    if height_m == RobotConfig().base_height_m:
+    if isinstance(config.robot, DescribedRobotConfig) or height_m == RobotConfig().base_height_m:
         return None
     link, below_m = Feasibility(config).find_lowest(config)
     if height_m + below_m > -_DEEPEST_SOLE_M:
@@ -147,11 +153,11 @@ def feasibility_check(config: Config) -> Check:
 
 def _replace_by_nominal_robot(config: Config) -> Config:
     """Replace all numbers of robot, tool and ball that one has to measure by their defaults."""
-    robot, defaults = config.robot, RobotConfig()
-    kept = {"name": robot.name, "posture": robot.posture, "locked": robot.locked, "base_height_m": robot.base_height_m}
+    fields = RobotConfig.model_fields
+    measured = {name: each.default for name, each in fields.items() if key_of_field(RobotConfig, name).swept}
     tool = type(config.tool).model_validate({"name": config.tool.name})
     return config.model_copy(
-        update={"robot": defaults.model_copy(update=kept), "tool": tool, "ball": type(config.ball)()}
+        update={"robot": config.robot.model_copy(update=measured), "tool": tool, "ball": type(config.ball)()}
     )
 
 

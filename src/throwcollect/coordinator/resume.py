@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from throwcollect.config.loader import dump_yaml, load, load_locating_errors
+from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
@@ -21,8 +21,9 @@ from throwcollect.coordinator.prepare import (
     prepare,
     read_listed_points,
 )
+from throwcollect.dataset.carried_robot import config_text, write_config
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SOURCES, TRIALS, config_path
+from throwcollect.dataset.directory import METADATA, PLAN, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import entry_of, entry_of_file, is_begun
 from throwcollect.dataset.recovery import remove_unfinished
@@ -156,7 +157,7 @@ def _write(plan: Plan, directory: Path, stored: Config | None, *, ended: bool) -
             # Were this process killed here, the plan must not lie beside another configuration. If it is empty, it is
             # made again, and the directory still holds a dataset.
             write_file(directory / PLAN, b"")
-        write_file(directory / CONFIG, dump_yaml(kept).encode())
+        write_config(directory, kept)
     if replanned:
         plan.write(directory / PLAN)
 
@@ -205,7 +206,7 @@ def _read_stored_config(directory: Path) -> Config | None:
         path = config_path(directory)
         config = load(path)
         # Compare the whole text: one that a power cut has cut off may still be valid, with defaults for missing keys.
-        return config if path.read_text(encoding="utf-8") == dump_yaml(config) else None
+        return config if path.read_text(encoding="utf-8") == config_text(config) else None
     except (ConfigError, DatasetError, OSError):
         return None
 

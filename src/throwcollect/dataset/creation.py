@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import MOST_FILES
-from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
+from throwcollect.dataset.carried_robot import write_config
+from throwcollect.dataset.directory import CONFIG, PLAN, ROBOT, TRIALS
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
@@ -73,6 +74,7 @@ def remove_plan(directory: Path, *, made: bool) -> None:
     with suppress(OSError):
         for name in (CONFIG, PLAN, TRIALS):
             (directory / name).unlink(missing_ok=True)
+        shutil.rmtree(directory / ROBOT, ignore_errors=True)
         if made:
             directory.rmdir()
 
@@ -81,7 +83,7 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
     refuse_taken(directory)
     with ExitStack() as undo:
         undo.callback(remove_plan, directory, made=made)
-        write_file(directory / CONFIG, dump_yaml(plan.config).encode())
+        write_config(directory, plan.config)
         # An empty plan marks the dataset and is made again, so a collection that is killed in the meantime can go on.
         write_file(directory / PLAN, b"")
         if listed is not None:

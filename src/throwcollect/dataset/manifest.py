@@ -17,12 +17,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from throwcollect.dataset.carried_robot import list_carried
 from throwcollect.dataset.directory import (
     CONFIG,
     JOURNAL,
     MANIFEST,
     METADATA,
     PLAN,
+    ROBOT,
     SHARD_SUFFIX,
     SOURCES,
     THROWS,
@@ -38,8 +40,8 @@ _PROFILE = "data-package"
 _HASH = "sha256:"
 DESCRIBING = (CONFIG, PLAN, TRIALS, SOURCES, THROWS)
 """Files beside the recordings and ``metadata.yaml`` that the manifest has, as far as a dataset has them."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-"""A file name without directories, so that no manifest can name a file outside of the dataset."""
+_NAME = re.compile(rf"(?:{ROBOT}/)?[A-Za-z0-9][A-Za-z0-9_.-]*")
+"""A file name without directories but that of the robot, so that no manifest can name a file outside of the dataset."""
 _MOST_BYTES = 100_000_000
 _BLOCK = 1 << 20
 
@@ -58,8 +60,8 @@ def entry_of(path: str, data: bytes) -> FileEntry:
     return FileEntry(path, len(data), hashlib.sha256(data).hexdigest())
 
 
-def entry_of_file(path: Path) -> FileEntry:
-    """Make the entry of a file on disk."""
+def entry_of_file(path: Path, name: str | None = None) -> FileEntry:
+    """Make the entry of a file on disk, which has this name in the dataset."""
     digest, size = hashlib.sha256(), 0
     try:
         with open(open_regular(path), "rb") as file:
@@ -68,7 +70,7 @@ def entry_of_file(path: Path) -> FileEntry:
                 size += len(block)
     except OSError as error:
         raise unreadable(path, error) from error
-    return FileEntry(path.name, size, digest.hexdigest())
+    return FileEntry(name or path.name, size, digest.hexdigest())
 
 
 def size_of_file(path: Path) -> int:
@@ -129,7 +131,8 @@ def list_promised_names(directory: Path) -> list[str]:
     """
     known = {METADATA, *DESCRIBING}
     names = os.listdir(directory)
-    return sorted(name for name in names if name in known or SHARD_SUFFIX in name or name.endswith(".new"))
+    promised = [name for name in names if name in known or SHARD_SUFFIX in name or name.endswith(".new")]
+    return sorted([*promised, *list_carried(directory)])
 
 
 def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
@@ -177,7 +180,7 @@ def was_changed(directory: Path, name: str) -> bool:
     """Whether there is a manifest, and a file of the dataset is not as the manifest says."""
     try:
         entries = [entry for entry in read_manifest(directory) if entry.path == name]
-        return any(entry != entry_of_file(directory / name) for entry in entries)
+        return any(entry != entry_of_file(directory / name, name) for entry in entries)
     except DatasetError:
         return False
 
@@ -195,7 +198,7 @@ def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full
         try:
             actual = replace(entry, bytes=size_of_file(path))
             if in_full and actual == entry:
-                actual = entry_of_file(path)
+                actual = entry_of_file(path, entry.path)
         except DatasetError as error:
             yield Finding(entry.path, "", error.problem)
             continue

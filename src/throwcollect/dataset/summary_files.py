@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from throwcollect.dataset.bag import BAG_SECTION, FileSummary, bag_information, to_yaml
+from throwcollect.dataset.carried_robot import list_carried
 from throwcollect.dataset.directory import FORMAT, MANIFEST, METADATA, THROWS
 from throwcollect.dataset.manifest import DESCRIBING, entry_of, entry_of_file, manifest_text
 from throwcollect.dataset.misses import read_targets
@@ -40,7 +41,11 @@ def write_description(
     metadata = metadata_text([summary for summary, _ in recordings], channels, digest).encode()
     entries = [
         entry_of(METADATA, metadata),
-        *(entry_of_file(path) for each in DESCRIBING if (path := directory / each).exists()),
+        *(
+            entry_of_file(path, each)
+            for each in (*DESCRIBING, *list_carried(directory))
+            if (path := directory / each).exists()
+        ),
         *(entry for _, entry in recordings),
     ]
     write_file(directory / MANIFEST, manifest_text(name, entries).encode())

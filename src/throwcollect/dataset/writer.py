@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
+from throwcollect.dataset.carried_robot import write_config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes, data_card
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN
@@ -239,7 +239,7 @@ class DatasetWriter:
         config = self._config.without_run()
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_provenance(self._directory, provenance)
-        write_file(self._directory / CONFIG, dump_yaml(config).encode())
+        write_config(self._directory, config)
         recordings = [self._recordings[number] for number in sorted(self._recordings)]
         write_description(self._directory, config.name, throws, self._channels, recordings)
         self.note("finished", wall_s=wall_s)

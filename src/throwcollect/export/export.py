@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.arguments import refuse_argument
+from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.directory import CARD, CONFIG, TRIALS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
@@ -59,6 +60,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
             chosen.write(source, beside)
             card = render_card(source, chosen.describe(source))
         shutil.copyfile(directory / CONFIG, beside / CONFIG)
+        carry_robot(source.dataset.config, beside)
         if source.dataset.config.sweep.file is not None:
             write_file(beside / TRIALS, encode_points(source.dataset.plan.trials.points))
         (beside / CARD).write_text(card, encoding="utf-8")

@@ -241,7 +241,9 @@ class _Search:
                     f"task.end.{joint}": (round(float(low), 3), round(float(high), 3)),
                     "task.duration_s": (shortest, round(slower * shortest, 3)),
                 }
-                grid = list(product(*(np.linspace(*each, count) for each, count in zip(ranges.values(), _GRID, strict=True))))
+                grid = list(
+                    product(*(np.linspace(*each, count) for each, count in zip(ranges.values(), _GRID, strict=True)))
+                )
                 throws = [
                     self._throw(config, dict(zip(ranges, map(float, point), strict=True)), feasibility, simulator)
                     for point in grid

@@ -37,6 +37,7 @@ class Postures:
 
     Attributes:
         model: All joints, in whose order postures are.
+        joints: Their names.
         allowed: Links that may overlap, by pairs in alphabetical order; more may be added.
         hand: Frame in the model of the link that holds the tool.
         tool: Pose in which it holds the tool.
@@ -45,6 +46,7 @@ class Postures:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.model = joint_model(robot)
+        self.joints = list(self.model.names)[1:]
         self._data = self.model.createData()
         self.geometry = pinocchio.GeometryModel(read_shapes(robot))
         self._placed = self.geometry.createData()
@@ -86,6 +88,11 @@ class Postures:
         """Compute the cosine of the angle between the tool's opening and the vertical."""
         pinocchio.framesForwardKinematics(self.model, self._data, posture)
         return float((self._data.oMf[self.hand] * self.tool).rotation[2, 0])
+
+    def find_reach(self, posture: NDArray[np.float64]) -> float:
+        """Compute the distance of the hand from the base [m]."""
+        pinocchio.framesForwardKinematics(self.model, self._data, posture)
+        return float(np.linalg.norm(self._data.oMf[self.hand].translation))
 
     def find_upright(self, count: int = 1) -> tuple[list[NDArray[np.float64]], float]:
         """Search postures that hold a ball in the tool and are clear.
@@ -174,8 +181,7 @@ def _find_home(
             ],
             hint="turn the hand by robot.tool_pose, or give robot.home",
         )
-    names = list(postures.model.names)[1:]
-    angles = dict(zip(names, np.round(found[0], 4).tolist(), strict=True))
+    angles = dict(zip(postures.joints, np.round(found[0], 4).tolist(), strict=True))
     return {joint: angles[joint] for joint in robot.joints}, "searched, holds the ball"
 
 

@@ -18,7 +18,6 @@ from throwcollect.engines.body import (
     BodyModel,
     LinkInertia,
     LinkShape,
-    Placement,
     to_text,
 )
 from throwcollect.errors import ConfigError, MemberError

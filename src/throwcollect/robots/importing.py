@@ -15,7 +15,7 @@ import re
 import shutil
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -31,7 +31,7 @@ from throwcollect.members import load_member, names_of
 from throwcollect.robots.derived import derive
 from throwcollect.robots.imported import SRDF, URDF, hash_files, make_robot, package_of
 from throwcollect.robots.joint_model import move_joint
-from throwcollect.robots.urdf import PACKAGE, Urdf, locate_mesh, read_urdf, read_xml
+from throwcollect.robots.urdf import PACKAGE, locate_mesh, read_urdf, read_xml
 from throwcollect.state_directory import state_directory
 from throwcollect.version import __version__
 from throwcollect.wording import suggest

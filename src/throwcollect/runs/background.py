@@ -19,14 +19,14 @@ from typing import IO, Literal, cast
 
 from pydantic import TypeAdapter
 
-from throwcollect.config.loader import dump_yaml, load, load_locating_errors
+from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.coordinator.progress import Progress
-from throwcollect.dataset.directory import config_path
+from throwcollect.dataset.carried_robot import write_config
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
-from throwcollect.files import open_log, write_file
+from throwcollect.files import open_log
 from throwcollect.interruption import stop_signals
 from throwcollect.runs.component_container import (
     CONTAINER_ORDERS,
@@ -283,7 +283,7 @@ def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onl
         config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
         directory = run.directory / "data"
         directory.mkdir(exist_ok=True)
-        write_file(config_path(directory), dump_yaml(config).encode())
+        write_config(directory, config)
         choice = choose(config, say=onlooker.say, warn=onlooker.warn)
         simulations = choice.runtime.simulations(config)
         run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations)

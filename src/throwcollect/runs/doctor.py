@@ -25,7 +25,7 @@ from throwcollect.extras import (
     is_installed,
 )
 from throwcollect.members import explain_failure, load_member, names_of
-from throwcollect.robots.description import joint_model
+from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, uses_rclpy

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,8 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.extras import has_wheel
 from throwcollect.members import load_member, names_of
+from throwcollect.robots.described import find_robot
 from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.robot import Robot
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.wording import find_near, suggest
 
@@ -26,9 +27,6 @@ POINTS = "throws.csv"
 
 _NARROW_RAD = 0.2
 """The last angle of a joint is swept by this angle to either side, but by no more than half of the joint's motion."""
-
-Motion = tuple[Mapping[str, float], Mapping[str, float], float]
-"""Angles at the start and at the end, by joint [rad], and the time in between [s]."""
 
 _STROKE_RAD = 0.4
 """How far each joint moves if its limits allow it [rad]."""
@@ -48,43 +46,68 @@ def samplers() -> list[str]:
     return root().child("sweep").child("sampler").choices
 
 
-def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
-    """Write a configuration to begin with, for the robot, the task and the sampler of these names.
+@dataclass(frozen=True)
+class Beginning:
+    """What a configuration begins with.
+
+    Attributes:
+        robot: Lines of its section `robot`, without the key.
+        start: Angle of each joint at the start [rad].
+        end: Angle at the end of the joints that move [rad].
+        duration_s: Time in between.
+        ranges: Least and greatest value of the keys to sweep.
+    """
+
+    robot: Sequence[str]
+    start: Mapping[str, float]
+    end: Mapping[str, float]
+    duration_s: float
+    ranges: Mapping[str, tuple[float, float]]
+
+
+def make_starter(task: str, sampler: str, beginning: Beginning) -> dict[str, str]:
+    """Write a configuration to begin with, for the task and the sampler of these names.
 
     Returns:
         The text of the configuration as ``throwcollect.yaml``, and of `POINTS` if the sampler reads it.
     """
-    for option, name, known in (
-        ("--robot", robot, names_of("robots")),
-        ("--task", task, names_of("tasks")),
-        ("--sampler", sampler, samplers()),
-    ):
-        if name not in known:
-            how = (
-                "" if option == "--sampler" or find_near(name, known) else "; CONTRIBUTING.md describes how to add one"
-            )
-            raise ConfigError(f"{option} {name}: no such {option[2:]} is installed{suggest(name, known)}{how}")
-    # A task of another package that cannot be loaded is reported here, before a configuration names it.
-    load_member("tasks", task)
-    motion = find_first_motion(robot, task)
-    start, end, duration_s = motion
-    joint = max(end, key=lambda name: abs(end[name] - start[name]))
-    half_rad = min(_NARROW_RAD, abs(end[joint] - start[joint]) / 2)
-    ranges = {
-        f"task.end.{joint}": (round(end[joint] - half_rad, 3), round(end[joint] + half_rad, 3)),
-        "task.duration_s": (duration_s, round(1.3 * duration_s, 3)),
-    }
-    texts = {str(DEFAULT_CONFIG): "".join(f"{line}\n" for line in _write_lines(robot, task, sampler, motion, ranges))}
+    ranges = beginning.ranges
+    texts = {str(DEFAULT_CONFIG): "".join(f"{line}\n" for line in _write_lines(task, sampler, beginning))}
     if sampler == "list":
         rows = zip(*((low, (low + high) / 2, high) for low, high in ranges.values()), strict=True)
         texts[POINTS] = "\n".join([",".join(ranges), *(",".join(f"{value:g}" for value in row) for row in rows), ""])
     return texts
 
 
-def _write_lines(
-    robot: str, task: str, sampler: str, motion: Motion, ranges: Mapping[str, tuple[float, float]]
-) -> Iterator[str]:
-    start, end, duration_s = motion
+def check_choices(task: str, sampler: str) -> None:
+    """Reject names of a task and a sampler that do not exist, and a task that cannot be loaded."""
+    for option, name, known in (("--task", task, names_of("tasks")), ("--sampler", sampler, samplers())):
+        if name not in known:
+            how = "" if option == "--sampler" or find_near(name, known) else "; docs/robots.md describes how to add one"
+            raise ConfigError(f"{option} {name}: no such {option[2:]} is installed{suggest(name, known)}{how}")
+    load_member("tasks", task)
+
+
+def begin_at_default(robot: str, task: str) -> Beginning | None:
+    """Find the default motion of a task with a robot; None if the default is for another robot and the task throws."""
+    try:
+        found = _describe_motion(robot, task).task
+    except ValidationError:
+        if load_member("tasks", task).throws:
+            return None
+        found = _find_short_motion(robot, task)
+    end, start, duration_s = found.end, found.start, found.duration_s
+    joint = max(end, key=lambda name: abs(end[name] - start[name]))
+    half_rad = min(_NARROW_RAD, abs(end[joint] - start[joint]) / 2)
+    ranges = {
+        f"task.end.{joint}": (round(end[joint] - half_rad, 3), round(end[joint] + half_rad, 3)),
+        "task.duration_s": (duration_s, round(1.3 * duration_s, 3)),
+    }
+    return Beginning([f"name: {robot} # {_list_choices(names_of('robots'))}"], start, end, duration_s, ranges)
+
+
+def _write_lines(task: str, sampler: str, beginning: Beginning) -> Iterator[str]:
+    start, end, duration_s, ranges = beginning.start, beginning.end, beginning.duration_s, beginning.ranges
     yield "# What is collected. Angles are in radians, times in seconds; docs/configuration.md lists every key, and"
     yield "# `throwcollect config` prints all of them. `throwcollect plan` says which trials the robot could not do."
     yield "name: throws # of the dataset: datasets/throws"
@@ -92,7 +115,7 @@ def _write_lines(
     yield "seed: 1 # everything that is random follows from it"
     yield ""
     yield "robot:"
-    yield f"  name: {robot} # {_list_choices(names_of('robots'))}"
+    yield from (f"  {line}" for line in beginning.robot)
     yield "task:"
     yield f"  name: {task} # {_list_choices(names_of('tasks'))}"
     yield f"  duration_s: {duration_s:g} # how long the motion takes"
@@ -126,28 +149,15 @@ def _list_choices(names: Iterable[str]) -> str:
     return f"one of {', '.join(names)}"
 
 
-def find_first_motion(robot: str, task: str) -> Motion:
-    """Find a motion: the default of the task or, if that is for another robot, a short one from the posture at rest.
-
-    The short motion keeps the limits of positions and velocities, even if a joint goes half as far again; neither
-    torques nor collisions are looked at. Robot and task are given by their names.
-    """
-    try:
-        found = _describe_motion(robot, task).task
-    except ValidationError:
-        found = _find_short_motion(robot, task)
-    return found.start, found.end, found.duration_s
-
-
 def _describe_motion(robot: str, task: str, **motion: Mapping[str, float]) -> Config:
     """Make the configuration of a motion; whatever is not given is the default of the task."""
     values = {"name": "throws", "robot": {"name": robot}, "task": {"name": task, **motion}}
-    return Config.model_validate(values, context=robot)
+    return Config.model_validate(values, context=find_robot(robot))
 
 
 def _find_short_motion(name: str, task: str) -> TaskConfig:
     """Find a motion of all joints that may move, each by `_STROKE_RAD`, or as far as its limits allow."""
-    robot: Robot = load_member("robots", name)
+    robot = find_robot(name)
     limits = joint_limits(robot)
     margin = np.minimum(_MARGIN_RAD, _MARGIN_SHARE * (limits.upper - limits.lower))
     lower, upper = limits.lower + margin, limits.upper - margin
