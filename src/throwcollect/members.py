@@ -31,6 +31,8 @@ _OWN = MappingProxyType(
             "talos": "throwcollect.robots.talos:TALOS",
             "panda": "throwcollect.robots.example_robots:PANDA",
             "ur5": "throwcollect.robots.example_robots:UR5",
+            "xarm7": "throwcollect.robots.example_robots:XARM7",
+            "tiago": "throwcollect.robots.example_robots:TIAGO",
         },
         "tools": {"spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig"},
         "engines": {

@@ -1,4 +1,4 @@
-"""Coordinate frames of a robot, from its URDF: those that never move, and those that joints turn."""
+"""Coordinate frames of a robot, from its URDF: those that never move, and those that joints move."""
 
 from __future__ import annotations
 
@@ -37,10 +37,28 @@ class Frame:
 
 @dataclass(frozen=True)
 class MovingFrame(Frame):
-    """A frame that a revolute joint turns in its parent; the axis is a unit vector in the frame itself."""
+    """A frame that a joint turns about an axis or, if it `slides`, moves along it: a unit vector in the frame itself."""
 
     joint: str
     axis: tuple[float, float, float]
+    slides: bool = False
+
+    def translation_at(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Compute the origin in the parent [m], ``(n, 3)``, at positions of a sliding joint [m] of shape ``(n,)``."""
+        x, y, z = self._turn_axis()
+        return np.stack([a + each * distance for a, each in zip(self.translation, (x, y, z), strict=True)], axis=-1)
+
+    def _turn_axis(self) -> tuple[float, float, float]:
+        """Turn the axis into the parent's frame."""
+        qx, qy, qz, qw = self.rotation_xyzw
+        x, y, z = self.axis
+        # Twice the cross product of the quaternion's vector with the axis.
+        tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
+        return (
+            x + qw * tx + qy * tz - qz * ty,
+            y + qw * ty + qz * tx - qx * tz,
+            z + qw * tz + qx * ty - qy * tx,
+        )
 
     def rotation_at(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
         """Compute unit quaternions (x, y, z, w), frame to parent, ``(n, 4)``, at angles [rad] of shape ``(n,)``."""
@@ -66,7 +84,7 @@ class FrameTree:
 
     Attributes:
         fixed: Frames that never move; the first is the robot's root in `WORLD`.
-        moving: Frames that joints turn.
+        moving: Frames that joints move.
     """
 
     fixed: tuple[Frame, ...]
@@ -89,17 +107,18 @@ def read_frames(urdf: str, *, base_height: float) -> FrameTree:
 
 
 def _frame_of(joint: BodyJoint) -> Frame:
-    if joint.kind not in ("fixed", "revolute", "continuous"):
+    if joint.kind not in ("fixed", "revolute", "continuous", "prismatic"):
         raise ConfigError(
-            f"robot description: joint {joint.name} is {joint.kind}", expected="fixed, revolute or continuous"
+            f"robot description: joint {joint.name} is {joint.kind}", expected="fixed, revolute, continuous or prismatic"
         )
     translation, rotation = joint.placement.xyz, quaternion_of(*joint.placement.rpy)
     if not joint.moves:
         return Frame(joint.parent, joint.child, translation, rotation)
     x, y, z = joint.axis
     length = math.hypot(x, y, z)
+    axis = x / length, y / length, z / length
     return MovingFrame(
-        joint.parent, joint.child, translation, rotation, joint.name, (x / length, y / length, z / length)
+        joint.parent, joint.child, translation, rotation, joint.name, axis, slides=joint.kind == "prismatic"
     )
 
 

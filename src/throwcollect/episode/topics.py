@@ -209,7 +209,11 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
         rows["transforms.0.transform.translation"] = samples.ball_position
         rows["transforms.0.transform.rotation"] = samples.ball_orientation_xyzw
         for number, (frame, column) in enumerate(zip(frames, columns, strict=True), start=1):
-            rows[f"transforms.{number}.transform.rotation"] = frame.rotation_at(samples.position[:, column])
+            position = samples.position[:, column]
+            if frame.slides:
+                rows[f"transforms.{number}.transform.translation"] = frame.translation_at(position)
+            else:
+                rows[f"transforms.{number}.transform.rotation"] = frame.rotation_at(position)
 
     return Topic("/tf", kind, layout, fill)
 

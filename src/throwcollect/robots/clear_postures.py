@@ -16,7 +16,8 @@ _MOST_TRIES = 300
 _LEAST_WORTH = 3
 """A posture is kept if it shows that at least this many postures of the motion are clear, itself included."""
 _UNBOUNDED_M = 1e9
-"""Reach of links beyond a joint that does not turn about an axis, because it is unknown how they move."""
+"""Reach of links beyond a joint of another kind, because it is unknown how they move."""
+_TURNS, _SLIDES = "JointModelR", "JointModelP"
 
 
 class ClearPostures:
@@ -115,10 +116,15 @@ def _find_reach(model: pinocchio.Model, shape: pinocchio.GeometryObject) -> NDAr
     reaches = np.zeros(model.nq)
     joint, reach = shape.parentJoint, max(float(np.linalg.norm(corner)) for corner in corners)
     while joint > 0:
-        # In Pinocchio, the names of all joints that turn about an axis begin with these letters, such as JointModelRX.
-        if not model.joints[joint].shortname().startswith("JointModelR"):
-            reach = _UNBOUNDED_M
-        reaches[model.idx_qs[joint]] = reach
+        column, kind = model.idx_qs[joint], model.joints[joint].shortname()
+        # In Pinocchio, the names of all joints that turn about an axis begin so, such as JointModelRX, and those of
+        # joints that slide so: these move all points by as much as they move, whatever turns before them.
+        if kind.startswith(_SLIDES):
+            reaches[column] = 1.0
+            reach += float(max(abs(model.lowerPositionLimit[column]), abs(model.upperPositionLimit[column])))
+        else:
+            reach = reach if kind.startswith(_TURNS) else _UNBOUNDED_M
+            reaches[column] = reach
         # Whatever the angles are, a point is no farther away than the sum of the lengths of the links up to it.
         reach += float(np.linalg.norm(model.jointPlacements[joint].translation))
         joint = model.parents[joint]

@@ -23,3 +23,22 @@ UR5 = DescribedRobotConfig(
         ]
     },
 )
+XARM7 = DescribedRobotConfig(
+    name="xarm7",
+    urdf="example-robot-data:xarm_description/urdf/xarm7.urdf",
+    flange="link_eef",
+    # xarm_ros2, xarm_controller/config/xarm7_controllers.yaml.
+    controllers={"xarm7_traj_controller": [f"joint{number}" for number in range(1, 8)]},
+)
+TIAGO = DescribedRobotConfig(
+    name="tiago",
+    urdf="example-robot-data:tiago_description/robots/tiago_no_hand.urdf",
+    flange="arm_tool_link",
+    base_height_m=0.0985,
+    # tiago_controller_configuration of tiago_robot.
+    controllers={
+        "torso_controller": ["torso_lift_joint"],
+        "arm_controller": [f"arm_{number}_joint" for number in range(1, 8)],
+        "head_controller": ["head_1_joint", "head_2_joint"],
+    },
+)

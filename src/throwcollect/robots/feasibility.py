@@ -120,14 +120,14 @@ class Feasibility:
             row, joint = worst
             side, limit = ("upper", limits.upper) if positions[worst] > middle[joint] else ("lower", limits.lower)
             return (
-                f"{joints[joint]} is at {positions[worst]:.4g} rad at {times[row]:.3f} s; "
-                f"its {side} limit is {limit[joint]:.4g} rad"
+                f"{joints[joint]} is at {positions[worst]:.4g} {self._robot.unit_of(joints[joint])} at {times[row]:.3f} s; "
+                f"its {side} limit is {limit[joint]:.4g} {self._robot.unit_of(joints[joint])}"
             )
         if worst := _find_worst(velocities, limits.velocity):
             row, joint = worst
             return (
-                f"{joints[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
-                f"its limit is {limits.velocity[joint]:.4g} rad/s"
+                f"{joints[joint]} moves at {abs(velocities[worst]):.4g} {self._robot.unit_of(joints[joint])}/s at {times[row]:.3f} s; "
+                f"its limit is {limits.velocity[joint]:.4g} {self._robot.unit_of(joints[joint])}/s"
             )
         limit = np.where([joint in locked for joint in joints], np.inf, limits.effort * config.robot.effort_scale)
         # The model without locked joints is faster and decides most trials. A trial near a limit is computed again

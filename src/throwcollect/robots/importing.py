@@ -237,7 +237,7 @@ class _Import:
 
     @staticmethod
     def _can_move(joint: BodyJoint) -> bool:
-        return joint.kind in ("revolute", "continuous") and not joint.mimics
+        return joint.kind in ("revolute", "continuous", "prismatic") and not joint.mimics
 
     def clean(self) -> BodyModel:
         """Make the model of the joints that controllers command; all others are fixed."""
@@ -267,7 +267,8 @@ class _Import:
         for name, value in (("max_velocity", velocity), ("max_effort", effort)):
             if value <= 0:
                 raise _make_error(key, f"the URDF has no {name} above 0: give one")
-        return replace(joint, kind="revolute", limits=(lower, upper, velocity, effort))
+        kind = "prismatic" if joint.kind == "prismatic" else "revolute"
+        return replace(joint, kind=kind, limits=(lower, upper, velocity, effort))
 
     def _fix(self, joint: BodyJoint) -> BodyJoint:
         bare = replace(joint, kind="fixed", limits=None, damping=0.0, friction=0.0, mimics="", axis=(1.0, 0.0, 0.0))

@@ -19,7 +19,7 @@ from throwcollect.robots.urdf import PACKAGE, Urdf, locate_mesh, read_urdf, read
 # Robots are keys of caches. With `eq`, a robot would be hashed by its fields, but mappings among them have no hash.
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot with a fixed base whose joints are all revolute, and the hand that holds the tool.
+    """A robot with a fixed base whose joints are revolute or prismatic, and the hand that holds the tool.
 
     Attributes:
         name: Name of the robot in configurations, such as ``talos``.
@@ -90,6 +90,15 @@ class Robot:
             if joint in joints:
                 return controller
         raise KeyError(joint)
+
+    @cached_property
+    def sliding(self) -> frozenset[str]:
+        """The joints that are prismatic: their positions are in metres, and their efforts in newtons."""
+        return frozenset(name for name in self.joints if self.description.joints[name].kind == "prismatic")
+
+    def unit_of(self, joint: str) -> str:
+        """Return the unit of the positions of a joint: ``rad`` or ``m``."""
+        return "m" if joint in self.sliding else "rad"
 
     def holds(self, link: str) -> bool:
         """Say whether a link holds the tool."""
@@ -177,9 +186,9 @@ class Robot:
                 f"{path}: joints that move, but have no controller of {self.title}: {', '.join(more)}",
                 hint='make them type="fixed" in a copy of the URDF, or add them to a controller if they are revolute',
             )
-        if others := [name for name in self.joints if kinds[name] != "revolute"]:
+        if others := [name for name in self.joints if kinds[name] not in ("revolute", "prismatic")]:
             raise ConfigError(
-                f"{path}: joints of controllers should be revolute; "
+                f"{path}: joints of controllers should be revolute or prismatic; "
                 + ", ".join(name + (" " if urdf.joints[name].mimics else " is ") + kinds[name] for name in others),
                 hint='a continuous joint becomes type="revolute" with a <limit> that has lower and upper',
             )

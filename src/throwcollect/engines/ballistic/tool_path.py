@@ -24,21 +24,23 @@ class _Joint:
     Attributes:
         turn: Orientation of its frame in the frame of the link before, shape ``(3, 3)``.
         place: Origin of its frame there [m], shape ``(3, 1)``.
-        axis: Unit vector that it turns about, in its frame.
+        axis: Unit vector that it turns about, or slides along, in its frame.
         column: Column of the commands that it follows; None if it is fixed.
+        slides: Whether it is prismatic.
     """
 
     turn: Array
     place: Array
     axis: Sequence[float]
     column: int | None
+    slides: bool
 
 
 class ToolPath:
     """The chain of joints from a robot's base to its tool.
 
     Raises:
-        ConfigError: If a joint of the chain neither turns about an axis nor is fixed.
+        ConfigError: If a joint of the chain neither turns about an axis, nor slides along it, nor is fixed.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -65,13 +67,16 @@ class ToolPath:
         for joint in self._chain:
             place = place + matmul(turn, joint.place)
             turn = matmul(turn, joint.turn)
-            if joint.column is not None:
+            if joint.column is not None and joint.slides:
+                way = positions[:, joint.column, np.newaxis, np.newaxis] * np.array(joint.axis).reshape(3, 1)
+                place = place + matmul(turn, way)
+            elif joint.column is not None:
                 turn = matmul(turn, _make_rotations(joint.axis, positions[:, joint.column]))
         return place, turn
 
 
 def _read_joint(joint: BodyJoint, moving: Sequence[str]) -> _Joint:
-    if joint.kind not in ("fixed", "revolute", "continuous"):
+    if joint.kind not in ("fixed", "revolute", "continuous", "prismatic"):
         raise ConfigError(
             f"joint {joint.name}: the engine ballistic knows no {joint.kind} joints between base and tool"
         )
@@ -84,7 +89,8 @@ def _read_joint(joint: BodyJoint, moving: Sequence[str]) -> _Joint:
     x, y, z = joint.axis
     length = math.hypot(x, y, z)
     column = moving.index(joint.name) if joint.moves else None
-    return _Joint(turn, np.array(place).reshape(3, 1), (x / length, y / length, z / length), column)
+    axis = x / length, y / length, z / length
+    return _Joint(turn, np.array(place).reshape(3, 1), axis, column, joint.kind == "prismatic")
 
 
 def _make_rotations(axis: Sequence[float], angles: Array) -> Array:
