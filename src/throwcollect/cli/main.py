@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from throwcollect.cli import cluster_commands, collect, image_commands, learning, node_commands, runs, serve, show
+from throwcollect.cli import cluster_commands, collect, learning, node_commands, runs, serve, show
 from throwcollect.cli.dataset import derive, info, replay, verify_command, writing
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
@@ -23,9 +23,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 dataset_app = typer.Typer(help="Look into datasets, and make others from them.", no_args_is_help=True)
-image_app = typer.Typer(help="Make the image that containers are made from.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
-app.add_typer(image_app, name="image")
 app.add_typer(ros_app, name="ros")
 
 
@@ -47,8 +45,6 @@ _add(
     panel="Nodes, as `up` starts them",
 )
 _add(collect.launch, collect.begin, hidden=True)
-image_app.command("build")(image_commands.build)
-image_app.command("sif")(image_commands.sif)
 dataset_app.command("info")(info.show_info)
 dataset_app.command("verify")(verify_command.verify_dataset)
 dataset_app.command("digest")(info.show_digest)

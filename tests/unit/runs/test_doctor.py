@@ -176,7 +176,7 @@ def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypa
     )
     with socketserver.ThreadingUnixStreamServer(str(path), Engine) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+        lacking = f"the image {default_tag()} is not there yet; make image, in a clone, builds it"
         assert check_docker() == ("note", f"Docker 27.1 answers at unix://{path}; {lacking}")
         monkeypatch.setattr(Engine, "images", (default_tag(),))
         assert check_docker() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
@@ -185,6 +185,6 @@ def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypa
         status, finding = check_docker()
         assert (status, finding.partition("; ")[2]) == (
             "note",
-            f"{outdated}; throwcollect image build makes it anew",
+            f"{outdated}; make image builds it anew",
         )
         server.shutdown()
