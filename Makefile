@@ -157,6 +157,7 @@ check-house: $(READY_DEV)
 	$(BIN)/python -m pytest -q tests/architecture
 
 # The image of this clone, labelled with its sources (docs/containers.md). BUILD has further options of the program that builds.
+BUILD :=
 VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' src/throwcollect/version.py)
 SIF := throwcollect.sif
 # gzip, which is the default, takes four times as long for the same size.
