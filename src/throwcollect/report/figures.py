@@ -12,11 +12,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from throwcollect.report.joint_peaks import JointPeaks
+from throwcollect.report.measured import JointPeaks, SweptKey, Throughput, choose_points
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.plotted_points import choose_points
-from throwcollect.report.swept_keys import SweptKey
-from throwcollect.report.throughput import Throughput
 
 BLUE = style_of(LANDED).colour
 NEUTRAL = "#8a8f98"

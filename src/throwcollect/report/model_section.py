@@ -16,7 +16,7 @@ from throwcollect.learning.model_directory import read_score
 from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, Score, ThrowAtTarget, format_length
 from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
-from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
+from throwcollect.report.targets import choose_scale, draw_miss_map, title_column, title_misses
 from throwcollect.units import choose_shown_unit
 from throwcollect.wording import command, format_count
 

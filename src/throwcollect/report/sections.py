@@ -17,14 +17,30 @@ from throwcollect.dataset.summary import Info
 from throwcollect.files import read_text
 from throwcollect.members import explain_failure, load_part
 from throwcollect.report import figures
-from throwcollect.report.amounts import format_duration, format_share, format_size
-from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, TaskReport, Tile
-from throwcollect.report.joint_peaks import KINDS, JointPeaks, summarise_peaks
+from throwcollect.report.contents import (
+    Listing,
+    Panel,
+    ReportSection,
+    Row,
+    Table,
+    TaskReport,
+    Tile,
+    format_duration,
+    format_share,
+    format_size,
+)
+from throwcollect.report.measured import (
+    KINDS,
+    JointPeaks,
+    SweptKey,
+    Throughput,
+    measure_throughput,
+    read_parameters,
+    summarise_peaks,
+)
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.swept_keys import SweptKey, read_parameters
-from throwcollect.report.targets_section import show_targets
-from throwcollect.report.throughput import Throughput, measure_throughput
+from throwcollect.report.targets import show_targets
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest
 from throwcollect.tasks.task import task_of

@@ -15,7 +15,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import new_directory, write_file
-from throwcollect.report.amounts import format_share
+from throwcollect.report.contents import format_share
 from throwcollect.report.outcomes import in_words
 from throwcollect.report.sections import Report
 from throwcollect.version import __version__

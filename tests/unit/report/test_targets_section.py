@@ -12,10 +12,9 @@ from tests.unit.dataset.targeted import collect_targeted
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.report.miss_map import choose_scale
 from throwcollect.report.painter import write_pictures
 from throwcollect.report.sections import report_dataset
-from throwcollect.report.targets_section import show_targets
+from throwcollect.report.targets import choose_scale, show_targets
 
 
 def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:

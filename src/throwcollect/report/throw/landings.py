@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.config.values import column_of
+from throwcollect.report.measured import read_numbers
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.plotted_points import read_numbers
 
 _BINS = 14
 _TITLES = {

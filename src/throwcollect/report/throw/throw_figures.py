@@ -19,8 +19,8 @@ from throwcollect.report.figures import (
     place_bars,
     single_precision,
 )
+from throwcollect.report.measured import choose_points
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.plotted_points import choose_points
 from throwcollect.report.throw.episodes import Residuals
 from throwcollect.report.throw.landings import CellAxis, Landings
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M

@@ -10,10 +10,9 @@ from markupsafe import Markup
 from throwcollect.config.sweep import LANDING_HEIGHT
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
-from throwcollect.report.amounts import format_share
-from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile
+from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile, format_share
+from throwcollect.report.measured import MOST_POINTS
 from throwcollect.report.outcomes import LANDED, Outcomes
-from throwcollect.report.plotted_points import MOST_POINTS
 from throwcollect.report.throw import throw_figures
 from throwcollect.report.throw.episodes import Residuals, choose_examples, measure_residuals
 from throwcollect.report.throw.landings import Coverage, Landings, count_throws, read_landings
