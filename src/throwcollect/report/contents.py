@@ -1,8 +1,8 @@
-"""The parts of a report before they become a page or pictures, and amounts as people write them."""
+"""The parts of a report before they become a page, and amounts as people write them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import plotly.graph_objects as go
@@ -17,21 +17,16 @@ class Panel:
         title: Short title, as text.
         figure: The figure, with its height.
         text: Caption, as text.
-        picture: Name of the picture for papers; panels with the same name stand below one another in one picture. Empty
-            for none.
         width_px: Width below which it scrolls [px]; with 0, it shrinks with the page instead.
         small: True if a third of the width of the page is enough.
-        on_page: False if the page shows the same in another way, so that the panel is only a picture.
     """
 
     key: str
     title: str
     figure: go.Figure
     text: str = ""
-    picture: str = ""
     width_px: int = 0
     small: bool = False
-    on_page: bool = True
 
 
 @dataclass(frozen=True)
@@ -78,11 +73,6 @@ class ReportSection:
     title: str
     text: str
     blocks: tuple[Row | Table | Listing | str, ...] = ()
-
-    @property
-    def panels(self) -> Iterator[Panel]:
-        """All its panels, in order."""
-        return (panel for block in self.blocks if isinstance(block, tuple) for panel in block)
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     seeds = format_count(score.seeds, "seed")
     text += f" Misses are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
-        _show_misses("targets", "Targets", model, score.throws, dataset.config.task, picture="targets"),
+        _show_misses("targets", "Targets", model, score.throws, dataset.config.task),
         *_show_errors(
             "training",
             "Misses by number of throws learned from",
@@ -72,9 +72,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     return ReportSection("model", "Model", _TITLE, text, tuple(rows))
 
 
-def _show_misses(
-    key: str, shown: str, model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig, *, picture: str = ""
-) -> Panel:
+def _show_misses(key: str, shown: str, model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig) -> Panel:
     """Show targets amid the places that the dataset reached, and a line for each miss."""
     shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
     targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
@@ -82,7 +80,7 @@ def _show_misses(
     titles = [title_column(column, task) for column in model.targets]
     times = choose_scale(targets, places)
     figure = draw_miss_map(model.learned.outputs, targets, places, titles, task, times=times)
-    return Panel(key, title_misses(shown, times), figure, picture=picture)
+    return Panel(key, title_misses(shown, times), figure)
 
 
 def _show_errors(
@@ -92,7 +90,7 @@ def _show_errors(
     throws = [count for count, _ in errors]
     for number, misses in enumerate(zip(*(each.by_unit for _, each in errors), strict=True)):
         figure = _draw_errors(throws, misses).update_xaxes(x).update_yaxes(y)
-        yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure, picture=key)
+        yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure)
 
 
 def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go.Figure:

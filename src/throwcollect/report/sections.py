@@ -179,7 +179,6 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
         title="Values of all trials" if len(shown) == 1 else "Each pair of keys, and on the diagonal each key alone",
         figure=figures.draw_parameter_matrix(shown, outcomes),
         text=" ".join(notes),
-        picture="parameters",
         width_px=90 + 105 * len(shown),
     )
     table = Table(
@@ -198,9 +197,7 @@ def _show_outcomes(
     outcomes: Outcomes, parameters: tuple[SweptKey, ...], failures: tuple[FailureGroup, ...], noun: str
 ) -> ReportSection:
     title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
-    # The page shows the same numbers in a bar at its head.
-    bars = Panel("all", title, figures.draw_outcome_bars(outcomes), picture="outcomes", on_page=False)
-    blocks: list[Row | Table] = [(bars,)]
+    blocks: list[Row | Table] = []
     failed = trials - outcomes.succeeded
     text = f"All {trials:,} {noun}s {in_words(outcomes.success)}."
     if failed:
@@ -237,7 +234,6 @@ def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> ReportS
             key=kind,
             title=f"{kind.capitalize()} over its limit",
             figure=figures.draw_limit_boxes(joints),
-            picture="limits",
             small=True,
         )
         for kind, joints in peaks.items()

@@ -117,7 +117,7 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
     panels = [
         _show_map(dataset, targets),
         *(
-            Panel(name, f"Share of misses below a distance: {name}", _draw_share(dataset, name), picture=name)
+            Panel(name, f"Share of misses below a distance: {name}", _draw_share(dataset, name))
             for name, each in misses.items()
             if each.measured
         ),
@@ -138,7 +138,7 @@ def _show_map(dataset: Dataset, targets: Targets) -> Panel:
     titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
     times = choose_scale(goals[aimed], places[aimed])
     figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, dataset.config.task, times=times)
-    return Panel("map", title_misses("Targets", times), figure, picture="targets_and_misses")
+    return Panel("map", title_misses("Targets", times), figure)
 
 
 def _draw_share(dataset: Dataset, miss: str) -> go.Figure:

@@ -1,4 +1,4 @@
-"""Figures of throws, in plotly; `painter` draws the same ones with matplotlib for print."""
+"""Figures of throws."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def _show_landings(
     others = len(landings) - len(planned)
     text += f". {format_count(others, 'further ball')} crossed the landing plane, too." if others else "."
     figure = throw_figures.draw_landing_map(landings, outcomes)
-    above = Panel("map", "Landings from above", figure, _say_how_many(landings), picture="landing_map")
+    above = Panel("map", "Landings from above", figure, _say_how_many(landings))
     return ReportSection("landing", "Landings", title, text, ((above, *_show_targets(coverage)),))
 
 
@@ -92,14 +92,13 @@ def _show_targets(coverage: Coverage | None) -> Iterator[Panel]:
         text += f"; {coverage.throws - int(coverage.counts.sum()):,} landed in no cell"
     if len(coverage.axes) == 1:
         figure = throw_figures.draw_coverage_bars(coverage.axes[0], coverage.counts)
-        yield Panel("cells", "Throws by target", figure, f"{text}.", picture="target_coverage")
+        yield Panel("cells", "Throws by target", figure, f"{text}.")
     for number, (first, second, counts) in enumerate(coverage.pairs):
         yield Panel(
             key=f"cells-{number}",
             title=f"{'Targets:' if coverage.configured else 'Throws by'} {first.name} and {second.name}",
             figure=throw_figures.draw_coverage_map(first, second, counts),
             text="" if number else f"{text}.",
-            picture="" if number else "target_coverage",
         )
 
 
@@ -113,7 +112,7 @@ def _show_releases(landings: Landings, outcomes: Outcomes) -> ReportSection:
         f"the median direction {abs(elevation_deg):.1f}° {'below' if elevation_deg < 0 else 'above'} the horizontal."
     )
     figure = throw_figures.draw_release_map(landings, outcomes)
-    panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings), picture="release")
+    panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings))
     return ReportSection("release", "Release", title, text, ((panel,),))
 
 
@@ -131,7 +130,7 @@ def _show_examples(dataset: Dataset, throws: Sequence[Throw], *, height_m: float
         text = f"{landed} throws that landed, from the nearest to the farthest. {text}"
     side, above = throw_figures.draw_ball_views(throws, height_m)
     views = (
-        Panel("side", "The ball from the side", side, picture="ball_paths"),
+        Panel("side", "The ball from the side", side),
         Panel("above", "The ball from above", above),
     )
     middle = _choose_middle(throws)
@@ -146,7 +145,6 @@ def _show_examples(dataset: Dataset, throws: Sequence[Throw], *, height_m: float
             title=name,
             figure=throw_figures.draw_joint(middle.joints[name], goal, release),
             text=f"Largest tracking error: {errors[name]:.2g}°.",
-            picture="joint_tracking",
             small=True,
         )
         for name, goal in commanded.items()
@@ -177,5 +175,5 @@ def _show_physics(residuals: Residuals) -> ReportSection:
     else:
         text += f"None departs by more than the tolerance of {BALLISTIC_TOLERANCE_M:g} m (dashed)."
     heading = "Largest distance of each flight from ballistic motion"
-    panel = Panel("residuals", heading, throw_figures.draw_residuals(residuals), picture="ballistic_residuals")
+    panel = Panel("residuals", heading, throw_figures.draw_residuals(residuals))
     return ReportSection("physics", "Physics", title, text, ((panel,),))
