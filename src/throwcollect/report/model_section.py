@@ -11,8 +11,7 @@ import plotly.graph_objects as go
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
-from throwcollect.learning.model import Model, load_model
-from throwcollect.learning.model_directory import read_score
+from throwcollect.learning.model import Model, load_model, read_score
 from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, Score, ThrowAtTarget, format_length
 from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
@@ -28,7 +27,7 @@ _NOUNS = {"m": "distance", "rad": "angle"}
 def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     """Show how a model of a dataset hits targets, from the directory of the model."""
     model, score = load_model(directory), read_score(directory)
-    trained = model.file.trained_on
+    trained = model.trained_on
     if trained.digest != dataset.digest:
         raise ConfigError(
             f"{directory}: was learned from {trained.name}, digest {trained.digest[:10]}",
@@ -110,5 +109,4 @@ def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go
 
 
 def _tabulate(score: Score) -> Table:
-    rows = tuple(row.cells for row in score.list_rows())
-    return Table(head=("", *SCORE_HEAD), rows=rows, number_columns=(1, 2, 3, 4, 5))
+    return Table(head=("", *SCORE_HEAD), rows=tuple(score.list_rows()), number_columns=(1, 2, 3, 4, 5))
