@@ -8,7 +8,7 @@ import pytest
 from throwcollect.report.contents import format_duration, format_share, format_size
 from throwcollect.report.outcomes import Outcomes, style_of
 from throwcollect.report.sections import FailureGroup, group_failures
-from throwcollect.report.throw.episodes import Residuals
+from throwcollect.report.throw.measured import Residuals
 from throwcollect.report.throw.throw_sections import _show_physics
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome

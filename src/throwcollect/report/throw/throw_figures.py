@@ -21,8 +21,7 @@ from throwcollect.report.figures import (
 )
 from throwcollect.report.measured import choose_points
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.throw.episodes import Residuals
-from throwcollect.report.throw.landings import CellAxis, Landings
+from throwcollect.report.throw.measured import CellAxis, Landings, Residuals
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 _SCALE = "Viridis"

@@ -14,8 +14,15 @@ from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile,
 from throwcollect.report.measured import MOST_POINTS
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw import throw_figures
-from throwcollect.report.throw.episodes import Residuals, choose_examples, measure_residuals
-from throwcollect.report.throw.landings import Coverage, Landings, count_throws, read_landings
+from throwcollect.report.throw.measured import (
+    Coverage,
+    Landings,
+    Residuals,
+    choose_examples,
+    count_throws,
+    measure_residuals,
+    read_landings,
+)
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import trajectory_of
