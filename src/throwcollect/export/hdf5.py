@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.signals import Signal
-from throwcollect.export.throw_source import ExportSource, ThrowSeries, read_metadata
+from throwcollect.export.throw_source import ExportSource, Signal, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
 from throwcollect.interruption import hold_stop_signals

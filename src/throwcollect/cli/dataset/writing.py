@@ -48,25 +48,19 @@ def report_dataset(
             "--output", "-o", metavar="FILE", help="HTML file to write; DIR.html beside the dataset if not given."
         ),
     ] = None,
-    png: Annotated[
-        Path | None,
-        typer.Option("--png", metavar="DIR", help="Also write the main plots as pictures; must be new or empty."),
-    ] = None,
     model: Annotated[
         Path | None, typer.Option("--model", metavar="MODEL", help="Also show a model of the dataset, and how it hits.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a page that shows what a dataset holds, and pictures for papers."""
-    from throwcollect.report.write import write_report
+    """Write a page that shows what a dataset holds."""
+    from throwcollect.report.page import write_report
 
     resolved = directory.resolve()
     page = output or resolved.with_name(f"{resolved.name}.html")
-    written = write_report(directory, page, pictures=png, model=model)
-    size = written.page.stat().st_size
-    pictures = [str(path) for path in written.pictures]
-    document = {"page": str(written.page), "size_bytes": size, "pictures": pictures}
-    print_result(document, "\n".join([f"{written.page}: {size / 1e6:.1f} MB", *pictures]), json=json)
+    write_report(directory, page, model=model)
+    size = page.stat().st_size
+    print_result({"page": str(page), "size_bytes": size}, f"{page}: {size / 1e6:.1f} MB", json=json)
 
 
 def view_dataset(

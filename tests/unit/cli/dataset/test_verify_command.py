@@ -11,7 +11,7 @@ from tests.unit.dataset.conftest import Collection
 from throwcollect.cli.dataset.verify_command import verify_dataset
 from throwcollect.errors import DatasetError
 from throwcollect.extras import MissingExtraError
-from throwcollect.replay.comparison import Comparison
+from throwcollect.replay.audit import Comparison
 
 
 @pytest.fixture
