@@ -139,13 +139,11 @@ def _check_port() -> Check:
 def _check_rclpy() -> Check:
     lacking = ros_installation.missing()
     if "rclpy" in lacking:
-        return Check("rclpy", "note", f"not installed; to have it: {ros_installation.how_to_install()}")
+        return Check("rclpy", "note", f"not installed; to have it: {ros_installation.HOW_TO_INSTALL}")
     rmws = join_names(ros_installation.rmws()) or "no RMW"
     found = f"{ros_installation.rclpy_version() or 'of unknown version'} with {rmws}"
     if lacking:
-        return Check(
-            "rclpy", "note", f"{found}, without {join_names(lacking)}; try: {ros_installation.how_to_install()}"
-        )
+        return Check("rclpy", "note", f"{found}, without {join_names(lacking)}; try: {ros_installation.HOW_TO_INSTALL}")
     return Check("rclpy", "ok", f"{found} and all interfaces")
 
 

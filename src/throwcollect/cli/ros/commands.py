@@ -8,6 +8,7 @@ import typer
 
 from throwcollect.cli.options import RunOption
 from throwcollect.cli.ros.goals import action_app
+from throwcollect.cli.ros.graph_session import find_run_and_connection
 from throwcollect.cli.ros.parameters import param_app
 from throwcollect.cli.ros.topics import topic_app
 from throwcollect.files import write_secret
@@ -23,12 +24,10 @@ _PROFILE = "fast_dds.xml"
 @ros_app.command("env")
 def env(run: RunOption = None) -> None:
     """Print the line that lets a shell's ROS 2 nodes join a run: eval "$(throwcollect ros env)"."""
-    from throwcollect.cli.ros.joined_run import find_run_and_connection, require_rmw_of_shell
     from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile
     from throwcollect.ros.middleware import RMW_VARIABLE
 
     found, connection = find_run_and_connection(run)
-    require_rmw_of_shell(found)
     middleware = found.record.middleware
     # The variables name files and hold no secret, because others may read the environment of a process.
     variables = {**connection.environment(), RMW_VARIABLE: middleware.rmw}

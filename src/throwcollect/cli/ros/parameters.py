@@ -16,8 +16,6 @@ param_app = typer.Typer(help="Parameters: get, set.", no_args_is_help=True)
 NodeArgument = Annotated[str, typer.Argument(metavar="NODE", help="Name of the node, with its namespace.")]
 ParameterArgument = Annotated[str, typer.Argument(metavar="NAME", help="Name of the parameter.")]
 
-_WHOLE = range(-(2**63), 2**63)
-"""Whole numbers that a parameter can hold."""
 _SERVICE_S = 5.0
 """Longest wait for the parameter services of a node."""
 _FIELDS = {
@@ -75,17 +73,15 @@ def _make_parameter(name: str, text: str) -> Any:
 
     try:
         value = parse(text, "VALUE")
-        parameter = ros.Parameter(name, value=text if value is None else value)
+        return ros.Parameter(name, value=text if value is None else value).to_parameter_msg()
     except (TypeError, ConfigError):
         return ros.Parameter(name, value=text).to_parameter_msg()
-    if any(isinstance(each, int) and each not in _WHOLE for each in (value if isinstance(value, list) else [value])):
-        raise ConfigError(f"VALUE: should be int64, got {text:.80}")
-    return parameter.to_parameter_msg()
 
 
 def _find_node(session: GraphSession, name: str) -> str:
     owner = absolute_name(name)
-    require_name("node", owner, session.node_names())
+    nodes = session.node.get_node_names_and_namespaces()
+    require_name("node", owner, [f"{namespace.removesuffix('/')}/{each}" for each, namespace in nodes])
     return owner
 
 
