@@ -62,9 +62,6 @@ def _name_options(error: ConfigError) -> ConfigError:
 
 def _describe(error: Exception) -> tuple[str, int]:
     """Find the message and the exit code of an error."""
-    if isinstance(error.__cause__, KeyboardInterrupt):
-        # Python wraps what is raised while it makes a class, such as during an import.
-        error = Interrupted("interrupted")
     if isinstance(error, ConfigError):
         error = _name_options(error)
     if isinstance(error, ThrowcollectError):
