@@ -6,17 +6,11 @@ This module is not a part of `ros`, because importing `ros` already needs the an
 from __future__ import annotations
 
 import os
-import re
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
-import rclzenoh
-
-# The path is not taken from `rclzenoh.interfaces`, because importing that would take health checks too long.
-DEFINITIONS = Path(rclzenoh.__file__).parent / "interfaces" / "definitions"
-"""Definitions of interfaces, by package and kind."""
 PACKAGES = (
     "action_msgs",
     "builtin_interfaces",
@@ -43,20 +37,8 @@ HOW_TO_INSTALL = (
 
 
 def missing() -> list[str]:
-    """List the parts of genuine ROS 2 that nodes need and Python lacks: rclpy, or else packages and interfaces."""
-    if _find_directory("rclpy") is None:
-        return ["rclpy"]
-    lacking = []
-    for package in PACKAGES:
-        directory = _find_directory(package)
-        if directory is None:
-            lacking.append(package)
-            continue
-        for path in sorted((DEFINITIONS / package).glob("*/*")):
-            kind = path.parent.name
-            if not (directory / kind / f"_{module_name(path.stem)}.py").is_file():
-                lacking.append(f"{package}/{kind}/{path.stem}")
-    return lacking
+    """List the parts of genuine ROS 2 that nodes need and Python lacks: rclpy, or else packages of interfaces."""
+    return [package for package in PACKAGES if not _is_there(package)] if _is_there("rclpy") else ["rclpy"]
 
 
 def rmws() -> list[str]:
@@ -79,14 +61,7 @@ def rclpy_version() -> str | None:
     return None
 
 
-def module_name(interface: str) -> str:
-    """Name the module of an interface, without its leading underscore: ``SpawnEntity`` is in ``spawn_entity``."""
-    # These are the two substitutions of rosidl_pycommon, by which ROS' own generators name the modules.
-    words = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", interface)
-    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
-
-
-def _find_directory(package: str) -> Path | None:
+def _is_there(package: str) -> bool:
     spec = find_spec(package)
     # A directory of that name in the working directory, without a module in it, is no package of ROS.
-    return Path(spec.origin).parent if spec is not None and spec.origin else None
+    return spec is not None and spec.origin is not None

@@ -36,7 +36,6 @@ def test_doctor_finds_no_problem_on_a_machine_that_runs_the_tests(tmp_path: Path
         "embedded",
         "docker",
         "state",
-        "ports",
         "disk",
     ]
     assert [check for check in checks.values() if check.status == "problem"] == []

@@ -14,7 +14,7 @@ from throwcollect import ros
 from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_graph, require_name
 from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError
-from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, full_name, is_hidden
+from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, is_hidden
 from throwcollect.wording import suggest
 
 topic_app = typer.Typer(help="Topics: list, echo, hz.", no_args_is_help=True)
@@ -44,10 +44,6 @@ def list_topics(
 @topic_app.command("echo")
 def echo(
     topic: TopicArgument,
-    kind: Annotated[
-        str | None,
-        typer.Argument(metavar="TYPE", help="Type, such as std_msgs/msg/String; needed if nobody publishes."),
-    ] = None,
     once: Annotated[bool, typer.Option("--once", help="End after the first message.")] = False,
     field: Annotated[
         str | None, typer.Option("--field", metavar="FIELD", help="Print this field alone, such as pose.pose.position.")
@@ -62,7 +58,7 @@ def echo(
     from throwcollect.ros.message_values import plain
 
     with join_graph(run) as session:
-        name, message_type = _find_message_type(session, topic, kind)
+        name, message_type = _find_message_type(session, topic)
         path = field.split(".") if field else []
         _check_field(message_type, path)
         printed = False
@@ -93,7 +89,7 @@ def show_rate(
 ) -> None:
     """Print how often messages arrive."""
     with join_graph(run) as session:
-        name, message_type = _find_message_type(session, topic, None)
+        name, message_type = _find_message_type(session, topic)
         # A gap lies between two arrivals, so one arrival more is kept.
         arrivals: deque[int] = deque(maxlen=window + 1)
         # A subscription that asks for less than the publisher offers is served; the other way round, nothing arrives.
@@ -120,19 +116,11 @@ def _describe_rate(arrivals: deque[int]) -> str:
     )
 
 
-def _find_message_type(session: GraphSession, topic: str, kind: str | None) -> tuple[str, Any]:
+def _find_message_type(session: GraphSession, topic: str) -> tuple[str, Any]:
     """Find the absolute name of a topic and the class of its messages."""
     name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
-    kinds = topics.get(name, [])
-    if kind is None:
-        require_name("topic", name, (each for each in topics if not is_hidden(each) or each == name))
-        if len(kinds) > 1:
-            raise ConfigError(f"{name} has {len(kinds)} types", expected=f"one of {', '.join(kinds)}")
-        (kind,) = kinds
-    message_type = find_interface("msg", kind)
-    if kinds and (full := full_name("msg", kind)) not in kinds:
-        raise ConfigError(f"{name} is no {full}", expected=", ".join(kinds))
-    return name, message_type
+    require_name("topic", name, (each for each in topics if not is_hidden(each) or each == name))
+    return name, find_interface("msg", topics[name][0])
 
 
 def _check_field(message_type: Any, path: list[str]) -> None:
