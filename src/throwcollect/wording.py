@@ -7,7 +7,6 @@ import shlex
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
-_LONGEST_LINE = 1000
 _MOST_NAMES = 6
 _MOST_NEAR = 3
 _SHORTEST_PART = 3
@@ -73,14 +72,10 @@ def command(*words: object) -> str:
 
 
 def printable(text: str) -> str:
-    """Make a message safe for a terminal: shorten long lines, and escape control characters."""
+    """Make a message safe for a terminal: escape control characters."""
     return "\n".join(_printable_line(line) for line in text.split("\n"))
 
 
 def _printable_line(line: str) -> str:
-    if len(line) > _LONGEST_LINE:
-        line = f"{line[: _LONGEST_LINE // 2]} [...] {line[-_LONGEST_LINE // 2 :]}"
-    if line.isprintable():
-        return line
     # `ascii` writes the escape between two quotes.
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in line)

@@ -19,15 +19,9 @@ def print_progress(wanted: bool = True) -> None:
 
     from throwcollect.progress_log import LOGGER
 
-    class Printer(logging.Handler):
-        """Prints records."""
-
-        def emit(self, record: logging.LogRecord) -> None:
-            tell(record.getMessage())
-
     logger = logging.getLogger(LOGGER)
     logger.setLevel(logging.INFO)
-    logger.handlers = [Printer()] if wanted else []
+    logger.handlers = [logging.StreamHandler()] if wanted else []
 
 
 def print_json(document: object, *, default: Callable[[Any], object] | None = None) -> None:

@@ -55,7 +55,7 @@ def ps(
         documents = [_make_document(run) for run in shown]
         for runtime, found in unrecorded:
             documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
-        documents += cluster_runs.list_queued(cluster_runs.make_document)
+        documents += [cluster_runs.make_document(*each) for each in cluster_runs.list_queued()]
         if server is not None:
             documents.append(
                 {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
@@ -65,7 +65,7 @@ def ps(
         return
     rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
-    rows += [(row, []) for row in cluster_runs.list_queued(cluster_runs.make_row)]
+    rows += [(cluster_runs.make_row(*each), []) for each in cluster_runs.list_queued()]
     if server is not None:
         rows.append(((SERVER, "-", "-", "-", f"running at {server.url}, pid {server.pid}", "-"), []))
     for line in _make_table(rows):

@@ -6,6 +6,7 @@ import statistics
 import time
 from collections import deque
 from itertools import pairwise
+from operator import attrgetter
 from typing import Annotated, Any
 
 import typer
@@ -15,7 +16,6 @@ from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_gra
 from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, is_hidden
-from throwcollect.wording import suggest
 
 topic_app = typer.Typer(help="Topics: list, echo, hz.", no_args_is_help=True)
 
@@ -24,6 +24,8 @@ TopicArgument = Annotated[str, typer.Argument(metavar="TOPIC", help="Name of the
 _DEPTH = 100
 """Messages that wait for `hz` to count them."""
 _REPORT_NS = 10**9
+_WINDOW = 10_000
+"""Number of messages that are averaged."""
 
 
 @topic_app.command("list")
@@ -59,8 +61,6 @@ def echo(
 
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic)
-        path = field.split(".") if field else []
-        _check_field(message_type, path)
         printed = False
 
         def show(message: Any) -> None:
@@ -69,9 +69,10 @@ def echo(
             if once and printed:
                 return
             printed = True
-            for part in path:
-                message = getattr(message, part)
-            value = plain(message)
+            try:
+                value = plain(attrgetter(field)(message) if field else message)
+            except AttributeError as error:
+                raise ConfigError(f"--field {field}: {error}") from error
             print(yaml_text(value if full else shorten(value)), end="---\n", flush=True)
 
         qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
@@ -80,18 +81,11 @@ def echo(
 
 
 @topic_app.command("hz")
-def show_rate(
-    topic: TopicArgument,
-    window: Annotated[
-        int, typer.Option("-w", "--window", min=2, metavar="N", help="Number of messages that are averaged.")
-    ] = 10_000,
-    run: RunOption = None,
-) -> None:
-    """Print how often messages arrive."""
+def show_rate(topic: TopicArgument, run: RunOption = None) -> None:
+    """Print how often messages arrive, on average over the last 10,000."""
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic)
-        # A gap lies between two arrivals, so one arrival more is kept.
-        arrivals: deque[int] = deque(maxlen=window + 1)
+        arrivals: deque[int] = deque(maxlen=_WINDOW)
         # A subscription that asks for less than the publisher offers is served; the other way round, nothing arrives.
         qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(
@@ -121,12 +115,3 @@ def _find_message_type(session: GraphSession, topic: str) -> tuple[str, Any]:
     name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
     require_name("topic", name, (each for each in topics if not is_hidden(each) or each == name))
     return name, find_interface("msg", topics[name][0])
-
-
-def _check_field(message_type: Any, path: list[str]) -> None:
-    value = message_type()
-    for part in path:
-        fields = value.get_fields_and_field_types() if hasattr(value, "get_fields_and_field_types") else {}
-        if part not in fields:
-            raise ConfigError(f"--field {'.'.join(path)}: no field {part!r}{suggest(part, fields)}")
-        value = getattr(value, part)

