@@ -25,7 +25,7 @@ def test_join_names_counts_the_names_after_the_fifth(names: str, said: str) -> N
         ("landing_x", "'landing_x_m'"),
         ("landing", "'landing_x_m', 'landing_y_m' or 'landing_vx_mps'"),
         ("Duration_S", "'task.duration_s'"),
-        ("lnading_y_m", "'landing_y_m'"),
+        ("lnading_y_m", "'landing_y_m', 'landing_x_m' or 'landing_vy_mps'"),
     ],
 )
 def test_a_wrong_name_is_answered_by_those_that_contain_it_or_else_by_similar_ones(name: str, near: str) -> None:
@@ -56,6 +56,5 @@ def test_no_module_writes_a_recommended_command_by_hand() -> None:
     assert not found
 
 
-def test_a_printed_message_is_escaped_for_terminals_and_shortened() -> None:
+def test_a_printed_message_is_escaped_for_terminals() -> None:
     assert printable("no run 'a\x1b[2J\udcff'\n  try: x") == "no run 'a\\x1b[2J\\udcff'\n  try: x"
-    assert printable("a" + 5000 * "b" + "c") == "a" + 499 * "b" + " [...] " + 499 * "b" + "c"
