@@ -108,11 +108,6 @@ def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) ->
         os.close(folder)
 
 
-def is_there(path: Path) -> bool:
-    """Say whether a file, or a link that may lead nowhere, has this name."""
-    return os.path.lexists(path)
-
-
 def check_regular(path: Path) -> None:
     """Reject links, pipes and directories before another library opens a file; it reports all other errors."""
     try:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 
 _MOST_NAMES = 6
 _MOST_NEAR = 3
 _SHORTEST_PART = 3
 """A shorter text is in too many names to be a part of the one that is meant."""
+_AS_SIMILAR = 0.03
+"""A name is as similar as the most similar one if its ratio of common letters differs by less than this."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
 
 
@@ -37,7 +39,9 @@ def find_near(name: object, known: Iterable[str]) -> list[str]:
     word, names = name.casefold(), {each.casefold(): each for each in known}
     if len(word) >= _SHORTEST_PART and (longer := [each for each in names if word in each]):
         return [names[each] for each in sorted(longer, key=len)[:_MOST_NEAR]]
-    return [names[each] for each in get_close_matches(word, names, _MOST_NEAR)]
+    near = get_close_matches(word, names, _MOST_NEAR)
+    ratios = [SequenceMatcher(None, each, word).ratio() for each in near]
+    return [names[each] for each, ratio in zip(near, ratios, strict=True) if ratio > ratios[0] - _AS_SIMILAR]
 
 
 def did_you_mean(names: Sequence[str]) -> str:

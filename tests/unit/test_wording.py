@@ -25,7 +25,7 @@ def test_join_names_counts_the_names_after_the_fifth(names: str, said: str) -> N
         ("landing_x", "'landing_x_m'"),
         ("landing", "'landing_x_m', 'landing_y_m' or 'landing_vx_mps'"),
         ("Duration_S", "'task.duration_s'"),
-        ("lnading_y_m", "'landing_y_m', 'landing_x_m' or 'landing_vy_mps'"),
+        ("lnading_y_m", "'landing_y_m'"),
     ],
 )
 def test_a_wrong_name_is_answered_by_those_that_contain_it_or_else_by_similar_ones(name: str, near: str) -> None:

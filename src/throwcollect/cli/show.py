@@ -94,15 +94,14 @@ def plan(
             ]
         )
         return
-    names = (*found.keys, *found.trials.target_names)
-    listed = found.trials if output is None else ()
-    if listed:
+    if output is None:
+        names = (*found.keys, *found.trials.target_names)
         typer.echo("  ".join(["trial", *names]))
-    for trial in listed:
-        values = {**trial.values, **trial.target}
-        numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
-        note = f"  refused: {trial.refused}" if trial.refused else ""
-        typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
+        for trial in found.trials:
+            values = {**trial.values, **trial.target}
+            numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
+            note = f"  refused: {trial.refused}" if trial.refused else ""
+            typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     tell(f"{count_trials(found)}; {len(found.trials.refused)} refused")
 
 
