@@ -20,7 +20,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: up ros dist test test-fast \
     test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client wait-for-image test-containers \
-    test-image test-processes test-cluster \
+    test-image test-processes test-cluster image sif sif-without-engine \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
@@ -155,6 +155,24 @@ check-imports: $(READY_DEV)
 
 check-house: $(READY_DEV)
 	$(BIN)/python -m pytest -q tests/architecture
+
+# The image of this clone, labelled with its sources (docs/containers.md). BUILD has further options of the program that builds.
+BUILD :=
+VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' src/throwcollect/version.py)
+SIF := throwcollect.sif
+# gzip, which is the default, takes four times as long for the same size.
+BUILD_SIF := apptainer build --force --mksquashfs-args '-comp zstd -Xcompression-level 3'
+
+image: | $(VENV)/bin/python
+	labels=$$($(BIN)/python docker/build_arguments.py) && \
+	    docker build -f docker/Dockerfile --target throwcollect -t throwcollect:$(VERSION) $$labels $(BUILD) .
+
+# The same for Apptainer: converted from the image of the engine, or built from the clone where there is no engine.
+sif:
+	$(BUILD_SIF) $(BUILD) '$(SIF)' docker-daemon:throwcollect:$(VERSION)
+
+sif-without-engine: | $(VENV)/bin/python
+	labels=$$($(BIN)/python docker/build_arguments.py) && $(BUILD_SIF) $$labels $(BUILD) '$(SIF)' docker/throwcollect.def
 
 # The documentation site, build/site/index.html; a broken link fails.
 docs: $(READY_DEV)

@@ -10,7 +10,6 @@ cd "$(dirname "$0")/.."
 . .ci/apt.sh
 python=${PYTHON:-.venv/bin/python}
 base=throwcollect-base:bookworm
-wheelhouse=build/wheelhouse
 state=${THROWCOLLECT_ENGINE_DIR:-/var/lib/throwcollect-engine}
 reason=build/engine-unavailable
 export DEBIAN_FRONTEND=noninteractive
@@ -69,6 +68,6 @@ fi
 why=$(install_missing docker-compose:docker-compose) || echo "no Compose 1.29 for the tests: $why"
 .ci/compose.sh || echo "no Compose v2 for the tests"
 [ -z "${AFTER:-}" ] || tail --pid="$AFTER" -f /dev/null
-"$python" docker/wheelhouse.py --ros "$wheelhouse"
-"$python" -m throwcollect image build --base "$base" --wheelhouse "$wheelhouse" 2> build/image.log \
+"$python" docker/wheelhouse.py --ros docker/wheelhouse
+make image BUILD="--build-arg BASE_IMAGE=$base" > build/image.log 2>&1 \
     || { tail -n 25 build/image.log; exit 1; }

@@ -60,7 +60,7 @@ def main() -> None:
             report[f"{engine}, n={simulations}"] = rounds
             _print_table(engine, simulations, rounds, loops=min(simulations, cores))
         if containers.image_mb() is None:
-            print("\nno containers: no engine answers, or it does not have the image (throwcollect image build)")
+            print("\nno containers: no engine answers, or it does not have the image (make image)")
         else:
             few = collection.draw_unchecked_plan(load(CONFIG, [f"trials={10 * containers.MANY}"]))
             report["containers"] = containers.measure(plan, few, arguments.rounds, Path(scratch))

@@ -46,7 +46,7 @@ else
 fi
 # Docker says why it cannot: no engine answers, or there is no such image.
 if ! docker image inspect "$THROWCOLLECT_IMAGE" >/dev/null 2>&1 && ! docker pull "$THROWCOLLECT_IMAGE" >&2; then
-    echo "$0: $THROWCOLLECT_IMAGE: cannot be had; \`throwcollect image build\` makes it" >&2
+    echo "$0: $THROWCOLLECT_IMAGE: cannot be had; \`make image\` builds the default one" >&2
     exit 2
 fi
 # Before anything is collected that could not be put there.

@@ -15,7 +15,7 @@ import throwcollect
 from throwcollect.ros.middleware import uses_rclpy
 
 EXTRAS = {
-    *("docker", "plotly", "jinja2", "markupsafe", "matplotlib", "h5py"),
+    *("docker", "plotly", "jinja2", "markupsafe", "h5py"),
     *("fastapi", "starlette", "uvicorn", "websockets", "orjson", "cbor2"),
 }
 modules = [module for root in (rclzenoh, throwcollect) for module in pkgutil.walk_packages(root.__path__, f"{root.__name__}.")]

@@ -43,7 +43,7 @@ def main(data: str, nominal: str, real: str) -> None:
             places.append(found)
             adapted = model.adapt(points, places, scatter=0.005)
             missed = 100 * miss(robot, adapted.aim([target])[0].parameters, target)
-            print(f"after {len(points)}: by {missed:.2f} cm ({adapted.file.adaptation.method.value})")
+            print(f"after {len(points)}: by {missed:.2f} cm ({adapted.adaptation.method.value})")
             if len(points) == 3:
                 break
 

@@ -57,7 +57,6 @@ DOORS = (
     "mcap",
     "docker",
     "plotly",
-    "matplotlib",
     "jinja2",
 )
 """Outside libraries whose rooms are shown."""

@@ -6,6 +6,7 @@ writes ``docs/pictures/throw.webp``, ``landing-map.webp`` and ``report.webp``.
 
 from __future__ import annotations
 
+import base64
 import subprocess
 import sys
 import tempfile
@@ -40,7 +41,9 @@ def write(picture: Path, name: str) -> None:
     """Write a picture as WebP, no wider than is shown."""
     with Image.open(picture) as image:
         height = round(image.height * WIDTH / image.width)
-        image.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS).save(
+        white = Image.new("RGBA", image.size, "white")
+        white.alpha_composite(image.convert("RGBA"))
+        white.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS).save(
             PICTURES / f"{name}.webp", quality=85
         )
 
@@ -52,13 +55,17 @@ def main(kept: Path) -> None:
 
     wide, quickstart = (collect(name, kept / name) for name in ("wide", "quickstart"))
     render(wide, PICTURES / "throw.webp", trial=far_throw(wide), slow=1.5)
-    page, plots = Path(tempfile.mkdtemp(dir=kept), "report.html"), Path(tempfile.mkdtemp(dir=kept))
+    page = Path(tempfile.mkdtemp(dir=kept), "report.html")
     command = [sys.executable, "-m", "throwcollect", "dataset", "report", str(quickstart)]
-    subprocess.run([*command, "--output", str(page), "--png", str(plots)], check=True)
-    write(plots / "landing_map.png", "landing-map")
+    subprocess.run([*command, "--output", str(page)], check=True)
     with browse(page.as_uri(), width=1200, height=900) as tab:
         tab.wait_for("document.querySelectorAll('.main-svg').length > 2")
         tab.picture(kept / "report.png")
+        shown = (
+            f"Plotly.toImage(document.getElementById('landing-map'), {{width: {WIDTH // 2}, height: 360, scale: 4}})"
+        )
+        (kept / "landing-map.png").write_bytes(base64.b64decode(tab.evaluate(shown).partition(",")[2]))
+    write(kept / "landing-map.png", "landing-map")
     write(kept / "report.png", "report")
 
 

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from throwcollect.export.export import export as export_dataset
     from throwcollect.extras import MissingExtraError
     from throwcollect.learning.aiming import Aim
-    from throwcollect.learning.model import Model, fit, load_model
+    from throwcollect.learning.fitting import fit
+    from throwcollect.learning.model import Model, load_model
     from throwcollect.learning.score import Score
     from throwcollect.replay.verification import verify_dataset
     from throwcollect.simulator import Simulator
@@ -88,7 +89,7 @@ _PLACES = {
     "compute_statistics": "derive.statistics:statistics",
     "export_dataset": "export.export:export",
     "filter_dataset": "derive.selection:filter_trials",
-    "fit": "learning.model:fit",
+    "fit": "learning.fitting:fit",
     "load": "dataset.reader:load",
     "load_config": "config.loader:load",
     "load_model": "learning.model:load_model",

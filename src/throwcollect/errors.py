@@ -29,9 +29,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-_MOST_PROBLEMS = 20
-"""Number of problems of a configuration that a message lists; the others are counted."""
-
 
 class ThrowcollectError(Exception):
     """Root of all errors raised on purpose.
@@ -110,10 +107,7 @@ class ConfigError(ThrowcollectError):
         self, problems: str | Sequence[Problem], *, expected: str | None = None, hint: str | None = None
     ) -> None:
         self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)
-        lines = list(map(str, self.problems[:_MOST_PROBLEMS]))
-        if unlisted := len(self.problems) - len(lines):
-            lines.append(f"and {unlisted} more")
-        super().__init__("\n".join(lines), expected=expected, hint=hint)
+        super().__init__("\n".join(map(str, self.problems)), expected=expected, hint=hint)
 
 
 class PlanError(ConfigError):

@@ -32,7 +32,6 @@ EXTRA_OF = MappingProxyType(
         "h5py": "export",
         "scipy": "export",
         "jinja2": "report",
-        "matplotlib": "report",
         "mujoco": "mujoco",
         "onnx": "onnx",
         "orjson": "serve",

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.own_directory import make_own_directory
 from throwcollect.wording import did_you_mean, find_near
 
 StrPath = str | os.PathLike[str]
@@ -60,13 +60,8 @@ def _find_reason(error: OSError) -> str:
 
 def suggest_path(path: Path) -> str:
     """Write the end of a message on a file or directory that does not exist: which ones in its place may be meant."""
-    try:
-        names = [] if is_there(path) else os.listdir(path.parent)
-    except OSError:
-        return ""
-    # A common ending alone does not make two names similar.
-    near = [each for each in find_near(path.name, names) if find_near(path.stem, [Path(each).stem])]
-    return did_you_mean([str(path.with_name(each)) for each in near])
+    names = os.listdir(path.parent) if path.parent.is_dir() and not path.exists() else []
+    return did_you_mean([str(path.with_name(each)) for each in find_near(path.name, names)])
 
 
 def refuse_pointers(directory: Path) -> None:
@@ -111,11 +106,6 @@ def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) ->
         return open_regular(Path(path.name), flags, folder=folder)
     finally:
         os.close(folder)
-
-
-def is_there(path: Path) -> bool:
-    """Say whether a file, or a link that may lead nowhere, has this name."""
-    return os.path.lexists(path)
 
 
 def check_regular(path: Path) -> None:
@@ -173,30 +163,31 @@ def replacing(path: Path) -> Iterator[int]:
 def new_directory(path: Path) -> Iterator[Path]:
     """Make a directory that gets its name if the block ends well, and vanishes if it does not.
 
-    If a process was killed while it made one of the same name, a minute ago or more, what it has left vanishes, too.
-    There must be nothing of that name, or only an empty directory. Errors of the block name its files as they would
-    have been called, because nobody else knows the hidden directory.
+    What a process that was killed has left of one of the same name vanishes, too. There must be nothing of that name,
+    or only an empty directory. Errors of the block name its files as they would have been called, because nobody else
+    knows the hidden directory.
 
     Yields:
         A directory in a hidden one beside `path`, to write into meanwhile.
     """
     try:
-        if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
-            problem = "is a symbolic link" if path.is_symlink() else "exists"
-            raise ConfigError(f"{path}: {problem}", expected="a directory that is new or empty")
+        if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+            raise ConfigError(f"{path}: exists", expected="a directory that is new or empty")
         path.parent.mkdir(parents=True, exist_ok=True)
         # The hidden directory is on the same file system, so one rename can give it its name.
-        with make_own_directory(f".{path.name}.unfinished-", path.parent) as hidden:
-            # One further down, as whoever writes a dataset locks its directory, and the hidden one is locked already.
-            beside = hidden / path.name
-            beside.mkdir()
-            try:
-                yield beside
-            except DatasetError as error:
-                if error.path is None or not error.path.is_relative_to(beside):
-                    raise
-                raise error.locate(path / error.path.relative_to(beside)) from error
+        hidden = path.with_name(f".{path.name}.unfinished")
+        shutil.rmtree(hidden, ignore_errors=True)
+        beside = hidden / path.name
+        beside.mkdir(parents=True)
+        try:
+            yield beside
             os.rename(beside, path)
+        except DatasetError as error:
+            if error.path is None or not error.path.is_relative_to(beside):
+                raise
+            raise error.locate(path / error.path.relative_to(beside)) from error
+        finally:
+            shutil.rmtree(hidden, ignore_errors=True)
     except OSError as error:
         raise unwritable(path, error) from error
 

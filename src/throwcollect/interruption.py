@@ -44,7 +44,7 @@ def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
 def count_interruptions(numbers: Iterable[signal.Signals] | None = None) -> Iterator[Callable[[], int]]:
     """Count signals instead of letting them raise or end this process, so that the block can end its nodes in order.
 
-    Only the main thread may use it.
+    In other threads than the main one none are counted, because signals never reach them.
 
     Args:
         numbers: The signals; None counts all that ask to stop, such as Ctrl-C.
@@ -52,6 +52,9 @@ def count_interruptions(numbers: Iterable[signal.Signals] | None = None) -> Iter
     Yields:
         Returns the number of signals so far.
     """
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: 0
+        return
     count = 0
 
     def note(_number: int, _frame: FrameType | None) -> None:
@@ -65,38 +68,6 @@ def count_interruptions(numbers: Iterable[signal.Signals] | None = None) -> Iter
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
-
-
-@contextmanager
-def hold_stop_signals() -> Iterator[Callable[[], None]]:
-    """Hold signals that ask to stop back, while a library calls Python and ignores the exceptions that handlers raise.
-
-    They reach their handlers at the end, unless the block ends with an error. In other threads than the main one there
-    is nothing to hold back, because handlers never run there.
-
-    Yields:
-        Lets the signals that have come so far reach their handlers, at a place where these may raise an exception.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: None
-        return
-    came: list[int] = []
-    # Only handlers of Python raise exceptions.
-    handlers = {number: handler for number in stop_signals() if callable(handler := signal.getsignal(number))}
-
-    def let_through() -> None:
-        while came:
-            number = came.pop(0)
-            handlers[signal.Signals(number)](number, None)
-
-    for number in handlers:
-        signal.signal(number, lambda number, _frame: came.append(number))
-    try:
-        yield let_through
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-    let_through()
 
 
 def die_with_parent(parent: int) -> None:

@@ -76,16 +76,6 @@ _WAY_OUT = f"mend or uninstall the package that it belongs to; {_DEBUG}=1 shows 
 """The hint if code of another package fails."""
 
 
-_left_out: set[str] = set()
-"""Families for which this process leaves out members of other packages."""
-
-
-def leave_out_others() -> None:
-    """Leave out members of other packages in this process; it must be called before names of members are asked for."""
-    _left_out.update(_OWN)
-    _find_members.cache_clear()
-
-
 def names_of(family: str) -> tuple[str, ...]:
     """List the names of the members of a family: our own first, then those of other packages, by name."""
     return tuple(_find_members()[family])
@@ -235,8 +225,7 @@ def _find_members() -> Mapping[str, Mapping[str, EntryPoint]]:
     looks for entry points, which takes 10 ms.
     """
     select = entry_points().select
-    added = {family: () if family in _left_out else select(group=f"throwcollect.{family}") for family in _OWN}
-    return MappingProxyType({family: _join_members(family, entries) for family, entries in added.items()})
+    return MappingProxyType({family: _join_members(family, select(group=f"throwcollect.{family}")) for family in _OWN})
 
 
 def _join_members(family: str, added: Iterable[EntryPoint]) -> Mapping[str, EntryPoint]:

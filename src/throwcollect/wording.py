@@ -7,13 +7,10 @@ import shlex
 from collections.abc import Iterable, Sequence
 from difflib import SequenceMatcher, get_close_matches
 
-_LONGEST_LINE = 1000
 _MOST_NAMES = 6
 _MOST_NEAR = 3
 _SHORTEST_PART = 3
 """A shorter text is in too many names to be a part of the one that is meant."""
-_LONGEST_WORD = 200
-"""A longer text is not a misspelt word, so that no similar word is looked for."""
 _AS_SIMILAR = 0.03
 """A name is as similar as the most similar one if its ratio of common letters differs by less than this."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?")
@@ -37,7 +34,7 @@ def find_near(name: object, known: Iterable[str]) -> list[str]:
     Names of which it is a part are taken before all others, because prefixes and units are forgotten more often than
     letters are mixed up. Capital letters do not matter.
     """
-    if not isinstance(name, str) or len(name) > _LONGEST_WORD:
+    if not isinstance(name, str):
         return []
     word, names = name.casefold(), {each.casefold(): each for each in known}
     if len(word) >= _SHORTEST_PART and (longer := [each for each in names if word in each]):
@@ -79,14 +76,10 @@ def command(*words: object) -> str:
 
 
 def printable(text: str) -> str:
-    """Make a message safe for a terminal: shorten long lines, and escape control characters."""
+    """Make a message safe for a terminal: escape control characters."""
     return "\n".join(_printable_line(line) for line in text.split("\n"))
 
 
 def _printable_line(line: str) -> str:
-    if len(line) > _LONGEST_LINE:
-        line = f"{line[: _LONGEST_LINE // 2]} [...] {line[-_LONGEST_LINE // 2 :]}"
-    if line.isprintable():
-        return line
     # `ascii` writes the escape between two quotes.
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in line)

@@ -1,6 +1,7 @@
 import os
 import pwd
 import shutil
+import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +11,6 @@ from docker.client import DockerClient
 
 from tests.cluster.slurm import Slurm
 from tests.docker.conftest import client
-from throwcollect.runtimes.apptainer.sif import make_sif
 from throwcollect.runtimes.docker import image
 
 BUILD = Path(__file__).parents[2] / "build"
@@ -67,7 +67,7 @@ def sif(client: DockerClient) -> Iterator[Path]:
         # SIFs of earlier images are no longer needed.
         shutil.rmtree(kept.parent, ignore_errors=True)
         kept.parent.mkdir(parents=True)
-        make_sif(kept, image=name, say=lambda _line: None)
+        subprocess.run(["make", "sif", f"SIF={kept}"], cwd=BUILD.parent, check=True)
     with tempfile.TemporaryDirectory(prefix="throwcollect-sif-") as path:
         Path(path).chmod(0o755)
         yield Path(shutil.copy(kept, path))

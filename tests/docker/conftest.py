@@ -25,7 +25,7 @@ def client() -> Iterator[DockerClient]:
         try:
             found.images.get(default_tag())
         except ImageNotFound:
-            pytest.skip(f"the engine has no image {default_tag()}; throwcollect image build makes it")
+            pytest.skip(f"the engine has no image {default_tag()}; make image builds it")
         if is_outdated(found, default_tag()):
-            pytest.skip(f"the image {default_tag()} is of other sources; throwcollect image build makes it anew")
+            pytest.skip(f"the image {default_tag()} is of other sources; make image builds it anew")
         yield found

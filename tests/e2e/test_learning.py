@@ -196,7 +196,7 @@ def test_a_target_out_of_reach_is_reported_with_the_nearest_throw(place: Path) -
 def test_fit_learns_the_same_model_from_a_directory_and_a_loaded_dataset(place: Path) -> None:
     directory = place / "data"
     by_path, loaded = throwcollect.fit(str(directory)), throwcollect.fit(throwcollect.load(directory))
-    assert by_path.file.model_dump_json() == loaded.file.model_dump_json()
+    assert by_path.model_dump_json() == loaded.model_dump_json()
     with pytest.raises(throwcollect.DatasetError, match="holds no dataset"):
         throwcollect.fit(place / "nowhere")
 

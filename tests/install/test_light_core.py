@@ -217,7 +217,6 @@ except throwcollect.MissingExtraError as error:
         ("collect", ("ros", "topic", "list")),
         ("collect", ("router",)),
         ("collect", ("dataset", "view", "DATASET", "out")),
-        ("docker", ("image", "build")),
         ("report", ("dataset", "report", "DATASET")),
         ("export", ("dataset", "export", "DATASET", "out", "--to", "hdf5")),
         ("export", ("dataset", "export", "DATASET", "out", "--to", "mat")),

@@ -1,4 +1,4 @@
-"""The end of a process whose parent dies, and signals that are counted or held back."""
+"""The end of a process whose parent dies, and signals that are counted."""
 
 import signal
 import subprocess
@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from throwcollect.interruption import count_interruptions, hold_stop_signals
+from throwcollect.interruption import count_interruptions
 
 CHILD = """
 import os, sys, time
@@ -39,37 +39,6 @@ def test_a_child_dies_with_its_parent_whenever_that_dies(
     assert (done.stdout, done.stderr) == (said, "")
 
 
-def test_signals_that_are_held_back_reach_their_handlers_where_they_are_let_through_or_at_the_end() -> None:
-    holding = hold_stop_signals()
-    let_through = holding.__enter__()
-    signal.raise_signal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt):
-        let_through()
-    signal.raise_signal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt):
-        holding.__exit__(None, None, None)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_a_signal_that_is_held_back_does_not_replace_an_error() -> None:
-    def fail() -> None:
-        with hold_stop_signals():
-            signal.raise_signal(signal.SIGINT)
-            raise OSError("full")
-
-    with pytest.raises(OSError, match="full"):
-        fail()
-
-
-def test_signals_are_not_held_back_in_other_threads_which_they_do_not_reach() -> None:
-    def hold() -> None:
-        with hold_stop_signals() as let_through:
-            let_through()
-
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(hold).result()
-
-
 def test_signals_are_counted_and_their_handlers_restored_afterwards() -> None:
     # `nohup` starts the tests with this signal ignored.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -89,3 +58,12 @@ def test_a_signal_that_was_ignored_stays_ignored(number: signal.Signals) -> None
     with count_interruptions() as interruptions:
         signal.raise_signal(number)
         assert interruptions() == 0
+
+
+def test_in_other_threads_no_signals_are_counted() -> None:
+    def count() -> int:
+        with count_interruptions() as interruptions:
+            return interruptions()
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(count).result() == 0

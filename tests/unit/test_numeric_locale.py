@@ -23,7 +23,7 @@ def test_a_block_changes_how_c_reads_numbers_for_its_own_thread_alone(use_decima
     assert read_in_c(b"0.5") == 0.5
     use_decimal_comma()
     assert (read_in_c(b"0.5"), read_in_c(b"0,5")) == (0.0, 0.5)
-    with ThreadPoolExecutor(1) as pool, reading_natively("nothing"):
+    with ThreadPoolExecutor(1) as pool, reading_natively():
         assert read_in_c(b"0.5") == 0.5
         assert pool.submit(read_in_c, b"0,5").result() == 0.5
     assert read_in_c(b"0,5") == 0.5

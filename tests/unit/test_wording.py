@@ -56,6 +56,5 @@ def test_no_module_writes_a_recommended_command_by_hand() -> None:
     assert not found
 
 
-def test_a_printed_message_is_escaped_for_terminals_and_shortened() -> None:
+def test_a_printed_message_is_escaped_for_terminals() -> None:
     assert printable("no run 'a\x1b[2J\udcff'\n  try: x") == "no run 'a\\x1b[2J\\udcff'\n  try: x"
-    assert printable("a" + 5000 * "b" + "c") == "a" + 499 * "b" + " [...] " + 499 * "b" + "c"

@@ -6,24 +6,20 @@ They do the same as for runs of this machine, as far as the queue and the files 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import typer
 
 from throwcollect.cli.dataset.info import print_collected
-from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, find_queued, follow
 from throwcollect.dataset.inspect import info
-from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.interruption import count_interruptions
 from throwcollect.runtimes.node_logs import Tail
 from throwcollect.wording import command, format_count
-
-_Described = TypeVar("_Described")
 
 
 def follow_to_the_end(directory: Path, *, as_json: bool) -> None:
@@ -46,8 +42,6 @@ def print_logs(run: ClusterRun, tasks: list[str], *, until_end: bool = False) ->
     for text in tasks:
         if text not in numbers:
             raise ConfigError(f"{run.directory}: has no task {text!r}", expected=f"0 to {numbers[-1]}")
-        if not until_end and text not in run.logs:
-            raise ConfigError(f"{run.directory}: task {text} has printed nothing yet")
     tails: dict[Path, Tail] = {}
 
     def print_new(*, last: bool) -> None:
@@ -91,16 +85,9 @@ def end(run: ClusterRun) -> None:
     typer.echo(f"{run.directory}: stopped; the dataset {complete}")
 
 
-def list_queued(describe: Callable[[ClusterRun, SlicesLook], _Described]) -> Iterator[_Described]:
-    """Describe each run in the queue by `make_row` or `make_document`; print the error of one that cannot be read."""
-    for directory in find_queued():
-        try:
-            run = ClusterRun.open(directory)
-            described = describe(run, run.look())
-        except ThrowcollectError as error:
-            tell(f"throwcollect: {error}")
-        else:
-            yield described
+def list_queued() -> list[tuple[ClusterRun, SlicesLook]]:
+    """List the runs in the queue, and how each is."""
+    return [(run, run.look()) for run in map(ClusterRun.open, find_queued())]
 
 
 def make_row(run: ClusterRun, look: SlicesLook) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ def fit(
     json: JsonOption = False,
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
-    from throwcollect.learning.model import fit
+    from throwcollect.learning.fitting import fit
     from throwcollect.learning.score import format_length
 
     if onnx:
@@ -74,9 +74,9 @@ def fit(
     if onnx:
         model = model.distil()
     model.save(output)
-    trained = model.file.trained_on
+    trained = model.trained_on
     if json:
-        typer.echo(model.file.model_dump_json(include={"kind", "targets", "axes", "trained_on"}, indent=2))
+        typer.echo(model.model_dump_json(include={"kind", "targets", "axes", "trained_on"}, indent=2))
         return
     typer.echo(
         f"learned from {format_count(trained.throws, 'throw')}, {trained.ignored} ignored as they did not succeed"
@@ -111,8 +111,7 @@ def aim(
     """Find parameters of throws at targets."""
     from throwcollect.config.loader import load as load_config
     from throwcollect.learning.lists import read_targets, write_aims
-    from throwcollect.learning.model import load_model
-    from throwcollect.learning.model_directory import CONFIG
+    from throwcollect.learning.model import CONFIG, load_model
 
     model = load_model(directory)
     names = (*model.targets, *model.given)
@@ -200,8 +199,7 @@ def score(
     """Throw at targets in simulation, and note in the model how well it hits."""
     from contextlib import ExitStack
 
-    from throwcollect.learning.model import load_model
-    from throwcollect.learning.model_directory import CONFIG, write_score
+    from throwcollect.learning.model import CONFIG, load_model
     from throwcollect.simulator import Simulator
 
     model = load_model(directory)
@@ -213,7 +211,7 @@ def score(
         found = model.score(
             simulator, targets=targets, seed=seed, seeds=seeds, world=other, scatter=scatter, processes=count_cores()
         )
-    write_score(directory, found)
+    model.write_score(directory, found)
     typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_describe_score(found)))
 
 
@@ -248,7 +246,7 @@ def adapt(
     except FarThrowError as error:
         raise error.locate_throw(rows[error.number].place) from None
     adapted.save(output)
-    entry = adapted.file.adaptation
+    entry = adapted.adaptation
     if entry is None:
         return
     if json:
@@ -292,7 +290,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
     from throwcollect.learning.lists import Row
 
     dataset = Dataset.open(directory)
-    trained, config = model.file.trained_on, dataset.config
+    trained, config = model.trained_on, dataset.config
     if (config.robot.name, config.task.name) != (trained.robot, trained.task):
         raise ConfigError(
             f"{directory}: the task {config.task.name} of the robot {config.robot.name}",
@@ -322,7 +320,7 @@ def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
 def _describe_score(score: Score) -> list[str]:
     from throwcollect.learning.score import SCORE_HEAD
 
-    rows = [("", *SCORE_HEAD), *(row.cells for row in score.list_rows())]
+    rows = [("", *SCORE_HEAD), *score.list_rows()]
     return [
         f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
         "of the seeds, in simulation:",

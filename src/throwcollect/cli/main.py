@@ -1,29 +1,33 @@
-"""All commands of the command line. Each of them imports what it needs when it is called, so that all start fast."""
+"""The command line: all commands, each of which imports what it needs when it is called; errors become messages."""
 
 from __future__ import annotations
 
-import copy
+import errno
+import os
+import signal
 import sys
+import traceback
 from collections.abc import Callable
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.exceptions import TyperException
 
-from throwcollect.cli import (
-    cluster_commands,
-    collect,
-    image_commands,
-    learning,
-    node_commands,
-    robot_commands,
-    runs,
-    serve,
-    show,
-)
-from throwcollect.cli.dataset import derive, info, replay, verify_command, writing
-from throwcollect.cli.execution import execute
+from throwcollect.cli import cluster_commands, collect, learning, node_commands, robot_commands, runs, serve, show
+from throwcollect.cli.dataset import derive, info, replay, writing
 from throwcollect.cli.ros.commands import ros_app
+from throwcollect.cli.streams import ensure_written
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.extras import explain_missing
+from throwcollect.interruption import stop_signals
 from throwcollect.version import __version__
+from throwcollect.wording import printable
+
+_WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR, errno.ENOENT)
+"""System errors that a path from the user may cause."""
+_OPTIONS = {"rate_hz": "--rate"}
+"""Options by the arguments that they set, where the two have different names."""
 
 app = typer.Typer(
     name="throwcollect",
@@ -33,9 +37,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 dataset_app = typer.Typer(help="Look into datasets, and make others from them.", no_args_is_help=True)
-image_app = typer.Typer(help="Make the image that containers are made from.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
-app.add_typer(image_app, name="image")
 app.add_typer(ros_app, name="ros")
 app.add_typer(robot_commands.app, name="robot")
 
@@ -58,10 +60,8 @@ _add(
     panel="Nodes, as `up` starts them",
 )
 _add(collect.launch, collect.begin, hidden=True)
-image_app.command("build")(image_commands.build)
-image_app.command("sif")(image_commands.sif)
 dataset_app.command("info")(info.show_info)
-dataset_app.command("verify")(verify_command.verify_dataset)
+dataset_app.command("verify")(info.verify_dataset)
 dataset_app.command("digest")(info.show_digest)
 dataset_app.command("export")(writing.export_dataset)
 dataset_app.command("merge")(derive.merge_datasets)
@@ -90,24 +90,61 @@ def _options(
     pass
 
 
-def assemble_command(first_word: str | None = None) -> Callable[..., Any]:
-    """Assemble the whole command, or only the part that a command line with this first word needs.
-
-    To assemble all of it takes 50 ms of processor time, a quarter of what a command takes to start.
-    """
-    part = copy.copy(app)
-    part.registered_commands = [
-        each for each in app.registered_commands if each.callback and _name(each.callback) == first_word
-    ]
-    part.registered_groups = [each for each in app.registered_groups if each.name == first_word]
-    is_known = part.registered_commands or part.registered_groups
-    return typer.main.get_command(part if is_known else app)
-
-
-def _name(command: Callable[..., Any]) -> str:
-    return typer.main.get_command_name(command.__name__)
-
-
-def main() -> None:
+def main() -> NoReturn:
     """Run the command that the command line asks for, and exit with its code."""
-    execute(assemble_command(*sys.argv[1:2]))
+    execute(typer.main.get_command(app))
+
+
+def execute(command: Callable[..., Any]) -> NoReturn:
+    """Run a command of typer, print errors as messages, exit with their codes."""
+    for number in stop_signals():
+        # The other signals raise KeyboardInterrupt as Ctrl-C does, so that the same code cleans up after them.
+        signal.signal(number, signal.default_int_handler)
+    try:
+        with explain_missing():
+            code = command(prog_name="throwcollect", standalone_mode=False) or 0
+        # typer turns KeyboardInterrupt into this code, and prints nothing.
+        if code == Interrupted.exit_code:
+            raise Interrupted("interrupted")
+        ensure_written(reader_may_leave=True)
+    except Exception as error:  # noqa: BLE001 - the one place where the unexpected becomes a message
+        if os.environ.get("THROWCOLLECT_DEBUG"):
+            traceback.print_exc()
+        message, code = _describe(error)
+        if message:
+            typer.echo(f"throwcollect: {printable(message)}", err=True)
+    sys.stdout.flush()
+    # While Python ends, which takes a while, a signal would only make the exit code contradict what was printed.
+    for number in stop_signals():
+        signal.signal(number, signal.SIG_IGN)
+    sys.exit(code)
+
+
+def _name_options(error: ConfigError) -> ConfigError:
+    """Return the same error with the option in place of each argument, as users of commands know options alone."""
+    problems = [
+        replace(each, key=_OPTIONS.get(each.key, f"--{each.key}"), argument=False) if each.argument else each
+        for each in error.problems
+    ]
+    return type(error)(problems, expected=error.expected, hint=error.hint)
+
+
+def _describe(error: Exception) -> tuple[str, int]:
+    """Find the message and the exit code of an error."""
+    if isinstance(error, ConfigError):
+        error = _name_options(error)
+    if isinstance(error, ThrowcollectError):
+        return str(error), error.exit_code
+    if isinstance(error, TyperException):
+        message = error.format_message()
+        context: typer.Context | None = getattr(error, "ctx", None)
+        # The message is empty if there was no argument: typer has printed the help then.
+        usage = f"{context.command_path if context else 'throwcollect'} --help"
+        return (f"{message}\n  try: {usage}" if message else ""), error.exit_code
+    if isinstance(error, OSError) and error.strerror:
+        where = "" if error.filename is None else f"{error.filename}: "
+        return f"{where}{error.strerror}", ConfigError.exit_code if error.errno in _WRONG_PATHS else 1
+    if isinstance(error, MemoryError):
+        return "out of memory\n  try: a machine with more of it, or a higher limit (ulimit -v)", 1
+    where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"
+    return f"internal error: {type(error).__name__}: {error}\n{where}", 1

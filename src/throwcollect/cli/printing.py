@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -19,31 +19,14 @@ def print_progress(wanted: bool = True) -> None:
 
     from throwcollect.progress_log import LOGGER
 
-    class Printer(logging.Handler):
-        """Prints records."""
-
-        def emit(self, record: logging.LogRecord) -> None:
-            tell(record.getMessage())
-
     logger = logging.getLogger(LOGGER)
     logger.setLevel(logging.INFO)
-    logger.handlers = [Printer()] if wanted else []
+    logger.handlers = [logging.StreamHandler()] if wanted else []
 
 
 def print_json(document: object, *, default: Callable[[Any], object] | None = None) -> None:
     """Print a JSON document; `default` is as for `json.dumps`."""
     typer.echo(jsonlib.dumps(document, indent=2, default=default))
-
-
-def print_json_list(items: Iterable[object]) -> None:
-    """Print a list as `print_json` does, but item by item, as the text of a large one need not fit into memory."""
-    separator = "["
-    for item in items:
-        # JSON escapes the line breaks of texts, so all that are left are those of the layout.
-        text = jsonlib.dumps(item, indent=2).replace("\n", "\n  ")
-        typer.echo(f"{separator}\n  {text}", nl=False)
-        separator = ","
-    typer.echo("[]" if separator == "[" else "\n]")
 
 
 def format_number(number: float | None) -> str:

@@ -55,7 +55,7 @@ def ps(
         documents = [_make_document(run) for run in shown]
         for runtime, found in unrecorded:
             documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
-        documents += cluster_runs.list_queued(cluster_runs.make_document)
+        documents += [cluster_runs.make_document(*each) for each in cluster_runs.list_queued()]
         if server is not None:
             documents.append(
                 {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
@@ -65,7 +65,7 @@ def ps(
         return
     rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
-    rows += [(row, []) for row in cluster_runs.list_queued(cluster_runs.make_row)]
+    rows += [(cluster_runs.make_row(*each), []) for each in cluster_runs.list_queued()]
     if server is not None:
         rows.append(((SERVER, "-", "-", "-", f"running at {server.url}, pid {server.pid}", "-"), []))
     for line in _make_table(rows):
@@ -81,9 +81,9 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
         return
     from throwcollect.cli.dataset.info import print_summary
     from throwcollect.runs.following import follow
-    from throwcollect.runs.run_selection import describe_death
+    from throwcollect.runs.run_selection import describe_death, find_run_to_watch
 
-    found = _find_run(run)
+    found = find_run_to_watch(run)
     with display(quiet=json) as shown, count_interruptions() as interruptions:
         for look in follow(found, keep_on=lambda: not interruptions()):
             found = look.run
@@ -115,8 +115,9 @@ def logs(
         print_logs(submitted, nodes or [], until_end=follow)
         return
     from throwcollect.runs.following import read_logs
+    from throwcollect.runs.run_selection import find_run_to_watch
 
-    for name, line, width in read_logs(_find_run(run), nodes or (), follow=follow, keep_on=has_reader):
+    for name, line, width in read_logs(find_run_to_watch(run), nodes or (), follow=follow, keep_on=has_reader):
         typer.echo(f"{name:{width}} | {line}")
 
 
@@ -128,8 +129,9 @@ def events(run: RunOption = None, json: JsonOption = False) -> None:
         print_events(submitted, as_json=json)
         return
     from throwcollect.runs.following import read_events
+    from throwcollect.runs.run_selection import find_run_to_watch
 
-    for event, line in read_events(_find_run(run), keep_on=has_reader):
+    for event, line in read_events(find_run_to_watch(run), keep_on=has_reader):
         typer.echo(line if json else f"{event.time}  {event}")
 
 
@@ -139,10 +141,9 @@ def scale(
 ) -> None:
     """Change the number of simulations of a run."""
     from throwcollect.runs import control
-    from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_run_to_change
 
-    found = find_run_to_change(Records(), run, command=f"scale {simulations}")
+    found = find_run_to_change(run)
     control.scale(found, simulations)
     typer.echo(f"{found.id}: {found.record.simulations} -> {format_count(simulations, 'simulation')}")
 
@@ -157,10 +158,9 @@ def stop(run: RunOption = None) -> None:
     if _end_server(run):
         return
     from throwcollect.runs import control
-    from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import describe_death, find_run_to_change, require_living
 
-    found = find_run_to_change(Records(), run, command="stop")
+    found = find_run_to_change(run)
     require_living(found)
     collects = found.record.kind == "collection"
     if collects:
@@ -194,12 +194,10 @@ def down(
     if _end_server(run):
         return
     from throwcollect.runs import control
-    from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_run_to_change
 
     # A run without a record may be another user's, so it is removed only if it is named.
-    command = "down -v" if volumes else "down"
-    found = find_run_to_change(Records(), None, command=command, died=True) if run is None else run
+    found = find_run_to_change(None, died=True) if run is None else run
     ended, removed = control.down(found, volumes=volumes)
     for name in removed:
         tell(f"removed {name}")
@@ -235,14 +233,6 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
     from throwcollect.cluster.cluster_run import find_cluster_run
 
     return find_cluster_run(run)
-
-
-def _find_run(named: str | None) -> Run:
-    """Find the run of this machine that a command is to look at."""
-    from throwcollect.runs.records import Records
-    from throwcollect.runs.run_selection import find_run_to_watch
-
-    return find_run_to_watch(Records(), named, say=tell)
 
 
 def _make_document(run: Run) -> dict[str, Any]:

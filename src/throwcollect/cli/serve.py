@@ -99,11 +99,10 @@ def serve(
 
 def view(run: RunOption = None, json: JsonOption = False) -> None:
     """Print the address of a page on which runs are seen, and open it where there is a screen."""
-    from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_run_to_watch
     from throwcollect.serve.finding import ensure_server, make_page_address
 
-    shown = find_run_to_watch(Records(), run, say=lambda _: None).id if run is not None else None
+    shown = find_run_to_watch(run).id if run is not None else None
     address = ensure_server()
     page = make_page_address(address, shown)
     if json:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import format_number, print_json, print_json_list, print_result, tell
+from throwcollect.cli.printing import format_number, print_json, print_result, tell
 from throwcollect.cli.robot_commands import FlangeOption, read_robot, write_robot
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
@@ -106,27 +106,28 @@ def plan(
             found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=shown)
     _load_world(found)
     if json:
-        print_json_list(
-            {
-                "trial": trial.number,
-                "values": dict(trial.values),
-                "seed": trial.seed,
-                "digest": trial.digest,
-                "refused": trial.refused,
-                **({"target": dict(trial.target)} if found.trials.target_names else {}),
-            }
-            for trial in found.trials
+        print_json(
+            [
+                {
+                    "trial": trial.number,
+                    "values": dict(trial.values),
+                    "seed": trial.seed,
+                    "digest": trial.digest,
+                    "refused": trial.refused,
+                    **({"target": dict(trial.target)} if found.trials.target_names else {}),
+                }
+                for trial in found.trials
+            ]
         )
         return
-    names = (*found.keys, *found.trials.target_names)
-    listed = found.trials if output is None else ()
-    if listed:
+    if output is None:
+        names = (*found.keys, *found.trials.target_names)
         typer.echo("  ".join(["trial", *names]))
-    for trial in listed:
-        values = {**trial.values, **trial.target}
-        numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
-        note = f"  refused: {trial.refused}" if trial.refused else ""
-        typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
+        for trial in found.trials:
+            values = {**trial.values, **trial.target}
+            numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
+            note = f"  refused: {trial.refused}" if trial.refused else ""
+            typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     tell(f"{count_trials(found)}; {len(found.trials.refused)} refused")
 
 

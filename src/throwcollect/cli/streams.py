@@ -1,4 +1,4 @@
-"""Standard streams that survive being closed, before a command starts or while it runs.
+"""Standard streams that survive the end of their readers.
 
 Output that cannot be written is dropped, so that a command still does its work and ends properly. The exit code reports
 lost standard output where it matters.
@@ -42,21 +42,8 @@ class _Stream(io.FileIO):
 
 
 def open_streams() -> None:
-    """Make sure that all three standard streams exist, and that a command goes on when a reader of its output ends.
-
-    A stream that was closed, as by ``>&-``, becomes ``/dev/null``. Otherwise the next file that is opened would get its
-    descriptor, and the output would be written into that file.
-    """
-    for number in (0, 1, 2):
-        try:
-            os.fstat(number)
-        except OSError:
-            # open() takes the lowest free descriptor, which is this one. Child processes must inherit it, too.
-            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
-    if sys.stdin is None:
-        sys.stdin = open(0, closefd=False)  # noqa: SIM115 - it stays open
-    sys.stdout = _open_text(1, sys.stdout)
-    sys.stderr = _open_text(2, sys.stderr)
+    """Let a command go on when a reader of its output, or of its remarks, ends."""
+    sys.stdout, sys.stderr = _open_text(1, sys.stdout), _open_text(2, sys.stderr)
 
 
 def has_reader() -> bool:
@@ -80,12 +67,11 @@ def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -
         raise OutputError(f"the output cannot be written: {failure.strerror}", hint=hint)
 
 
-def _open_text(number: int, as_started: TextIO | None) -> TextIO:
+def _open_text(number: int, as_started: TextIO) -> TextIO:
     """Open a descriptor for text, with the encoding that Python has chosen for it."""
     return io.TextIOWrapper(
         io.BufferedWriter(_Stream(number, "w", closefd=False)),
-        encoding=as_started.encoding if as_started else "utf-8",
-        # The name of a file may hold bytes that are no text.
+        encoding=as_started.encoding,
         errors="backslashreplace",
-        line_buffering=number == 2 or os.isatty(number) or getattr(as_started, "write_through", False),
+        line_buffering=number == 2 or os.isatty(number),
     )

@@ -12,6 +12,7 @@ from pathlib import Path
 from throwcollect.cluster import slurm
 from throwcollect.cluster.cluster_run import ClusterRun
 from throwcollect.cluster.script import BatchScripts
+from throwcollect.cluster.sif import SIF_COMMAND, check_sif
 from throwcollect.cluster.site import with_site
 from throwcollect.cluster.submission import (
     CLUSTER,
@@ -33,7 +34,6 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
 from throwcollect.own_process import make_command
 from throwcollect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
-from throwcollect.runtimes.apptainer.sif_contents import check_sif
 from throwcollect.side_by_side import count_cores
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
@@ -194,7 +194,8 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
         image = Path(config.cluster.image).absolute()
         if not image.is_file():
             raise ConfigError(
-                [Problem(f"there is no image {image}", key="cluster.image")], hint="throwcollect image sif makes one"
+                [Problem(f"there is no image {image}", key="cluster.image")],
+                hint=f"{SIF_COMMAND}, in a clone of the project, makes one",
             )
         # Many login nodes have no Apptainer, though the nodes of tasks have.
         if shutil.which("apptainer") is not None:

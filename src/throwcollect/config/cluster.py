@@ -64,7 +64,7 @@ class ClusterConfig(Section):
     lines: list[Line] = []
     """Further lines that the site needs at the start of the batch script: `#SBATCH` options and commands."""
     image: str | None = None
-    """Image of Apptainer that tasks run in (`throwcollect image sif`); null takes the Python environment from which
+    """Image of Apptainer that tasks run in (`make sif`); null takes the Python environment from which
     the collection is submitted, which all nodes have to see."""
     binds: list[Bind] = []
     """Further directories that tasks see inside the image; they always see the directory of the dataset."""

@@ -195,7 +195,8 @@ class ContainersConfig(Section):
     """How nodes run in containers; nothing in this section changes the dataset."""
 
     image: str | None = None
-    """Image of all nodes; null takes `throwcollect` of this version, which is built if it is missing."""
+    """Image of all nodes; null takes `throwcollect` of this version (`make image`). Another one is pulled if it
+    is missing."""
     volume: Volume | None = None
     """Volume of the engine that holds the dataset; null writes it to a directory of this machine."""
     router: NodeContainerConfig = NodeContainerConfig()

@@ -30,7 +30,7 @@ from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
-from throwcollect.files import check_regular, is_there, remove, write_file
+from throwcollect.files import check_regular, remove, write_file
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
@@ -64,7 +64,7 @@ def resume(
             through.
     """
     with hold_lock(directory):
-        if is_there(directory / SOURCES):
+        if (directory / SOURCES).exists():
             raise DatasetError(
                 "was derived from other datasets, so nothing is collected into it",
                 path=directory,
@@ -172,7 +172,7 @@ def _has_contents(path: Path, contents: bytes) -> bool:
 
 def _find_damaged(directory: Path, onlooker: Onlooker) -> frozenset[str]:
     """Find the names of files of a finished dataset that are missing or damaged; none if it is not finished."""
-    if not is_there(directory / METADATA):
+    if not (directory / METADATA).exists():
         return frozenset()
     findings = find_damage(directory, in_full=True)
     for finding in findings:

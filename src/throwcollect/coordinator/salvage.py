@@ -19,7 +19,6 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
-from throwcollect.files import is_there
 from throwcollect.robots.description import is_available
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import LOST, REFUSED, Result
@@ -36,7 +35,7 @@ def finish_without_simulating(
     finished dataset of which nothing is missing or damaged stays as it is.
     """
     plan = resume(config, directory, sweep_directory=sweep_directory, onlooker=onlooker)
-    if is_there(directory / METADATA):
+    if (directory / METADATA).exists():
         onlooker.say(f"{directory}: is finished, and no file of it is missing or damaged")
         return
     table, provenance = ThrowsTable.of(plan), read_provenance(directory)

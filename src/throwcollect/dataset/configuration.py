@@ -11,7 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, config_path, describe_other, has_files
 from throwcollect.dataset.manifest import is_begun, was_changed
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import is_there, refuse_pointers
+from throwcollect.files import refuse_pointers
 from throwcollect.wording import command
 
 
@@ -59,7 +59,7 @@ def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
 
 def refuse_lost_config(directory: Path) -> None:
     """Refuse a directory that holds files of a dataset, but no configuration."""
-    if has_files(directory) and not is_there(directory / CONFIG):
+    if has_files(directory) and not (directory / CONFIG).exists():
         raise DatasetError("no such file", path=directory / CONFIG, hint=_restore(directory))
 
 

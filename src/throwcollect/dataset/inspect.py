@@ -14,7 +14,6 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.errors import DatasetError
-from throwcollect.files import is_there
 from throwcollect.progress_log import log_progress
 from throwcollect.sweep.arrow_column import find_range, find_rows
 from throwcollect.wording import command, join_names
@@ -70,7 +69,7 @@ def _find_landing_area(throws: pa.Table, success: str) -> Mapping[str, tuple[flo
 
 def check_recordings_are_there(directory: Path) -> None:
     """Refuse a finished dataset of which recordings are missing; `verify` says whether the others are right."""
-    missing = [name for name in Dataset.open(directory).shards if not is_there(directory / name)]
+    missing = [name for name in Dataset.open(directory).shards if not (directory / name).exists()]
     if missing:
         raise DatasetError(
             f"{join_names(missing[:_MOST_NAMED])}{' and more' if len(missing) > _MOST_NAMED else ''} "

@@ -32,7 +32,7 @@ from throwcollect.dataset.directory import (
 )
 from throwcollect.dataset.findings import Finding
 from throwcollect.errors import DatasetError
-from throwcollect.files import is_there, open_regular, read_text, unreadable
+from throwcollect.files import open_regular, read_text, unreadable
 from throwcollect.sweep.digest import is_digest
 from throwcollect.wording import command
 
@@ -152,7 +152,7 @@ def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
 def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     """Read the name of the collection that a manifest has, and its entries; see `read_manifest`."""
     path = directory / MANIFEST
-    if not is_there(path):
+    if not path.exists():
         raise DatasetError("is missing", path=path, hint=command("resume", directory, "--no-simulate"))
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
@@ -192,7 +192,7 @@ def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full
     """
     for entry in entries:
         path = directory / entry.path
-        if not is_there(path):
+        if not path.exists():
             yield Finding(entry.path, "", f"is missing, {MANIFEST} has it")
             continue
         try:

@@ -28,7 +28,7 @@ from throwcollect.dataset.directory import CARD, PROVENANCE
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.manifest import entry_of_file
 from throwcollect.errors import DatasetError
-from throwcollect.files import is_there, read_text, write_file
+from throwcollect.files import read_text, write_file
 from throwcollect.version import __version__
 
 HOST_VARIABLE = "THROWCOLLECT_HOST"
@@ -140,7 +140,7 @@ def find_changes(directory: Path) -> Iterator[Finding]:
     """Find changed bytes of the provenance of a dataset and of its data card."""
     try:
         _, card = _load(directory / PROVENANCE)
-        if is_there(directory / CARD) and entry_of_file(directory / CARD).sha256 != card:
+        if (directory / CARD).exists() and entry_of_file(directory / CARD).sha256 != card:
             yield Finding(CARD, "", f"its bytes were changed: its SHA-256 is not the one in {PROVENANCE}")
     except DatasetError as error:
         yield Finding.of(error.path.name if error.path else PROVENANCE, error)

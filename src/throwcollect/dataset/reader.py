@@ -28,7 +28,7 @@ from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
-from throwcollect.files import StrPath, is_there
+from throwcollect.files import StrPath
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.arrow_column import count_values, find_trial
@@ -82,7 +82,7 @@ class Dataset(Sequence[Throw]):
             if (found := _find_custom(bag, "throwcollect.format")) != FORMAT:
                 raise DatasetError(f"has the format {found}", path=path, expected=FORMAT)
             plan = Plan.read(path / PLAN, read_config(path))
-            if not is_there(path / THROWS):
+            if not (path / THROWS).exists():
                 raise DatasetError("is missing", path=path / THROWS)
             return cls(path, plan, read_throws(path, plan), bag)
         except DatasetError as error:
@@ -304,7 +304,7 @@ def load(directory: StrPath) -> Dataset:
     """
     path = Path(directory)
     # If the directory is no dataset at all, `open` says what is wrong.
-    if is_there(path / METADATA) or not is_there(path / PLAN):
+    if (path / METADATA).exists() or not (path / PLAN).exists():
         return Dataset.open(path)
     plan = Plan.read(path / PLAN, read_config(path))
     rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))

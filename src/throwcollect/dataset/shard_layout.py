@@ -8,7 +8,6 @@ from pathlib import Path
 
 from throwcollect.dataset.directory import path_of_part, shard_name
 from throwcollect.dataset.recovery import LeftShard
-from throwcollect.files import is_there
 from throwcollect.sweep.plan import Plan
 
 
@@ -43,7 +42,7 @@ class ShardLayout:
     def has_file(self, number: int) -> bool:
         """Whether a shard was begun."""
         path = self.path(number)
-        return is_there(path) or is_there(path_of_part(path))
+        return path.exists() or path_of_part(path).exists()
 
     def part(self, number: int) -> LeftShard:
         """Describe a shard for `find_left`, without a look into its files."""

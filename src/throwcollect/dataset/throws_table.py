@@ -18,7 +18,6 @@ from throwcollect.config.values import column_of
 from throwcollect.dataset.directory import SOURCES, THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import is_there
 from throwcollect.members import explain_failure
 from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_numbers, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
@@ -218,7 +217,7 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
     path = directory / THROWS
     table = read_throws_table(path, plan)
     numbers, planned = table["trial"].to_pylist(), plan.trials.numbers
-    if is_there(directory / SOURCES):
+    if (directory / SOURCES).exists():
         if numbers != sorted({number for number in numbers if number in planned}):
             raise DatasetError("its rows are not trials of the plan in order", path=path)
     elif numbers != list(planned):

@@ -37,7 +37,7 @@ from throwcollect.dataset.summary_files import combine_digests, metadata_text
 from throwcollect.dataset.throws_table import ThrowsTable, read_throws
 from throwcollect.dataset.verify_recording import RecordingReport, check_recording
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
-from throwcollect.files import is_there, read_text
+from throwcollect.files import read_text
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
@@ -100,8 +100,8 @@ def find_damage(directory: Path, *, in_full: bool) -> list[Finding]:
     Data card and provenance differ between equal collections, so they are not in the manifest; the provenance has their
     hashes. In full, every byte of each file is read, or else only its size is compared.
     """
-    findings = [Finding(name, "", "is missing") for name in (CARD, PROVENANCE) if not is_there(directory / name)]
-    if in_full and is_there(directory / PROVENANCE):
+    findings = [Finding(name, "", "is missing") for name in (CARD, PROVENANCE) if not (directory / name).exists()]
+    if in_full and (directory / PROVENANCE).exists():
         findings += find_changes(directory)
     try:
         entries = read_manifest(directory)

@@ -109,7 +109,8 @@ def read_frames(urdf: str, *, base_height: float) -> FrameTree:
 def _frame_of(joint: BodyJoint) -> Frame:
     if joint.kind not in ("fixed", "revolute", "continuous", "prismatic"):
         raise ConfigError(
-            f"robot description: joint {joint.name} is {joint.kind}", expected="fixed, revolute, continuous or prismatic"
+            f"robot description: joint {joint.name} is {joint.kind}",
+            expected="fixed, revolute, continuous or prismatic",
         )
     translation, rotation = joint.placement.xyz, quaternion_of(*joint.placement.rpy)
     if not joint.moves:

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.signals import Signal
-from throwcollect.export.throw_source import ExportSource, ThrowSeries, read_metadata
+from throwcollect.export.throw_source import ExportSource, Signal, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
-from throwcollect.interruption import hold_stop_signals
+from throwcollect.interruption import count_interruptions
 
 h5py = lazily("h5py")
 
@@ -67,7 +66,7 @@ def write(source: ExportSource, directory: Path) -> None:
     config = source.dataset.config
     # The HDF5 library goes on after an exception in one of the output's methods, without what should have been written.
     with (
-        hold_stop_signals() as let_through,
+        count_interruptions() as interruptions,
         _Output(directory / "throws.hdf5") as output,
         h5py.File(output, "w") as file,
     ):
@@ -83,7 +82,8 @@ def write(source: ExportSource, directory: Path) -> None:
             _add_throw(data.create_group(name), throw, source)
             succeeded += [name] * throw.succeeded
             output.check()
-            let_through()
+            if interruptions():
+                raise KeyboardInterrupt
         file[f"mask/{config.task.success}"] = np.array(succeeded, dtype="S")
         _add_table(file.create_group("throws"), source.table, h5py.string_dtype())
 

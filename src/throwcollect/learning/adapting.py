@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
+from pydantic import FiniteFloat
 
+from throwcollect.dataset.misses import find_median
 from throwcollect.errors import ConfigError
-from throwcollect.learning.arrays import Array
+from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.learning.learned_map import Correction, KeyRole, LearnedMap
 from throwcollect.reproducible_math import matmul, solve
 from throwcollect.units import unit_of_name
@@ -77,25 +79,44 @@ ROLES = {Method.BIAS: KeyRole.PARAMETER, Method.LATENT: KeyRole.LATENT}
 """Inputs that differ, apart from the offset."""
 
 
-@dataclass(frozen=True, eq=False)
-class Adaptation:
+class AdaptedNumber(ModelEntry):
+    """A number that adaptation found.
+
+    Attributes:
+        name: A latent, which has `value` in this world; or a parameter or a target, to which `value` is added.
+        value: In the unit of the name.
+        deviation: Standard deviation of `value`.
+    """
+
+    name: str
+    value: FiniteFloat
+    deviation: FiniteFloat
+
+
+class Adaptation(ModelEntry):
     """How a world differs, found by a few throws in it.
 
     Attributes:
         method: How the world is assumed to differ.
-        correction: The correction of the map for this world.
-        deviations: Standard deviations of the numbers that were found: of the biases or latents, scaled, then of the
-            offset; shape ``(n_found,)``.
-        before: Distance of each throw from the prediction of the map, shape ``(n_throws,)``.
-        after: Distance of each throw from the prediction of a map that was adapted to other throws: to all others if
-            there are up to ten throws, else to nine tenths of them; empty for a single throw.
+        throws: Number of throws.
+        scatter: Standard deviation that was assumed for each measured coordinate, in the unit of the targets.
+        before: Distances of the throws from where the model predicted them before it was adapted.
+        after: The same distances, each from the prediction of a model that was adapted to the other throws; empty for a
+            single throw.
+        found: The numbers that were found.
     """
 
     method: Method
-    correction: Correction
-    deviations: Array
-    before: Array
-    after: Array
+    throws: int
+    scatter: FiniteFloat
+    before: list[FiniteFloat]
+    after: list[FiniteFloat]
+    found: list[AdaptedNumber]
+
+    @property
+    def medians(self) -> tuple[float | None, float | None]:
+        """Medians of `before` and of `after`; None if there are no distances."""
+        return find_median(self.before), find_median(self.after)
 
 
 def adapt(
@@ -107,10 +128,11 @@ def adapt(
     method: Method | None = None,
     scatter: float,
     latents_count: bool,
-) -> Adaptation:
+) -> tuple[Correction, Adaptation]:
     """Find out how a world differs from the world of a map.
 
-    The result is the most probable difference, given the throws and what was expected before them.
+    The result is the correction of the map for the most probable difference, given the throws and what was expected
+    before them, and how it was found.
 
     Args:
         learned: The map, corrected or not; the search begins with its latents.
@@ -126,15 +148,39 @@ def adapt(
     before = _measure_distances(learned, *throws)
     chosen = method or _choose(len(places), latents_count=latents_count)
     if chosen is Method.NONE:
-        return leave_as_it_is(learned, before)
+        return leave_as_it_is(learned, before, scatter)
     found, deviations = _find(learned, chosen, throws, scatter)
     after = np.empty(0)
     if len(places) > 1:
         after = _predict_by_others(learned, chosen, throws, scatter, found)
     helps = float((before**2).sum() - (after**2).sum()) > (_CLEARLY * scatter) ** 2
     if method is None and not helps:
-        return leave_as_it_is(learned, before)
-    return Adaptation(chosen, _shift(learned.correction, chosen, found), deviations, before, after)
+        return leave_as_it_is(learned, before, scatter)
+    correction = _shift(learned.correction, chosen, found)
+    return correction, Adaptation(
+        method=chosen,
+        throws=len(places),
+        scatter=scatter,
+        before=before.tolist(),
+        after=after.tolist(),
+        found=_list_found(learned, correction, chosen, deviations),
+    )
+
+
+def _list_found(learned: LearnedMap, correction: Correction, method: Method, deviations: Array) -> list[AdaptedNumber]:
+    """List the numbers that were found, in their units; deviations are those of `_find`."""
+    role = ROLES.get(method)
+    axes = learned.axes_of(role) if role else ()
+    found = []
+    for number, axis in enumerate(axes):
+        half = (axis.maximum - axis.minimum) / 2
+        if role is KeyRole.LATENT:
+            value = axis.minimum + (float(correction.latents[number]) + 1) * half
+        else:
+            value = float(correction.bias[number]) * half
+        found.append(AdaptedNumber(name=axis.key, value=value, deviation=float(deviations[number]) * half))
+    offsets = zip(learned.targets, correction.offset.tolist(), deviations[len(axes) :].tolist(), strict=True)
+    return [*found, *(AdaptedNumber(name=name, value=value, deviation=spread) for name, value, spread in offsets)]
 
 
 def refuse_far_inputs(learned: LearnedMap, role: KeyRole, inputs: Array) -> None:
@@ -184,10 +230,13 @@ def _suggest_checks(targets: Sequence[str]) -> str | None:
     return "; ".join(checks) or None
 
 
-def leave_as_it_is(learned: LearnedMap, distances: Array) -> Adaptation:
-    """Make the adaptation that changes nothing; distances of throws from predictions have shape ``(n_throws,)``."""
-    after = distances if len(distances) > 1 else np.empty(0)
-    return Adaptation(Method.NONE, learned.correction, np.empty(0), distances, after)
+def leave_as_it_is(learned: LearnedMap, distances: Array, scatter: float) -> tuple[Correction, Adaptation]:
+    """Find no difference; distances of throws from predictions have shape ``(n_throws,)``."""
+    before = distances.tolist()
+    after = before if len(before) > 1 else []
+    return learned.correction, Adaptation(
+        method=Method.NONE, throws=len(before), scatter=scatter, before=before, after=after, found=[]
+    )
 
 
 def _choose(throws: int, *, latents_count: bool) -> Method:

@@ -16,8 +16,17 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.aiming import aim
 from throwcollect.learning.arrays import Array
-from throwcollect.learning.fitting import EFFORT, count_needed_throws, fit_throws
-from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap, find_nearest, scale_values
+from throwcollect.learning.learned_map import (
+    EFFORT,
+    Axis,
+    KeyRole,
+    Kind,
+    LearnedMap,
+    count_needed_throws,
+    find_nearest,
+    fit_throws,
+    scale_values,
+)
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import spread
 
@@ -133,7 +142,7 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
         if name in datasets[0].throws.column_names
     }
     places = grid.measure(columns)
-    learned = fit_throws(Kind.LOCAL, axes, grid.names, values[landed], places, columns[EFFORT]).learned
+    learned, _, _ = fit_throws(Kind.LOCAL, axes, grid.names, values[landed], places, columns[EFFORT])
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(number, 0)))
     found = _aim(learned, Tried(axes, values, ~landed), parameters, grid, count, randomness)
     if not len(found):

@@ -1,138 +1,116 @@
-"""Learns from the throws of a dataset where trials end."""
+"""Learns a model from the throws of a dataset."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
+from throwcollect.arguments import read_word, refuse_argument
+from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.selection import find_rows
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import StrPath
 from throwcollect.learning.arrays import Array
-from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap, no_correction, scale_values
-from throwcollect.learning.polynomial import Validation, cross_validate, fit_polynomial
+from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, LearnedMap, count_needed_throws, fit_throws
+from throwcollect.learning.model import Model
+from throwcollect.learning.model_file import TrainedOn
+from throwcollect.version import __version__
 from throwcollect.wording import format_count, suggest
 
-EFFORT = "effort_peak_share"
-"""Column of the largest share of a joint's torque limit."""
-_THROWS_PER_PARAMETER = 3
-_EFFORT_DEGREE = 2
-_FOLDS = 5
-_CELL = 0.05
-"""Width of the cells of targets [m or rad]."""
 _WORTH_KNOWING = 2.0
 """Latents are worth knowing if predictions without them are at least this many times worse."""
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A map that was learned, and how well it predicts.
-
-    Attributes:
-        learned: The map.
-        trials: Numbers of the trials that it was learned from, shape ``(n,)``.
-        ignored: Number of the dataset's throws that did not succeed.
-        validation: How polynomials of several degrees predict throws that they were not fitted to.
-        without_latents: Median error of predictions without latents as inputs; None if there are no latents.
-    """
-
-    learned: LearnedMap
-    trials: NDArray[np.int64]
-    ignored: int
-    validation: Validation
-    without_latents: float | None
-
-    @property
-    def error(self) -> float:
-        """Median distance of a throw from its prediction by a polynomial that it was not fitted to [m or rad]."""
-        return float(np.median(self.validation.best))
-
-    @property
-    def latents_count(self) -> bool:
-        """Whether latents have an effect that is worth knowing."""
-        return self.without_latents is not None and self.without_latents >= _WORTH_KNOWING * self.error
-
-
-def fit_map(
-    dataset: Dataset,
+def fit(
+    dataset: Dataset | StrPath,
     *,
-    kind: Kind = Kind.LOCAL,
+    kind: str = Kind.LOCAL.value,
     targets: Sequence[str] = (),
     parameters: Sequence[str] = (),
-    context: Sequence[str] = (),
-) -> Fit:
-    """Learn from the trials of a dataset that succeeded.
+    given: Sequence[str] = (),
+    where: str | None = None,
+) -> Model:
+    """Learn a model from the throws of a dataset that succeeded.
 
     Args:
-        dataset: The dataset, or a selection of its throws.
-        kind: How predictions are made.
+        dataset: The dataset, or its directory.
+        kind: ``local``: predict by a polynomial, corrected by the nearest throws; or ``polynomial``: by the polynomial
+            alone.
         targets: Columns that say where a trial ended; those of the task by default.
-        parameters: Swept keys that are chosen when aiming; those of the task by default.
-        context: Swept keys that are given with a target; those that the task names by default.
+        parameters: Swept keys that aiming chooses; all of the task by default. The others belong to the world.
+        given: Swept keys whose values are given with a target; those that the task names by default.
+        where: A condition on throws, as `Dataset.select` takes it.
+
+    Raises:
+        ConfigError: If there is no such kind, nothing to aim at, a key was not swept, no throw fulfils the condition,
+            or too few throws succeeded.
+        DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
-    for argument, names in (("targets", targets), ("parameters", parameters), ("given", context)):
-        if twice := [name for name in names if names.count(name) > 1]:
-            raise ConfigError(f"{argument}: {twice[0]} is named twice", expected="each name once")
-    if both := [key for key in parameters if key in context]:
-        raise ConfigError(f"parameters and given: {both[0]} is in both", expected="each key in one of them")
-    config = dataset.config
+    _check_names(targets, parameters, given)
+    chosen = read_word("kind", kind, Kind)
+    if not isinstance(dataset, Dataset):
+        dataset = Dataset.open(dataset)
+    config, selected = dataset.config, _select(dataset, where)
     columns = tuple(targets) or config.task.targets
     if not columns:
         raise ConfigError(
             f"the task {config.task.name} names no targets", expected="columns of the table of throws as targets"
         )
-    throws = dataset.throws.filter(pc.equal(dataset.throws["outcome"], config.task.success))
-    axes = _find_axes(dataset, throws, parameters, context)
-    _check_amount(dataset, throws, axes)
+    throws = selected.throws.filter(pc.equal(selected.throws["outcome"], config.task.success))
+    axes = _find_axes(selected, throws, parameters, given)
+    _check_amount(selected, throws, axes)
     outputs = np.column_stack([_read_numbers(throws, column, dataset) for column in columns])
     values = np.column_stack([_read_numbers(throws, column_of(axis.key), dataset) for axis in axes])
-    trials: NDArray[np.int64] = throws["trial"].to_numpy()
-    fit = fit_throws(kind, axes, columns, values, outputs, _read_numbers(throws, EFFORT, dataset))
-    return replace(fit, trials=trials, ignored=len(dataset) - len(throws))
+    efforts = _read_numbers(throws, EFFORT, dataset)
+    learned, errors, blind = fit_throws(chosen, axes, columns, values, outputs, efforts)
+    return Model(
+        version=__version__,
+        kind=chosen,
+        axes=axes,
+        targets=columns,
+        forward=learned.forward,
+        effort=learned.effort,
+        correction=learned.correction,
+        trained_on=TrainedOn(
+            name=config.name,
+            robot=config.robot.name,
+            task=config.task.name,
+            engine=config.sim.engine,
+            digest=dataset.digest,
+            throws=len(throws),
+            ignored=len(selected) - len(throws),
+            selection=where,
+            folds_error=errors,
+            without_latents=blind,
+            latents_count=blind is not None and blind >= _WORTH_KNOWING * min(errors.values()),
+        ),
+        adaptation=None,
+        points=_tabulate(throws, learned),
+        config=dump_yaml(config),
+    )
 
 
-def fit_throws(
-    kind: Kind, axes: tuple[Axis, ...], targets: tuple[str, ...], values: Array, outputs: Array, efforts: Array
-) -> Fit:
-    """Learn from throws that succeeded.
-
-    Args:
-        kind: How predictions are made.
-        axes: The inputs.
-        targets: Columns that say where a trial ended.
-        values: Inputs in the units of their keys, shape ``(n, n_axes)``.
-        outputs: Where the trials ended, shape ``(n, n_targets)``.
-        efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
-    """
-    inputs, folds = scale_values(axes, values), _assign_folds(outputs)
-    # Latents come last. Products of two latents have little effect, so such terms are left out.
-    minor = sum(axis.role is KeyRole.LATENT for axis in axes)
-    validation = cross_validate(inputs, outputs, folds, minor=minor)
-    known = [axis.role is not KeyRole.LATENT for axis in axes]
-    # The error of predictions without latents tells whether latents are worth knowing.
-    blind = None if all(known) else float(np.median(cross_validate(inputs[:, known], outputs, folds).best))
-    forward = fit_polynomial(inputs, outputs, validation.degree, minor=minor)
-    effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, validation.degree))
-    correction = no_correction(axes, targets)
-    learned = LearnedMap(kind, axes, targets, forward, effort, values, outputs, efforts, correction)
-    return Fit(learned, np.arange(len(inputs)), 0, validation, blind)
+def _check_names(targets: Sequence[str], parameters: Sequence[str], given: Sequence[str]) -> None:
+    for argument, names in (("targets", targets), ("parameters", parameters), ("given", given)):
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ConfigError(f"{argument}: {twice[0]} is named twice", expected="each name once")
+    if both := [key for key in parameters if key in given]:
+        raise ConfigError(f"parameters and given: {both[0]} is in both", expected="each key in one of them")
 
 
-def count_needed_throws(parameters: int) -> int:
-    """Smallest number of throws from which a model with this many parameters can be learned."""
-    return _THROWS_PER_PARAMETER * (parameters + 1)
-
-
-def number_cells(places: Array) -> NDArray[np.int64]:
-    """Numbers of the cell of 5 cm or 0.05 rad that each place lies in, shape ``(n, n_targets)`` as the places."""
-    return np.floor(places / _CELL).astype(np.int64)
+def _select(dataset: Dataset, where: str | None) -> Dataset:
+    if where is None:
+        return dataset
+    selected = dataset.select(find_rows(where, dataset.throws, "where"))
+    if not len(selected):
+        raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
+    return selected
 
 
 def _find_axes(
@@ -167,6 +145,14 @@ def _choose_role(config: Config, key: str, parameters: Sequence[str], context: S
     return KeyRole.PARAMETER if chosen else KeyRole.LATENT
 
 
+def _tabulate(throws: pa.Table, learned: LearnedMap) -> pa.Table:
+    """Make a table of the throws that a map was learned from."""
+    columns = {"trial": throws["trial"].to_numpy()}
+    columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
+    columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
+    return pa.table({**columns, EFFORT: learned.efforts})
+
+
 def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
     """Refuse a dataset that no model can be learned from."""
     chosen = [axis.key for axis in axes if axis.role is KeyRole.PARAMETER]
@@ -194,13 +180,3 @@ def _read_numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
         trial = throws["trial"][int(wrong[0])].as_py()
         raise DatasetError(f"{column} of trial {trial} is {values[wrong[0]]}", path=dataset.directory)
     return values
-
-
-def _assign_folds(outputs: Array) -> NDArray[np.int64]:
-    """Number of the fold of each throw; throws that ended in one cell are in one fold."""
-    # A hash of the cell gives the fold, so that a throw stays in its fold when the dataset grows.
-    numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in number_cells(outputs)]
-    if len(set(numbers)) < 2:
-        # All throws ended in cells of one fold, so nothing would be left to learn from; now their order gives the fold.
-        numbers = [number % _FOLDS for number in range(len(numbers))]
-    return np.array(numbers, np.int64)

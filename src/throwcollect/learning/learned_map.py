@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -11,11 +12,18 @@ from numpy.typing import NDArray
 from pydantic import FiniteFloat
 
 from throwcollect.learning.arrays import Array, Vector
-from throwcollect.learning.polynomial import Polynomial
+from throwcollect.learning.polynomial import Polynomial, cross_validate, fit_polynomial
 from throwcollect.units import unit_of_name
 
+EFFORT = "effort_peak_share"
+"""Column of the largest share of a joint's torque limit."""
 _NEIGHBOURS = 8
 """Number of nearest throws whose residuals correct the polynomial at a point."""
+_THROWS_PER_PARAMETER = 3
+_EFFORT_DEGREE = 2
+_FOLDS = 5
+_CELL = 0.05
+"""Width of the cells of targets [m or rad]."""
 
 
 class Kind(str, Enum):
@@ -217,3 +225,58 @@ def scale_values(axes: tuple[Axis, ...], values: Array) -> Array:
 
 def _list_bounds(axes: tuple[Axis, ...]) -> tuple[Array, Array]:
     return np.array([axis.minimum for axis in axes], np.float64), np.array([axis.maximum for axis in axes], np.float64)
+
+
+def fit_throws(
+    kind: Kind, axes: tuple[Axis, ...], targets: tuple[str, ...], values: Array, outputs: Array, efforts: Array
+) -> tuple[LearnedMap, dict[int, float], float | None]:
+    """Learn from throws that succeeded.
+
+    Args:
+        kind: How predictions are made.
+        axes: The inputs.
+        targets: Columns that say where a trial ended.
+        values: Inputs in the units of their keys, shape ``(n, n_axes)``.
+        outputs: Where the trials ended, shape ``(n, n_targets)``.
+        efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
+
+    Returns:
+        The map; by degree, the median distance of throws from their prediction by polynomials that were fitted to
+        others; the smallest such distance when latents are no inputs, None if there are no latents.
+    """
+    inputs, folds = scale_values(axes, values), _assign_folds(outputs)
+    # Latents come last. Products of two latents have little effect, so such terms are left out.
+    minor = sum(axis.role is KeyRole.LATENT for axis in axes)
+    errors = _find_medians(cross_validate(inputs, outputs, folds, minor=minor))
+    known = [axis.role is not KeyRole.LATENT for axis in axes]
+    # The error of predictions without latents tells whether latents are worth knowing.
+    blind = None if all(known) else min(_find_medians(cross_validate(inputs[:, known], outputs, folds)).values())
+    degree = min(errors, key=errors.__getitem__)
+    forward = fit_polynomial(inputs, outputs, degree, minor=minor)
+    effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, degree))
+    correction = no_correction(axes, targets)
+    return LearnedMap(kind, axes, targets, forward, effort, values, outputs, efforts, correction), errors, blind
+
+
+def _find_medians(errors: dict[int, Array]) -> dict[int, float]:
+    return {degree: float(np.median(each)) for degree, each in errors.items()}
+
+
+def count_needed_throws(parameters: int) -> int:
+    """Smallest number of throws from which a model with this many parameters can be learned."""
+    return _THROWS_PER_PARAMETER * (parameters + 1)
+
+
+def number_cells(places: Array) -> NDArray[np.int64]:
+    """Numbers of the cell of 5 cm or 0.05 rad that each place lies in, shape ``(n, n_targets)`` as the places."""
+    return np.floor(places / _CELL).astype(np.int64)
+
+
+def _assign_folds(outputs: Array) -> NDArray[np.int64]:
+    """Number of the fold of each throw; throws that ended in one cell are in one fold."""
+    # A hash of the cell gives the fold, so that a throw stays in its fold when the dataset grows.
+    numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in number_cells(outputs)]
+    if len(set(numbers)) < 2:
+        # All throws ended in cells of one fold, so nothing would be left to learn from; now their order gives the fold.
+        numbers = [number % _FOLDS for number in range(len(numbers))]
+    return np.array(numbers, np.int64)

@@ -3,58 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field, ValidationError
 
 from throwcollect.arguments import check_bounds, read_word, refuse_argument
-from throwcollect.config.loader import dump_yaml
 from throwcollect.config.task_config import LARGEST_TARGET
-from throwcollect.errors import ConfigError
+from throwcollect.dataset.directory import has_files
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
-from throwcollect.files import StrPath
+from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
 from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs, refuse_far_places
 from throwcollect.learning.aiming import Aim, Choice, aim
-from throwcollect.learning.arrays import Array
-from throwcollect.learning.distilling import distil
-from throwcollect.learning.fitting import Fit, fit_map
-from throwcollect.learning.learned_map import KeyRole, Kind, LearnedMap
-from throwcollect.learning.model_directory import read_model, write_model
-from throwcollect.learning.model_file import AdaptationEntry, ModelFile, TrainedOn, list_found
+from throwcollect.learning.arrays import Array, ModelEntry
+from throwcollect.learning.distilling import ONNX, distil, encode_onnx
+from throwcollect.learning.learned_map import EFFORT, KeyRole, LearnedMap
+from throwcollect.learning.model_card import describe_model
+from throwcollect.learning.model_file import ModelFile
 from throwcollect.learning.score import Score, pool_scores
 from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
+from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.version import __version__
-from throwcollect.wording import format_count
+from throwcollect.wording import command, format_count
 
-if TYPE_CHECKING:
-    from throwcollect.dataset.reader import Dataset
+MODEL = "model.json"
+POINTS = "points.parquet"
+CONFIG = "config.yaml"
+SCORE = "score.json"
+CARD = "README.md"
+_MOST_BYTES = 100_000_000
+
+_File = TypeVar("_File", bound=ModelEntry)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Model:
+class Model(ModelFile):
     """Where throws with given parameters end, and which parameters lead to a target.
 
-    A model is a pure function of the dataset and of the arguments of `fit`, byte for byte.
+    A model is a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`, byte for byte.
+
+    Its other attributes are those of `ModelFile`.
 
     Attributes:
-        file: The model without the throws that it was learned from.
-        learned: The map, with these throws.
-        trials: Numbers of their trials, shape ``(n,)``.
-        config: YAML of the dataset's configuration.
+        points: Arrow table of the throws that it was learned from: ``trial``, inputs, ends, effort; a file of its own.
+        config: YAML of the dataset's configuration; a file of its own.
     """
 
-    file: ModelFile
-    learned: LearnedMap
-    trials: NDArray[np.int64]
-    config: str
+    points: Any = Field(default=None, exclude=True)
+    config: str = Field(default="", exclude=True)
 
     def __repr__(self) -> str:
-        trained = self.file.trained_on
-        learned = f"{trained.name!r}, {self.learned.kind.value}, {format_count(trained.throws, 'throw')}"
+        trained = self.trained_on
+        learned = f"{trained.name!r}, {self.kind.value}, {format_count(trained.throws, 'throw')}"
         return f"Model({learned}: {', '.join((*self.targets, *self.given))} -> {', '.join(self.parameters)})"
+
+    @cached_property
+    def learned(self) -> LearnedMap:
+        """The map, with the throws that it was learned from."""
+        columns = {name: self.points[name].to_numpy() for name in self.points.column_names}
+        return LearnedMap(
+            self.kind,
+            self.axes,
+            self.targets,
+            self.forward,
+            self.effort,
+            np.column_stack([columns[axis.key] for axis in self.axes]),
+            np.column_stack([columns[target] for target in self.targets]),
+            columns[EFFORT],
+            self.correction,
+        )
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -70,11 +89,6 @@ class Model:
     def latents(self) -> tuple[str, ...]:
         """Keys of the world, whose values are only known from throws."""
         return tuple(axis.key for axis in self.learned.axes_of(KeyRole.LATENT))
-
-    @property
-    def targets(self) -> tuple[str, ...]:
-        """Columns of the table of throws that say where a trial ended."""
-        return self.learned.targets
 
     def predict(self, points: Sequence[Mapping[str, float]]) -> Array:
         """Where throws should end, in the units of the targets, shape ``(n_points, n_targets)``.
@@ -148,7 +162,7 @@ class Model:
             check_bounds(name, number, least=1)
         check_bounds("seed", seed, least=0)
         _check_scatter(scatter)
-        distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
+        distilled = None if self.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
             score_model(
                 self.learned,
@@ -157,8 +171,8 @@ class Model:
                 seed=each,
                 world=world,
                 scatter=scatter,
-                error=self.file.trained_on.error,
-                latents_count=self.file.trained_on.latents_count,
+                error=self.trained_on.error,
+                latents_count=self.trained_on.latents_count,
                 distilled=distilled,
                 processes=processes,
             )
@@ -205,30 +219,20 @@ class Model:
         refuse_far_inputs(self.learned, KeyRole.CONTEXT, context)
         refuse_far_places(self.learned, measured)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
-        deviation = float(np.hypot(scatter, self.file.trained_on.error))
-        adapted = adapt(
+        deviation = float(np.hypot(scatter, self.trained_on.error))
+        correction, adaptation = adapt(
             self.learned,
             parameters,
             context,
             measured,
             method=chosen,
             scatter=deviation,
-            latents_count=self.file.trained_on.latents_count,
+            latents_count=self.trained_on.latents_count,
         )
-        learned = self.learned.correct(adapted.correction)
-        entry = AdaptationEntry(
-            method=adapted.method,
-            throws=len(measured),
-            scatter=deviation,
-            before=adapted.before.tolist(),
-            after=adapted.after.tolist(),
-            found=list_found(learned, adapted.method, adapted.deviations),
-        )
-        file = self.file.model_copy(
-            update={"correction": adapted.correction, "adaptation": entry, "version": __version__, "distilled": None}
-        )
-        world = replace(self, file=file, learned=learned)
-        return world if self.file.distilled is None else world.distil()
+        # The map of the other world shares what was computed from the throws.
+        changed = {"correction": correction, "learned": self.learned.correct(correction)}
+        world = self.model_copy(update={**changed, "adaptation": adaptation, "version": __version__, "distilled": None})
+        return world if self.distilled is None else world.distil()
 
     def distil(self) -> Model:
         """Add one polynomial from targets to parameters, which `save` writes into ``model.onnx``, too.
@@ -237,7 +241,7 @@ class Model:
             MissingExtraError: If the package ``onnx`` is not installed.
         """
         require("onnx")
-        return replace(self, file=self.file.model_copy(update={"distilled": distil(self.learned)}))
+        return self.model_copy(update={"distilled": distil(self.learned)})
 
     def save(self, directory: StrPath) -> None:
         """Write the model into a directory that is new or empty.
@@ -247,7 +251,19 @@ class Model:
             DatasetError: If it cannot be written.
             MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
-        write_model(Path(directory), self.file, self.learned, self.trials, self.config)
+        onnx = None if self.distilled is None else encode_onnx(self.learned, self.distilled)
+        with new_directory(Path(directory)) as beside:
+            write_file(beside / MODEL, (self.model_dump_json(indent=1) + "\n").encode())
+            write_file(beside / POINTS, encode_table(self.points))
+            write_file(beside / CONFIG, self.config.encode())
+            write_file(beside / CARD, describe_model(self, None).encode())
+            if onnx is not None:
+                write_file(beside / ONNX, onnx)
+
+    def write_score(self, directory: Path, score: Score) -> None:
+        """Write a score into the directory of this model, in place of an earlier one, and into the model's card."""
+        write_file(directory / SCORE, (score.model_dump_json(indent=1) + "\n").encode())
+        write_file(directory / CARD, describe_model(self, score).encode())
 
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points."""
@@ -270,80 +286,49 @@ class Model:
         return parameters, self.learned.scale(KeyRole.CONTEXT, values[:, split:])
 
 
-def fit(
-    dataset: Dataset | StrPath,
-    *,
-    kind: str = Kind.LOCAL.value,
-    targets: Sequence[str] = (),
-    parameters: Sequence[str] = (),
-    given: Sequence[str] = (),
-    where: str | None = None,
-) -> Model:
-    """Learn a model from the throws of a dataset that succeeded.
-
-    Args:
-        dataset: The dataset, or its directory.
-        kind: ``local``: predict by a polynomial, corrected by the nearest throws; or ``polynomial``: by the polynomial
-            alone.
-        targets: Columns that say where a trial ended; those of the task by default.
-        parameters: Swept keys that aiming chooses; all of the task by default. The others belong to the world.
-        given: Swept keys whose values are given with a target; those that the task names by default.
-        where: A condition on throws, as `Dataset.select` takes it.
-
-    Raises:
-        ConfigError: If there is no such kind, nothing to aim at, a key was not swept, no throw fulfils the condition,
-            or too few throws succeeded.
-        DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
-    """
-    from throwcollect.dataset.reader import Dataset
-    from throwcollect.dataset.selection import find_rows
-
-    chosen = read_word("kind", kind, Kind)
-    if not isinstance(dataset, Dataset):
-        dataset = Dataset.open(dataset)
-    throws = dataset
-    if where is not None:
-        throws = dataset.select(find_rows(where, dataset.throws, "where"))
-        if not len(throws):
-            raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
-    found = fit_map(throws, kind=chosen, targets=tuple(targets), parameters=tuple(parameters), context=tuple(given))
-    return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
-
-
 def load_model(directory: StrPath) -> Model:
     """Read a model from its directory.
 
     Raises:
         DatasetError: If there is none, or it is damaged.
     """
-    return Model(*read_model(Path(directory)))
+    directory = Path(directory)
+    path = directory / MODEL
+    try:
+        text = read_text(path, most_bytes=_MOST_BYTES)
+    except DatasetError as error:
+        if not isinstance(error.__cause__, FileNotFoundError):
+            raise
+        # Users easily give a dataset in place of its model, so the hint makes a model of it.
+        dataset = directory if has_files(directory) else "DATASET"
+        hint = command("fit", dataset, "-o", "MODEL")
+        problem = f"holds no model: there is no {MODEL}{suggest_path(directory)}"
+        raise DatasetError(problem, path=directory, hint=hint) from error
+    model = _read_json(Model, text, path)
+    points = read_parquet(directory / POINTS)
+    names = {"trial", *(axis.key for axis in model.axes), *model.targets, EFFORT}
+    if set(points.column_names) != names:
+        expected = ", ".join(sorted(names))
+        raise DatasetError("does not have the columns of this model", path=directory / POINTS, expected=expected)
+    config = read_text(directory / CONFIG, most_bytes=_MOST_BYTES)
+    return model.model_copy(update={"points": points, "config": config})
 
 
-def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
-    learned, validation = found.learned, found.validation
-    return ModelFile(
-        version=__version__,
-        kind=learned.kind,
-        axes=learned.axes,
-        targets=learned.targets,
-        forward=learned.forward,
-        effort=learned.effort,
-        correction=learned.correction,
-        trained_on=TrainedOn(
-            name=dataset.config.name,
-            robot=dataset.config.robot.name,
-            task=dataset.config.task.name,
-            engine=dataset.config.sim.engine,
-            digest=dataset.digest,
-            throws=len(found.trials),
-            ignored=found.ignored,
-            selection=where,
-            folds_error={degree: float(np.median(errors)) for degree, errors in validation.errors.items()},
-            without_latents=found.without_latents,
-            latents_count=found.latents_count,
-        ),
-        adaptation=None,
-    )
+def read_score(directory: Path) -> Score | None:
+    """Read the score of a model from its directory; None if it has none."""
+    path = directory / SCORE
+    return _read_json(Score, read_text(path, most_bytes=_MOST_BYTES), path) if path.exists() else None
+
+
+def _read_json(kind: type[_File], text: str, path: Path) -> _File:
+    try:
+        return kind.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise DatasetError(
+            f"{where + ': ' if where else ''}{first['msg']}", path=path, hint="throwcollect fit makes models"
+        ) from error
 
 
 def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequence[str]) -> Array:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from throwcollect.learning.adapting import Method
+from throwcollect.learning.adapting import Adaptation, Method
 from throwcollect.learning.learned_map import Axis
-from throwcollect.learning.model_file import AdaptationEntry, ModelFile
-from throwcollect.learning.score import SCORE_HEAD, Score, ScoreRow, format_length, format_scatter
+from throwcollect.learning.model_file import ModelFile
+from throwcollect.learning.score import SCORE_HEAD, Score, format_length, format_scatter
 from throwcollect.wording import format_count
 
 PROGRAM = """\
@@ -118,7 +118,7 @@ def _describe_axis(axis: Axis) -> str:
     )
 
 
-def _describe_adaptation(adaptation: AdaptationEntry, file: ModelFile) -> list[str]:
+def _describe_adaptation(adaptation: Adaptation, file: ModelFile) -> list[str]:
     throws = format_count(adaptation.throws, "throw")
     if adaptation.method is Method.NONE:
         return ["## Adapted to another world", "", f"{throws} there did not speak for any difference.", ""]
@@ -145,13 +145,14 @@ def _describe_adaptation(adaptation: AdaptationEntry, file: ModelFile) -> list[s
 def _describe_score(score: Score, file: ModelFile) -> list[str]:
     targets = format_count(score.targets, "target")
     rows = score.list_rows()
+    here = len(rows) - len(score.adapted)
     lines = [
         "## How it hits",
         "",
         f"Misses of {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
         "the seeds; each draws targets, the throws that were learned from, and those in another world; in simulation:",
         "",
-        *_tabulate([row for row in rows if not row.elsewhere]),
+        *_tabulate(rows[:here]),
         "",
     ]
     if score.adapted:
@@ -163,14 +164,14 @@ def _describe_score(score: Score, file: ModelFile) -> list[str]:
         lines += [
             f"In another world{scatter}, at those of these targets that can be reached there, in simulation:",
             "",
-            *_tabulate([row for row in rows if row.elsewhere]),
+            *_tabulate(rows[here:]),
             "",
         ]
     return lines
 
 
-def _tabulate(rows: Sequence[ScoreRow]) -> list[str]:
-    lines = [("", *SCORE_HEAD), ("---",) * (len(SCORE_HEAD) + 1), *(row.cells for row in rows)]
+def _tabulate(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    lines = [("", *SCORE_HEAD), ("---",) * (len(SCORE_HEAD) + 1), *rows]
     return [f"| {' | '.join(cells)} |" for cells in lines]
 
 

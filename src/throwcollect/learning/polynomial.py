@@ -67,27 +67,6 @@ class Polynomial:
         return np.stack(slopes, axis=-1)
 
 
-@dataclass(frozen=True, eq=False)
-class Validation:
-    """How well polynomials of several degrees predict samples that they were not fitted to.
-
-    Attributes:
-        errors: By degree: distance of each sample from its prediction, shape ``(n,)``.
-    """
-
-    errors: dict[int, Array]
-
-    @property
-    def degree(self) -> int:
-        """The degree with the smallest median error."""
-        return min(self.errors, key=lambda degree: float(np.median(self.errors[degree])))
-
-    @property
-    def best(self) -> Array:
-        """Errors of that degree, shape ``(n,)``."""
-        return self.errors[self.degree]
-
-
 def fit_polynomial(inputs: Array, outputs: Array, degree: int, *, minor: int = 0) -> Polynomial:
     """Fit a polynomial by least squares.
 
@@ -101,7 +80,7 @@ def fit_polynomial(inputs: Array, outputs: Array, degree: int, *, minor: int = 0
     return _solve(exponents, _Sums.of(inputs, outputs, exponents))
 
 
-def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, minor: int = 0) -> Validation:
+def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, minor: int = 0) -> dict[int, Array]:
     """Predict each sample by polynomials that were fitted to the other folds.
 
     Args:
@@ -109,6 +88,9 @@ def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, m
         outputs: Shape ``(n, n_outputs)``.
         folds: Number of the fold of each sample, shape ``(n,)``.
         minor: Number of minor inputs, as `list_exponents` takes it.
+
+    Returns:
+        By degree: distance of each sample from its prediction, shape ``(n,)``.
     """
     errors: dict[int, Array] = {}
     numbers = np.unique(folds)
@@ -129,7 +111,7 @@ def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, m
             missed = _solve(exponents, others).predict(inputs[held]) - outputs[held]
             distances[held] = np.linalg.norm(missed, axis=1)
         errors[degree] = distances
-    return Validation(errors)
+    return errors
 
 
 def list_exponents(inputs: int, degree: int, *, minor: int = 0) -> NDArray[np.int64]:

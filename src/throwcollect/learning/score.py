@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -53,6 +52,15 @@ class Errors(MissStatistics):
         """Misses over the targets of each unit."""
         return self, *self.others
 
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """What `SCORE_HEAD` names, for people; misses are those of all units."""
+        misses = (
+            ", ".join(dict.fromkeys(format_distance(getattr(each, name), each.unit) for each in self.by_unit))
+            for name in ("median", "share90", "largest")
+        )
+        return (*misses, str(self.throws), str(self.missed))
+
     @classmethod
     def of(cls, away: Array, targets: Sequence[str]) -> Errors:
         """Sum up how far throws ended from their targets.
@@ -78,15 +86,6 @@ def list_units(targets: Sequence[str]) -> list[str]:
     """Units of targets, each once: metres first, the others in order."""
     units = dict.fromkeys(unit_of_name(target) for target in targets)
     return sorted(units, key=lambda unit: unit != "m")
-
-
-def format_misses(errors: Errors) -> tuple[str, str, str]:
-    """Write median, share90 and largest for people, each for all units."""
-    median, share90, largest = (
-        ", ".join(dict.fromkeys(format_distance(getattr(each, name), each.unit) for each in errors.by_unit))
-        for name in ("median", "share90", "largest")
-    )
-    return median, share90, largest
 
 
 def format_length(length: float | None, targets: Sequence[str]) -> str:
@@ -162,26 +161,6 @@ class ThrowAtTarget(ModelEntry):
     place: list[FiniteFloat] | None
 
 
-@dataclass(frozen=True)
-class ScoreRow:
-    """A row of the table of a score.
-
-    Attributes:
-        label: Which model threw.
-        errors: How it hits.
-        elsewhere: Whether it threw in another world.
-    """
-
-    label: str
-    errors: Errors
-    elsewhere: bool = False
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """The label, and what `SCORE_HEAD` names."""
-        return (self.label, *format_misses(self.errors), str(self.errors.throws), str(self.errors.missed))
-
-
 class Score(ModelEntry):
     """All results of a model; all numbers are from simulation.
 
@@ -208,14 +187,17 @@ class Score(ModelEntry):
     adapted: list[Adapted]
     adapted_throws: list[ThrowAtTarget] = Field(repr=False)
 
-    def list_rows(self) -> list[ScoreRow]:
-        """Make the table of all results, for people."""
-        rows = [ScoreRow(f"learned from {each.trained_on:,} throws", each.errors) for each in self.trained]
+    def list_rows(self) -> list[tuple[str, ...]]:
+        """Make the table of all results, for people: which model threw, and what `SCORE_HEAD` names.
+
+        The last ones, as many as `adapted`, are those in the other world.
+        """
+        rows = [(f"learned from {each.trained_on:,} throws", *each.errors.cells) for each in self.trained]
         if self.distilled is not None:
-            rows.append(ScoreRow("model.onnx of these", self.distilled))
+            rows.append(("model.onnx of these", *self.distilled.cells))
         for each in self.adapted:
             after = f"after {format_count(each.real_throws, 'throw')} ({each.method.value})"
-            rows.append(ScoreRow(f"in the other world {after}", each.errors, elsewhere=True))
+            rows.append((f"in the other world {after}", *each.errors.cells))
         return rows
 
 

@@ -13,8 +13,16 @@ from throwcollect.learning.adapting import Adaptation, adapt, leave_as_it_is
 from throwcollect.learning.aiming import aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import DistilledMap
-from throwcollect.learning.fitting import count_needed_throws, fit_throws, number_cells
-from throwcollect.learning.learned_map import KeyRole, LearnedMap, find_nearest, no_correction
+from throwcollect.learning.learned_map import (
+    Correction,
+    KeyRole,
+    LearnedMap,
+    count_needed_throws,
+    find_nearest,
+    fit_throws,
+    no_correction,
+    number_cells,
+)
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
 from throwcollect.progress_log import log_progress
 from throwcollect.side_by_side import limit_processes
@@ -116,7 +124,7 @@ def _adapt_step_by_step(
     error: float,
     latents_count: bool,
     processes: int,
-) -> dict[int, Adaptation]:
+) -> dict[int, tuple[Correction, Adaptation]]:
     """Throw in another world, and adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
     context = _find_nominal_context(learned)
     tries = spread_first(draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + _APART))
@@ -127,7 +135,7 @@ def _adapt_step_by_step(
     # The second number of the seed makes this sequence independent of the sequence for targets.
     noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
     parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
-    found = {0: leave_as_it_is(learned, np.empty(0))}
+    found = {0: leave_as_it_is(learned, np.empty(0), scatter)}
     for number in sorted({min(number, len(measured)) for number in REAL_THROWS} - {0}):
         found[number] = adapt(
             learned,
@@ -141,7 +149,11 @@ def _adapt_step_by_step(
 
 
 def _throw_there(
-    learned: LearnedMap, adaptations: Mapping[int, Adaptation], targets: Array, world: Simulates, processes: int
+    learned: LearnedMap,
+    adaptations: Mapping[int, tuple[Correction, Adaptation]],
+    targets: Array,
+    world: Simulates,
+    processes: int,
 ) -> tuple[list[Adapted], list[ThrowAtTarget]]:
     """Throw in another world at the targets that can be reached there, once with each adaptation.
 
@@ -149,7 +161,7 @@ def _throw_there(
         How each adaptation hits, and the throws of the last one; both empty if no target can be reached.
     """
     given = np.tile(_find_nominal_context(learned), (len(targets), 1))
-    worlds = [learned.correct(each.correction) for each in adaptations.values()]
+    worlds = [learned.correct(correction) for correction, _ in adaptations.values()]
     reachable = aim(worlds[-1], targets, given).reachable
     targets, given = targets[reachable], given[reachable]
     if not len(targets):
@@ -158,7 +170,7 @@ def _throw_there(
     found = _throw(learned, lists, given, world, processes)
     adapted = [
         Adapted(real_throws=number, method=each.method, errors=Errors.of(places - targets, learned.targets))
-        for (number, each), places in zip(adaptations.items(), found, strict=True)
+        for (number, (_, each)), places in zip(adaptations.items(), found, strict=True)
     ]
     return adapted, _list_throws(targets, found[-1])
 
@@ -215,7 +227,7 @@ def _find_nominal_context(learned: LearnedMap) -> Array:
 def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap:
     """Learn a map from some throws of the dataset, drawn at random."""
     drawn = np.sort(np.random.default_rng((seed, 2)).permutation(len(learned.inputs))[:size])
-    fit = fit_throws(
+    fit, _, _ = fit_throws(
         learned.kind,
         learned.axes,
         learned.targets,
@@ -223,7 +235,7 @@ def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap:
         learned.outputs[drawn],
         learned.efforts[drawn],
     )
-    return fit.learned
+    return fit
 
 
 def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Simulates, processes: int) -> list[Array]:

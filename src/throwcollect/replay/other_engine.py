@@ -18,9 +18,6 @@ from throwcollect.replay.audit import simulate_side_by_side
 from throwcollect.sim.simulator import Simulator
 from throwcollect.wording import join_names, suggest
 
-LANDING = ("landing_x_m", "landing_y_m")
-"""Columns with the place where a throw landed."""
-
 
 @dataclass(frozen=True)
 class Deviation:

@@ -1,1 +1,1 @@
-"""A report on a dataset: one page that needs nothing else, and pictures for papers."""
+"""A report on a dataset: one page that needs nothing else."""

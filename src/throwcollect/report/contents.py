@@ -1,8 +1,8 @@
-"""The parts of a report, before they become a page or pictures."""
+"""The parts of a report before they become a page, and amounts as people write them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import plotly.graph_objects as go
@@ -17,21 +17,16 @@ class Panel:
         title: Short title, as text.
         figure: The figure, with its height.
         text: Caption, as text.
-        picture: Name of the picture for papers; panels with the same name stand below one another in one picture. Empty
-            for none.
         width_px: Width below which it scrolls [px]; with 0, it shrinks with the page instead.
         small: True if a third of the width of the page is enough.
-        on_page: False if the page shows the same in another way, so that the panel is only a picture.
     """
 
     key: str
     title: str
     figure: go.Figure
     text: str = ""
-    picture: str = ""
     width_px: int = 0
     small: bool = False
-    on_page: bool = True
 
 
 @dataclass(frozen=True)
@@ -79,11 +74,6 @@ class ReportSection:
     text: str
     blocks: tuple[Row | Table | Listing | str, ...] = ()
 
-    @property
-    def panels(self) -> Iterator[Panel]:
-        """All its panels, in order."""
-        return (panel for block in self.blocks if isinstance(block, tuple) for panel in block)
-
 
 @dataclass(frozen=True)
 class Tile:
@@ -108,3 +98,26 @@ class TaskReport:
     tiles: tuple[Tile, ...]
     results: tuple[ReportSection, ...]
     episodes: tuple[ReportSection, ...]
+
+
+def format_share(count: int, total: int) -> str:
+    """A share in percent; only all is 100 % and only none is 0 %."""
+    percent = 100 * count / total
+    if 0 < count < total:
+        percent = min(max(percent, 0.1), 99.9)
+    return f"{percent:.3g} %" if percent in (0, 100) else f"{percent:.1f} %"
+
+
+def format_duration(seconds: float) -> str:
+    """A time in seconds, minutes or hours."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:,.1f} h"
+
+
+def format_size(count: int) -> str:
+    """A number of bytes in kB, MB or GB."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6)):
+        if count >= size:
+            return f"{count / size:.1f} {unit}"
+    return f"{count / 1e3:.0f} kB"

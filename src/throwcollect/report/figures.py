@@ -1,4 +1,4 @@
-"""Figures that any dataset has, in plotly; `painter` draws the same ones with matplotlib for print.
+"""Figures that any dataset has.
 
 Text, sizes and colours of the theme are the page's own.
 """
@@ -12,11 +12,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from throwcollect.report.joint_peaks import JointPeaks
+from throwcollect.report.measured import JointPeaks, SweptKey, Throughput, choose_points
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.plotted_points import choose_points
-from throwcollect.report.swept_keys import SweptKey
-from throwcollect.report.throughput import Throughput
 
 BLUE = style_of(LANDED).colour
 NEUTRAL = "#8a8f98"
@@ -107,22 +104,6 @@ def _matrix_range(parameter: SweptKey) -> list[float]:
 def _name_axis(letter: str, index: int) -> str:
     """Name of an axis: with ``x`` in a trace, with ``xaxis`` in a layout."""
     return letter if index == 0 else f"{letter}{index + 1}"
-
-
-def draw_outcome_bars(outcomes: Outcomes) -> go.Figure:
-    """Draw number and share of trials of each outcome, the first one on top."""
-    rows = list(reversed(outcomes.counts.items()))
-    total, most = len(outcomes.codes), max(outcomes.counts.values())
-    bars = go.Bar(
-        x=[count for _, count in rows],
-        y=[in_words(name) for name, _ in rows],
-        text=[f"{count} ({count / total:.1%})" for _, count in rows],
-        textposition="outside",
-        orientation="h",
-        marker_color=[outcomes.style_of(name).colour for name, _ in rows],
-    )
-    figure = go.Figure(bars).update_xaxes(title="trials", range=[0, 1.3 * most], showgrid=False)
-    return figure.update_layout(height=72 + 41 * len(rows))
 
 
 def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:

@@ -11,12 +11,11 @@ import plotly.graph_objects as go
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
-from throwcollect.learning.model import Model, load_model
-from throwcollect.learning.model_directory import read_score
+from throwcollect.learning.model import Model, load_model, read_score
 from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, Score, ThrowAtTarget, format_length
 from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
-from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
+from throwcollect.report.targets import choose_scale, draw_miss_map, title_column, title_misses
 from throwcollect.units import choose_shown_unit
 from throwcollect.wording import command, format_count
 
@@ -28,7 +27,7 @@ _NOUNS = {"m": "distance", "rad": "angle"}
 def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     """Show how a model of a dataset hits targets, from the directory of the model."""
     model, score = load_model(directory), read_score(directory)
-    trained = model.file.trained_on
+    trained = model.trained_on
     if trained.digest != dataset.digest:
         raise ConfigError(
             f"{directory}: was learned from {trained.name}, digest {trained.digest[:10]}",
@@ -48,7 +47,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     seeds = format_count(score.seeds, "seed")
     text += f" Misses are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
-        _show_misses("targets", "Targets", model, score.throws, dataset.config.task, picture="targets"),
+        _show_misses("targets", "Targets", model, score.throws, dataset.config.task),
         *_show_errors(
             "training",
             "Misses by number of throws learned from",
@@ -72,9 +71,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     return ReportSection("model", "Model", _TITLE, text, tuple(rows))
 
 
-def _show_misses(
-    key: str, shown: str, model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig, *, picture: str = ""
-) -> Panel:
+def _show_misses(key: str, shown: str, model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig) -> Panel:
     """Show targets amid the places that the dataset reached, and a line for each miss."""
     shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
     targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
@@ -82,7 +79,7 @@ def _show_misses(
     titles = [title_column(column, task) for column in model.targets]
     times = choose_scale(targets, places)
     figure = draw_miss_map(model.learned.outputs, targets, places, titles, task, times=times)
-    return Panel(key, title_misses(shown, times), figure, picture=picture)
+    return Panel(key, title_misses(shown, times), figure)
 
 
 def _show_errors(
@@ -92,7 +89,7 @@ def _show_errors(
     throws = [count for count, _ in errors]
     for number, misses in enumerate(zip(*(each.by_unit for _, each in errors), strict=True)):
         figure = _draw_errors(throws, misses).update_xaxes(x).update_yaxes(y)
-        yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure, picture=key)
+        yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure)
 
 
 def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go.Figure:
@@ -112,5 +109,4 @@ def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go
 
 
 def _tabulate(score: Score) -> Table:
-    rows = tuple(row.cells for row in score.list_rows())
-    return Table(head=("", *SCORE_HEAD), rows=rows, number_columns=(1, 2, 3, 4, 5))
+    return Table(head=("", *SCORE_HEAD), rows=tuple(score.list_rows()), number_columns=(1, 2, 3, 4, 5))

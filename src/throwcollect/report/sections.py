@@ -17,14 +17,30 @@ from throwcollect.dataset.summary import Info
 from throwcollect.files import read_text
 from throwcollect.members import explain_failure, load_part
 from throwcollect.report import figures
-from throwcollect.report.amounts import format_duration, format_share, format_size
-from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, TaskReport, Tile
-from throwcollect.report.joint_peaks import KINDS, JointPeaks, summarise_peaks
+from throwcollect.report.contents import (
+    Listing,
+    Panel,
+    ReportSection,
+    Row,
+    Table,
+    TaskReport,
+    Tile,
+    format_duration,
+    format_share,
+    format_size,
+)
+from throwcollect.report.measured import (
+    KINDS,
+    JointPeaks,
+    SweptKey,
+    Throughput,
+    measure_throughput,
+    read_parameters,
+    summarise_peaks,
+)
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.swept_keys import SweptKey, read_parameters
-from throwcollect.report.targets_section import show_targets
-from throwcollect.report.throughput import Throughput, measure_throughput
+from throwcollect.report.targets import show_targets
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest
 from throwcollect.tasks.task import task_of
@@ -163,7 +179,6 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
         title="Values of all trials" if len(shown) == 1 else "Each pair of keys, and on the diagonal each key alone",
         figure=figures.draw_parameter_matrix(shown, outcomes),
         text=" ".join(notes),
-        picture="parameters",
         width_px=90 + 105 * len(shown),
     )
     table = Table(
@@ -182,9 +197,7 @@ def _show_outcomes(
     outcomes: Outcomes, parameters: tuple[SweptKey, ...], failures: tuple[FailureGroup, ...], noun: str
 ) -> ReportSection:
     title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
-    # The page shows the same numbers in a bar at its head.
-    bars = Panel("all", title, figures.draw_outcome_bars(outcomes), picture="outcomes", on_page=False)
-    blocks: list[Row | Table] = [(bars,)]
+    blocks: list[Row | Table] = []
     failed = trials - outcomes.succeeded
     text = f"All {trials:,} {noun}s {in_words(outcomes.success)}."
     if failed:
@@ -221,7 +234,6 @@ def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> ReportS
             key=kind,
             title=f"{kind.capitalize()} over its limit",
             figure=figures.draw_limit_boxes(joints),
-            picture="limits",
             small=True,
         )
         for kind, joints in peaks.items()

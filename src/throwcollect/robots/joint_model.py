@@ -28,7 +28,7 @@ def joint_model(robot: Robot) -> pinocchio.Model:
     source = robot.description.model
     # Pinocchio gets the links and joints alone: it would take other things from the file than the strict reader.
     bare = replace(source, links=tuple(replace(link, shapes=()) for link in source.links))
-    with reading_natively(str(robot.urdf_path)):
+    with reading_natively():
         try:
             model = pinocchio.buildModelFromXML(bare.write_urdf())
         except (ValueError, RuntimeError) as error:

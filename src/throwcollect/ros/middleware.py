@@ -13,7 +13,7 @@ from functools import cache
 from typing import Literal
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros_installation import how_to_install, missing, rmws
+from throwcollect.ros_installation import HOW_TO_INSTALL, missing, rmws
 from throwcollect.wording import join_names
 
 VARIABLE = "THROWCOLLECT_ROS"
@@ -115,7 +115,7 @@ def _choose_installed(backend: str, rmw: str | None) -> Middleware:
             return Middleware()
         raise ConfigError(
             f"{VARIABLE} is rclpy, but Python does not find {join_names(lacking)}",
-            hint=f"{how_to_install()}; or set it to embedded",
+            hint=f"{HOW_TO_INSTALL}; or set it to embedded",
         )
     installed = rmws()
     if rmw is None or rmw in installed:

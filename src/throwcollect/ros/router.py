@@ -33,7 +33,7 @@ from throwcollect.ros.fast_dds import server_profile, write_temporarily
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
 from throwcollect.ros.zenoh_errors import zenoh_errors
-from throwcollect.ros_installation import how_to_install
+from throwcollect.ros_installation import HOW_TO_INSTALL
 from throwcollect.run_key import RunKey
 
 _PROGRAM = "fast-discovery-server"
@@ -230,7 +230,7 @@ def _find_program() -> str:
     if program is None:
         raise ConfigError(
             f"there is no program {_PROGRAM}, by which nodes on Fast DDS find each other",
-            hint=f"it comes with Fast DDS: {how_to_install()}; or set run.ros to embedded",
+            hint=f"it comes with Fast DDS: {HOW_TO_INSTALL}; or set run.ros to embedded",
         )
     return program
 

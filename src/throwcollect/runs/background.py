@@ -127,7 +127,6 @@ def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin
         started=datetime.now(timezone.utc),
         launcher=0,
         simulations=0,
-        begun_in=os.getcwd(),
         kind=kind,
         origin=origin,
     )

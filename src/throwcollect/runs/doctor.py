@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import socket
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -37,9 +36,6 @@ from throwcollect.wording import format_count, join_names
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
 """Upper limit of the resident memory of one simulation."""
-
-_ROS_ROUTER_PORT = 7447
-"""Port at which ROS 2 nodes on rmw_zenoh_cpp look for a router."""
 
 _LEAST_DISK_GIB = 1.0
 _DIGITS = 10
@@ -124,28 +120,14 @@ def _check_state() -> Check:
         return Check("state", "problem", error.one_line)
 
 
-def _check_port() -> Check:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", _ROS_ROUTER_PORT))
-        except OSError as error:
-            return Check(
-                "ports", "note", f"{_ROS_ROUTER_PORT} is taken ({error.strerror}); runs use a free port by default"
-            )
-    return Check("ports", "ok", f"{_ROS_ROUTER_PORT}, where ROS nodes look for a router, is free")
-
-
 def _check_rclpy() -> Check:
     lacking = ros_installation.missing()
     if "rclpy" in lacking:
-        return Check("rclpy", "note", f"not installed; to have it: {ros_installation.how_to_install()}")
+        return Check("rclpy", "note", f"not installed; to have it: {ros_installation.HOW_TO_INSTALL}")
     rmws = join_names(ros_installation.rmws()) or "no RMW"
     found = f"{ros_installation.rclpy_version() or 'of unknown version'} with {rmws}"
     if lacking:
-        return Check(
-            "rclpy", "note", f"{found}, without {join_names(lacking)}; try: {ros_installation.how_to_install()}"
-        )
+        return Check("rclpy", "note", f"{found}, without {join_names(lacking)}; try: {ros_installation.HOW_TO_INSTALL}")
     return Check("rclpy", "ok", f"{found} and all interfaces")
 
 
@@ -184,6 +166,5 @@ def examine(directory: Path) -> list[Check]:
         *(check() for check in machine),
         *of_runtimes,
         _check_state(),
-        _check_port(),
         _check_disk(directory),
     ]

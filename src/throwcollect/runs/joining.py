@@ -7,6 +7,8 @@ import socket
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
@@ -14,7 +16,6 @@ from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import UnreachableError, WorkerError
 from throwcollect.files import write_file
-from throwcollect.own_directory import make_own_directory
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import answers
@@ -48,7 +49,8 @@ def join_run(
     """
     token = JoinToken.decode(word)
     token.check_build()
-    with make_own_directory("throwcollect-join-") as scratch:
+    with TemporaryDirectory(prefix="throwcollect-join-") as made:
+        scratch = Path(made)
         key = RunKey(scratch / "key")
         key.create(bytes.fromhex(token.secret))
         connection = Connection(token.endpoint, key, token.domain_id)

@@ -287,7 +287,6 @@ def _make_record(
         started=request.started,
         launcher=os.getpid(),
         simulations=choice.runtime.simulations(request.config),
-        begun_in=os.getcwd(),
         middleware=choice.middleware,
         origin=request.origin,
     )

@@ -98,7 +98,6 @@ class RunRecord:
         left: Whether containers of the run may still exist, because its launcher did not remove them.
         failure: The error with which the run ended; None if there was none.
         summary: Summary of the dataset; None if the dataset is not finished.
-        begun_in: Absolute path of the directory in which the run was begun.
         middleware: The middleware that carries the messages of the nodes.
         origin: The request of a client; None if a command or a program began the run.
         stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.
@@ -124,7 +123,6 @@ class RunRecord:
     left: bool = False
     failure: RunFailure | None = None
     summary: Summary | None = None
-    begun_in: str = ""
     middleware: Middleware = _EMBEDDED
     kind: Kind = "collection"
     origin: Origin | None = None

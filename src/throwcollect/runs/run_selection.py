@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from throwcollect.dataset.directory import config_path
@@ -17,51 +16,18 @@ from throwcollect.runtimes.runtime import HeldRun
 from throwcollect.wording import command, suggest
 
 
-def find_run_to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
-    """Find the run that a command is to change; `command` is its name without the option ``--run``, for hints.
-
-    The user names the run as for `id_of`. None takes the only run that lives (with `died`, also one whose launcher
-    died) and that belongs to the current directory, because it was begun there or its dataset lies below.
-    """
-    if named is not None:
-        return records.get(id_of(records, named))
-    runs = records.all()
-    candidates = [run for run in runs if run.status == "running" or (died and run.status == "died")]
-    here = [run for run in candidates if _belongs_here(run.record)]
-    if not here and len(candidates) == 1:
-        (other,) = candidates
-        raise ConfigError(
-            f"no run of this directory lives; {other.id} was begun in {other.record.begun_in}",
-            hint=f"throwcollect {command} --run {other.id}, if that one is meant",
-        )
-    return _require_only_run(here or candidates)
-
-
 def find(named: StrPath) -> Run:
-    """Find a run of this machine by its id, the beginning of its id, or the directory of its dataset; see `id_of`."""
+    """Find a run of this machine by its id, a unique beginning of its id, or the directory of its dataset."""
     records = Records()
     return records.get(id_of(records, named))
 
 
-def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
-    """Find the run that a command is to look at, and `say` which it is if it belongs to another directory.
-
-    The user names the run as for `id_of`. None takes the only run of the current directory that lives, or else the
-    latest run of that directory. If no run belongs to the current directory, those of all directories are considered.
-    """
+def find_run_to_change(named: str | None, *, died: bool = False) -> Run:
+    """Find the run that a command changes; None takes the only run that lives or, with `died`, lost its launcher."""
     if named is not None:
-        return records.get(id_of(records, named))
-    runs = records.all()
-    here = [run for run in runs if _belongs_here(run.record)]
-    known = here or runs
-    living = [run for run in known if run.status == "running"]
-    run = known[-1] if known and not living else _require_only_run(living)
-    if not here:
-        say(f"run {run.id}, which was begun in {run.record.begun_in}")
-    return run
-
-
-def _require_only_run(living: Sequence[Run]) -> Run:
+        return find(named)
+    statuses = ("running", "died") if died else ("running",)
+    living = [run for run in Records().all() if run.status in statuses]
     if len(living) == 1:
         return living[0]
     if living:
@@ -70,19 +36,16 @@ def _require_only_run(living: Sequence[Run]) -> Run:
     raise ConfigError("no run lives", hint="throwcollect up -d starts one; throwcollect ps -a lists earlier ones")
 
 
-def _belongs_here(record: RunRecord) -> bool:
-    """Whether a run was begun in the current directory, or its dataset lies below that."""
-    here = os.getcwd()
-    dataset = None if record.volume else Path(os.path.realpath(record.directory))
-    return record.begun_in == here or (dataset is not None and dataset.is_relative_to(here))
+def find_run_to_watch(named: str | None) -> Run:
+    """Find the run that a command looks at; None takes the only run that lives or, if none does, the latest run."""
+    runs = [] if named is not None else Records().all()
+    if runs and not any(run.status == "running" for run in runs):
+        return runs[-1]
+    return find_run_to_change(named)
 
 
 def id_of(records: Records, named: StrPath) -> str:
-    """Find the id of the run that a user names by its id, the beginning of its id, or the directory of the dataset.
-
-    If several ids begin alike, the user means the only run of them that lives. If none of them lives, or more than one,
-    this raises an error, because choosing one would be a guess.
-    """
+    """Find the id of the run that a user names by its id, a unique beginning of its id, or its dataset's directory."""
     directory, named = Path(named), os.fspath(named)
     # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
     if not named:
@@ -94,14 +57,11 @@ def id_of(records: Records, named: StrPath) -> str:
     if into := records.into(directory):
         return into[-1].id
     matches = [run for run in ids if run.startswith(named)]
-    if len(matches) == 1:
-        return matches[0]
     if not matches:
         raise NotFoundError(f"no run {named!r}{suggest(named, ids, 'throwcollect ps -a')}")
-    living = [run for run in records.read(matches) if run.status == "running"]
-    if len(living) != 1:
+    if len(matches) > 1:
         raise ConfigError(f"{len(matches)} runs begin with {named!r}", expected=f"one of {', '.join(matches)}")
-    return living[0].id
+    return matches[0]
 
 
 def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:

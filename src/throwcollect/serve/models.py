@@ -14,9 +14,8 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel
 
 from throwcollect.errors import NotFoundError
-from throwcollect.learning.model import Model, load_model
-from throwcollect.learning.model_directory import POINTS, read_score
-from throwcollect.learning.model_file import MODEL, AdaptationEntry
+from throwcollect.learning.adapting import Adaptation
+from throwcollect.learning.model import MODEL, POINTS, Model, load_model, read_score
 from throwcollect.learning.score import Score
 from throwcollect.serve.catalogue import ENTRY
 
@@ -47,7 +46,7 @@ class ModelView(BaseModel):
     targets: list[str]
     given: list[str]
     reached: list[list[float]]
-    adaptation: AdaptationEntry | None
+    adaptation: Adaptation | None
     score: Score | None
 
 
@@ -82,7 +81,7 @@ class Models:
     def view(self, name: str) -> ModelView:
         """Describe a model."""
         model = self._load(name)
-        trained, ends = model.file.trained_on, model.learned.outputs
+        trained, ends = model.trained_on, model.learned.outputs
         return ModelView(
             name=name,
             learned_from=trained.name,
@@ -93,7 +92,7 @@ class Models:
             given=list(model.given),
             # The step is rounded up, so that there are never more points than allowed.
             reached=ends[:: max(1, -(-len(ends) // _MOST_POINTS))].tolist(),
-            adaptation=model.file.adaptation,
+            adaptation=model.adaptation,
             score=read_score(self.directory / name),
         )
 

@@ -22,7 +22,7 @@ from throwcollect.files import write_file
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.urdf import PACKAGE
 from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
-from throwcollect.view.shown_throws import choose_throws
+from throwcollect.view.viewer_directory import choose_throws
 
 _OUTWARD = np.array([0.32, -1.0, 0.22])
 """Direction from the throw to the camera in world: a little in front of the robot, and a little above."""

@@ -5,18 +5,21 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rclzenoh.interfaces import get_message
+from throwcollect.config.schema import Config
+from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import BALL, make_header
 from throwcollect.errors import ConfigError
 from throwcollect.view.drawn_robot import BALL_RGBA, DrawnShape, Rgba
-from throwcollect.view.shown_throws import ShownThrow
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
 _SUCCEEDED: Rgba = (0.0, 0.75, 0.35, 1.0)
@@ -29,6 +32,21 @@ _POINT_M, _TEXT_M, _LINE_M, _THIN_LINE_M, _PLANE_M = 0.035, 0.07, 0.012, 0.005, 
 _MARGIN_M = 0.5
 _POINTS_PER_S = 100
 """Number of points of a path for each second; the eye could not distinguish more."""
+
+
+@dataclass(frozen=True)
+class ShownThrow:
+    """A throw with the configuration of its trial, and when it is shown.
+
+    Attributes:
+        start_ns: Stamp of its first sample in the file that viewers open [ns].
+        path: Ball centre in world [m], shape ``(n_samples, 3)``.
+    """
+
+    throw: Throw
+    config: Config
+    start_ns: int
+    path: NDArray[np.float64]
 
 
 def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns: int) -> Any:

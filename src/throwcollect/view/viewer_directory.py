@@ -13,10 +13,11 @@ from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.record import Samples
+from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory
 from throwcollect.progress_log import log_progress
 from throwcollect.view.drawn_robot import draw_robot_of
-from throwcollect.view.shown_throws import ShownThrow, choose_throws
+from throwcollect.view.markers import ShownThrow
 from throwcollect.view.viewer_recording import FACTS_HARDWARE, FACTS_NAME, ViewRecording
 
 _SCENE = "3D!throws"
@@ -87,6 +88,14 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         recording_bytes=recording_bytes,
         mesh_bytes=mesh_bytes,
     )
+
+
+def choose_throws(dataset: Dataset, trials: Iterable[int] | None) -> Dataset:
+    """Choose the throws that are shown: some trials in their order, or all that have an episode."""
+    throws = dataset.recorded if trials is None else dataset.select(trials)
+    if not len(throws):
+        raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
+    return throws
 
 
 def _schedule(dataset: Dataset, throws: Dataset) -> Iterator[tuple[ShownThrow, Samples]]:

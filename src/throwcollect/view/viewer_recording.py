@@ -36,8 +36,7 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import tool_of
 from throwcollect.view.drawn_robot import ball_urdf, draw_robot_of
-from throwcollect.view.markers import all_markers, path_cloud, shape_markers, throw_markers
-from throwcollect.view.shown_throws import ShownThrow
+from throwcollect.view.markers import ShownThrow, all_markers, path_cloud, shape_markers, throw_markers
 
 FACTS_NAME = "throw"
 FACTS_HARDWARE = "throwcollect"

@@ -3,11 +3,13 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from throwcollect.cli.main import assemble_command
+import typer
 
-COMMAND: Any = assemble_command()
+from throwcollect.cli.main import app
+
+COMMAND: Any = typer.main.get_command(app)
 PAGE = (Path(__file__).parents[3] / "docs" / "cli.md").read_text(encoding="utf-8")
 
 
@@ -64,12 +66,3 @@ def test_help_shows_optional_arguments_in_one_pair_of_brackets() -> None:
         context = found.make_context(path[-1], [], resilient_parsing=True)
         usage = " ".join(found.collect_usage_pieces(context))
         assert not re.search(r"\[\[|\.\.\.[\]}]", usage), f"{' '.join(path)}: {usage}"
-
-
-def test_a_command_line_assembles_only_the_command_that_it_names() -> None:
-    for name, whole in COMMAND.commands.items():
-        made: Any = assemble_command(name)
-        assert list(made.commands) == [name]
-        assert [path for path, _ in list_commands(made)] == [path for path, _ in list_commands(whole, (name,))]
-    for other in (None, "--help", "upp", ""):
-        assert list(cast(Any, assemble_command(other)).commands) == list(COMMAND.commands)

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.cli.execution import execute
-from throwcollect.cli.main import assemble_command
+from throwcollect.cli.main import main
 
 
 @pytest.mark.parametrize("option", ["--datasets", "--models"])
@@ -20,6 +19,6 @@ def test_a_file_in_place_of_a_directory_is_refused(
     address = ["--host", "192.0.2.1", "--in-the-clear"]
     monkeypatch.setattr(sys, "argv", ["throwcollect", "serve", *address, option, str(tmp_path / "file")])
     with pytest.raises(SystemExit) as ended:
-        execute(assemble_command("serve"))
+        main()
     assert ended.value.code == 2
     assert f"throwcollect: Invalid value for '{option}': dir '{tmp_path}/file' is a file." in capsys.readouterr().err

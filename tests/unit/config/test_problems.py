@@ -147,10 +147,3 @@ def test_an_error_about_another_file_or_without_a_key_keeps_its_place(write, pro
     with pytest.raises(ConfigError, match="torn") as caught, load_locating_errors(write("trials: 3")):
         raise ConfigError([problem])
     assert caught.value.problems == [problem]
-
-
-def test_only_twenty_of_many_problems_are_listed_and_the_rest_are_counted(write):
-    with pytest.raises(ConfigError, match="unknown_0: unknown key") as caught:
-        load(write("".join(f"unknown_{number}: 1\n" for number in range(50))))
-    lines = str(caught.value).splitlines()
-    assert (len(lines), lines[-1]) == (21, "and 30 more")

@@ -25,7 +25,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.selection import sample
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.export.export import export
-from throwcollect.export.signals import unit_of
+from throwcollect.export.throw_source import unit_of
 from throwcollect.extras import MissingExtraError
 from throwcollect.members import load_member
 from throwcollect.runs.preparation import prepare, resume

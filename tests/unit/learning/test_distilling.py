@@ -59,9 +59,9 @@ def test_the_onnx_file_is_reproducible_and_agrees_with_the_distilled_map(tmp_pat
     for name in ("two", "three"):
         assert {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} == files
     model = load_model(tmp_path / "one")
-    assert model.file.distilled is not None
+    assert model.distilled is not None
     context = model.learned.scale(KeyRole.CONTEXT, np.array([[0.1]]))
-    scaled = model.file.distilled.aim(np.array([[1.2, -0.2]]), context)
+    scaled = model.distilled.aim(np.array([[1.2, -0.2]]), context)
     wanted = model.learned.unscale(KeyRole.PARAMETER, scaled)[0]
     assert ONNX_PROGRAM.rstrip() in (tmp_path / "one" / "README.md").read_text()
     script = f"target = [1.2, -0.2, 0.1]\n{ONNX_PROGRAM}\nprint(json.dumps(parameters))"
@@ -75,11 +75,11 @@ def test_adapting_a_distilled_model_distils_it_again(tmp_path: Path) -> None:
     model = fit(make_dataset(tmp_path / "data", 120)).distil()
     point = dict(zip(KEYS, draw(1, 8)[0].tolist(), strict=True))
     adapted = model.adapt([point], [(land(draw(1, 8)) + SHIFT)[0]], method="offset")
-    assert adapted.file.distilled is not None
-    assert adapted.file.distilled.low == pytest.approx(np.add(model.file.distilled.low, SHIFT), abs=0.05)
+    assert adapted.distilled is not None
+    assert adapted.distilled.low == pytest.approx(np.add(model.distilled.low, SHIFT), abs=0.05)
     path = tmp_path / "real"
     adapted.save(path)
-    assert load_model(path).file.model_dump_json() == adapted.file.model_dump_json()
+    assert load_model(path).model_dump_json() == adapted.model_dump_json()
 
 
 def test_distilling_without_onnx_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

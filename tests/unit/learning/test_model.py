@@ -17,8 +17,8 @@ from tests.unit.learning.worlds import DRAG, KEYS, TARGETS, draw, land, make_dat
 from throwcollect import ConfigError, DatasetError, Model, fit, load_model
 from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
+from throwcollect.learning.model import read_score
 from throwcollect.learning.model_card import PROGRAM
-from throwcollect.learning.model_directory import read_score, write_score
 from throwcollect.learning.score import Adapted, Errors, MissStatistics, Score, ThrowAtTarget, Trained
 
 COUNT = 120
@@ -43,7 +43,7 @@ def change(dataset: Dataset, column: str, values: object) -> Dataset:
 def test_keys_of_the_task_become_parameters_and_those_of_the_world_latents(model: Model) -> None:
     assert sorted(model.parameters) == sorted(KEYS)
     assert (model.given, model.latents, model.targets) == ((), (DRAG.key,), TARGETS)
-    assert model.file.trained_on.throws == COUNT
+    assert model.trained_on.throws == COUNT
 
 
 def test_a_model_can_be_learned_from_throws_that_end_close_together(dataset: Dataset) -> None:
@@ -97,7 +97,7 @@ def test_the_program_of_the_card_aims_with_nothing_but_the_model_files(dataset: 
 def test_a_saved_adapted_model_keeps_its_adaptation_in_file_and_card(model: Model, tmp_path: Path) -> None:
     points = [dict(zip(KEYS, row, strict=True)) for row in draw(4, 8).tolist()]
     adapted = model.adapt(points, land(draw(4, 8), 0.9).tolist(), method="latent")
-    (found,) = (each for each in adapted.file.adaptation.found if each.name == DRAG.key)
+    (found,) = (each for each in adapted.adaptation.found if each.name == DRAG.key)
     assert found.value == pytest.approx(0.9, abs=0.15)
     adapted.save(tmp_path / "real")
     again = load_model(tmp_path / "real")
@@ -120,14 +120,14 @@ def test_a_score_is_stored_in_the_model_and_shown_in_its_card(model: Model, tmp_
     )
     model.save(tmp_path / "model")
     assert read_score(tmp_path / "model") is None
-    write_score(tmp_path / "model", score)
+    model.write_score(tmp_path / "model", score)
     assert read_score(tmp_path / "model") == score
     card = (tmp_path / "model" / "README.md").read_text()
     assert "| learned from 120 throws | 0.12 cm | - | - | 2 | 1 |" in card
     assert "| model.onnx of these | 1.00 cm, 0.57° | -, 1.15° | - | 2 | 1 |" in card
     assert "| in the other world after 0 throws (none) | 0.12 cm | - | - | 2 | 1 |" in card
     # The page of a report shows the same rows.
-    assert [row.cells[0] for row in score.list_rows()] == [
+    assert [row[0] for row in score.list_rows()] == [
         line.split(" | ")[0].removeprefix("| ") for line in card.splitlines() if line.endswith(" | 2 | 1 |")
     ]
     assert "with a scatter of 2.00 cm" in card
@@ -161,8 +161,8 @@ def test_fit_refuses_wrong_options_and_too_few_throws(
 
 def test_fit_leaves_out_throws_that_did_not_land(dataset: Dataset) -> None:
     found = fit(change(dataset, "outcome", ["self_hit"] * 20 + ["landed"] * (COUNT - 20)))
-    assert (found.file.trained_on.throws, found.file.trained_on.ignored) == (COUNT - 20, 20)
-    assert found.trials[0] == 20
+    assert (found.trained_on.throws, found.trained_on.ignored) == (COUNT - 20, 20)
+    assert found.points["trial"][0].as_py() == 20
 
 
 def test_a_constant_parameter_is_left_out_or_refused_by_name(dataset: Dataset) -> None:

@@ -13,10 +13,9 @@ from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.misses import find_median, find_share90
-from throwcollect.learning.adapting import Method
+from throwcollect.learning.adapting import Adaptation, Method
 from throwcollect.learning.distilling import distil
-from throwcollect.learning.model_file import AdaptationEntry
-from throwcollect.learning.score import Errors, Score, format_misses, pool_scores
+from throwcollect.learning.score import Errors, Score, pool_scores
 from throwcollect.learning.scoring import draw_targets, score_model, spread_first
 
 SHIFT = np.array([0.1, 0.12])
@@ -141,7 +140,7 @@ def test_errors_of_a_model_are_summed_up_as_misses_of_a_dataset_are() -> None:
     misses = [0.1, 0.01, 0.03, 0.02]
     found = Errors.of(np.array(misses)[:, np.newaxis], ["landing_x_m"])
     assert (found.median, found.share90) == (find_median(misses), find_share90(misses))
-    entry = AdaptationEntry(method="none", throws=4, scatter=0.0, before=misses, after=[], found=[])
+    entry = Adaptation(method="none", throws=4, scatter=0.0, before=misses, after=[], found=[])
     assert entry.medians == (found.median, None)
 
 
@@ -152,8 +151,8 @@ def test_errors_in_metres_and_radians_are_summarised_separately() -> None:
     assert (lengths.unit, lengths.median, lengths.largest) == ("m", pytest.approx(0.05), pytest.approx(0.5))
     assert (angles.unit, angles.median, angles.largest) == ("rad", 0.2, 0.5)
     assert Errors.middle([found, found]) == found.model_copy(update={"throws": 6})
-    assert format_misses(found) == ("5.00 cm, 11.46°", "41.00 cm, 25.21°", "50.00 cm, 28.65°")
-    assert format_misses(Errors.of(away[:, :1], ["landing_time_s"]))[2] == "0.5 s"
+    assert found.cells[:3] == ("5.00 cm, 11.46°", "41.00 cm, 25.21°", "50.00 cm, 28.65°")
+    assert Errors.of(away[:, :1], ["landing_time_s"]).cells[2] == "0.5 s"
 
 
 def test_a_distilled_map_is_scored_at_the_same_targets() -> None:

@@ -9,9 +9,8 @@ import pytest
 
 from throwcollect import progress_log
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError
 from throwcollect.replay.other_engine import Deviation, Distribution, distributions, simulate_with
-from throwcollect.report.throw.deviations import check_picture, write_deviations
 from throwcollect.simulator import Simulator
 
 
@@ -70,22 +69,3 @@ def test_throws_that_are_simulated_again_are_counted(
     with caplog.at_level(logging.INFO, logger=progress_log.LOGGER):
         list(simulate_with(dataset, "ballistic", [4, 1]))
     assert caplog.messages == ["1 of 2 throws simulated"]
-
-
-def test_a_picture_that_cannot_be_written_is_refused_with_the_reason(tmp_path: Path) -> None:
-    for name in ("apart.txt", "apart.svg", "apart.jpg", "apart"):
-        with pytest.raises(ConfigError, match=rf"{name}: should end with \.png"):
-            check_picture(tmp_path / name)
-    with pytest.raises(ConfigError, match=r"apart\.png: its directory does not exist"):
-        check_picture(tmp_path / "missing" / "apart.png")
-    check_picture(tmp_path / "apart.png")
-    (tmp_path / "apart.png").touch()
-    with pytest.raises(ConfigError, match=r"apart\.png: exists"):
-        check_picture(tmp_path / "apart.png")
-    with pytest.raises(DatasetError, match=r"apart\.png: cannot be written: No such file or directory"):
-        write_deviations([[0.001, -0.002], [0.0, 0.003]], "mujoco", tmp_path / "missing" / "apart.png")
-
-
-def test_a_picture_of_deviations_is_written_as_png(tmp_path: Path) -> None:
-    write_deviations([[0.001, -0.002], [0.0, 0.003]], "mujoco", tmp_path / "apart.png")
-    assert (tmp_path / "apart.png").read_bytes().startswith(b"\x89PNG")

@@ -6,6 +6,8 @@ import json
 from html.parser import HTMLParser
 from typing import Any
 
+from throwcollect.report.contents import Panel, ReportSection
+
 VOID = {"meta", "link", "br"}
 
 
@@ -51,3 +53,8 @@ class Page(HTMLParser):
     @property
     def words(self) -> str:
         return " ".join(" ".join(text.split()) for tag, text in self.texts if tag not in ("script", "style"))
+
+
+def list_panels(section: ReportSection) -> list[Panel]:
+    """All panels of a section, in order."""
+    return [panel for block in section.blocks if isinstance(block, tuple) for panel in block]

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 from tests.unit.learning.worlds import make_dataset
+from tests.unit.report.page_parser import list_panels
 
 from throwcollect import ConfigError, DatasetError, fit
 from throwcollect.dataset.reader import Dataset
-from throwcollect.learning.model_directory import write_score
+from throwcollect.learning.model import load_model
 from throwcollect.learning.score import Adapted, Errors, MissStatistics, Score, ThrowAtTarget, Trained
 from throwcollect.report.model_section import show_model
 
@@ -46,13 +47,13 @@ def score() -> Score:
 
 def test_a_model_without_a_score_is_shown_with_the_command_that_scores_it(dataset: Dataset, model: Path) -> None:
     section = show_model(model, dataset)
-    assert not list(section.panels)
+    assert not list_panels(section)
     assert f"throwcollect score {model}" in section.text
 
 
 def test_misses_are_drawn_as_arrows_from_their_targets(dataset: Dataset, model: Path) -> None:
-    write_score(model, score())
-    panels = {panel.key: panel.figure for panel in show_model(model, dataset).panels}
+    load_model(model).write_score(model, score())
+    panels = {panel.key: panel.figure for panel in list_panels(show_model(model, dataset))}
     assert list(panels) == ["targets", "training", "adapting", "elsewhere"]
     axes = panels["targets"].layout
     assert (axes.xaxis.title.text, axes.yaxis.title.text) == ("x [m]", "y [m]")
@@ -67,9 +68,9 @@ def test_misses_are_drawn_as_arrows_from_their_targets(dataset: Dataset, model: 
 
 
 def test_curves_of_misses_over_numbers_of_throws_are_in_centimetres(dataset: Dataset, model: Path) -> None:
-    write_score(model, score())
+    load_model(model).write_score(model, score())
     section = show_model(model, dataset)
-    panels = {panel.key: panel.figure for panel in section.panels}
+    panels = {panel.key: panel.figure for panel in list_panels(section)}
     median = panels["adapting"].data[0]
     assert list(median.x) == [0, 5]
     assert median.y == pytest.approx([2.0, 0.1])
@@ -82,9 +83,11 @@ def test_every_unit_has_its_own_curves_and_the_distilled_map_has_a_row(dataset: 
     found = score()
     mixed = found.trained[-1].errors.model_copy(update={"others": [angles]})
     trained = [each.model_copy(update={"errors": mixed}) for each in found.trained]
-    write_score(model, found.model_copy(update={"trained": trained, "distilled": mixed, "adapted": []}))
+    load_model(model).write_score(
+        model, found.model_copy(update={"trained": trained, "distilled": mixed, "adapted": []})
+    )
     section = show_model(model, dataset)
-    panels = {panel.key: panel.figure for panel in section.panels}
+    panels = {panel.key: panel.figure for panel in list_panels(section)}
     assert list(panels) == ["targets", "training", "training-rad"]
     assert panels["training-rad"].data[0].y == pytest.approx([0.573, 0.573], abs=0.001)
     assert panels["training-rad"].layout.yaxis.title.text == "angle from the target [°]"

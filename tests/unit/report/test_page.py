@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,14 +13,18 @@ import plotly.graph_objects as go
 import pytest
 from plotly.offline import get_plotlyjs
 from tests.unit.report.page_parser import Page
+from typer.testing import CliRunner
 
-from throwcollect.dataset.directory import PROVENANCE
+from throwcollect.cli.main import dataset_app
+from throwcollect.dataset.directory import METADATA, PROVENANCE
 from throwcollect.dataset.provenance import read_provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.extras import MissingExtraError
 from throwcollect.report.contents import Panel, ReportSection, Table
 from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.page import render_page, write_report
 from throwcollect.report.sections import Report, report_dataset
-from throwcollect.report.write import render_page
 
 SECTIONS = [
     "landing",
@@ -114,3 +120,68 @@ def test_hostile_text_of_a_report_is_escaped_in_scripts_and_attributes() -> None
     ] == [hostile]
     assert not page.find_elements("b")
     assert {tag for tag, said in page.texts if said == hostile} == {"h1", "h2", "h3", "p", "a", "th", "td"}
+
+
+@pytest.mark.parametrize(
+    ("settings", "refused", "lost"),
+    [
+        ({"sweep": {"sampler": "grid", "parameters": {"task.duration_s": {"values": [1.0]}}}}, [], []),
+        ({"trials": 1}, [], [0]),
+        ({"trials": 4}, [0, 1, 3], []),
+    ],
+    ids=["a single throw", "no landing", "all refused but one"],
+)
+def test_the_report_of_a_dataset_with_few_throws_has_every_section(
+    make_collection: Any,
+    tmp_path: Path,
+    settings: dict[str, Any],
+    refused: list[int],
+    lost: list[int],
+) -> None:
+    collection = make_collection({"trials": None, **settings})
+    for trial in refused:
+        collection.refuse(trial, "too fast")
+    trials = [trial.number for trial in collection.plan.trials if trial.number not in refused]
+    page = parse(collection.collect(tmp_path / "dataset", trials, lost=lost))
+    assert [attributes["id"] for attributes in page.find_elements("section")] == SECTIONS
+    assert ("No ball crossed the landing plane." in page.words) == bool(lost)
+    assert "This dataset has no journal of its collection" in page.words
+
+
+def test_a_report_never_overwrites_a_file_and_writes_nothing_of_an_unfinished_dataset(
+    dataset: Path, tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    page.write_text("mine")
+    with pytest.raises(ConfigError, match=r"page\.html: exists"):
+        write_report(dataset, page)
+    assert page.read_text() == "mine"
+    page.unlink()
+    (dataset / METADATA).unlink()
+    with pytest.raises(DatasetError, match="not finished"):
+        write_report(dataset, page)
+    assert [path.name for path in tmp_path.iterdir()] == ["dataset"]
+
+
+def test_a_report_without_plotly_says_what_to_install(
+    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    with pytest.raises(MissingExtraError, match="needs plotly, which is not installed") as raised:
+        write_report(collected, tmp_path / "page.html")
+    assert raised.value.hint == "pip install 'throwcollect[report]'"
+
+
+def test_the_report_command_writes_beside_the_dataset_and_prints_a_summary(dataset: Path, tmp_path: Path) -> None:
+    printed = CliRunner().invoke(dataset_app, ["report", str(dataset), "--json"])
+    assert printed.exit_code == 0, printed.output
+    page = tmp_path / "dataset.html"
+    assert json.loads(printed.output) == {"page": str(page), "size_bytes": page.stat().st_size}
+    named = CliRunner().invoke(dataset_app, ["report", str(dataset), "-o", str(tmp_path / "named.html")])
+    assert named.exit_code == 0, named.output
+    assert (tmp_path / "named.html").read_bytes() == page.read_bytes()
+
+
+def test_the_camera_of_each_plot_saves_a_large_picture_for_papers(text: str) -> None:
+    assert 'modeBarButtons: [["toImage"]]' in text
+    assert 'toImageButtonOptions: { format: "png", filename: element.id, scale: 4 }' in text

@@ -12,10 +12,8 @@ from tests.unit.dataset.targeted import collect_targeted
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.report.miss_map import choose_scale
-from throwcollect.report.painter import write_pictures
 from throwcollect.report.sections import report_dataset
-from throwcollect.report.targets_section import show_targets
+from throwcollect.report.targets import choose_scale, show_targets
 
 
 def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
@@ -31,7 +29,7 @@ def test_the_section_shows_targets_misses_and_their_spread(tmp_path: Path) -> No
         f"3 of 4 throws should end at a target. miss_m: median {100 * misses[1]:.2f} cm, "
         f"9 of 10 below {100 * share90:.2f} cm, in simulation."
     )
-    above, spread = section.panels
+    above, spread = section.blocks[0]
     others, targets, lines = above.figure.data
     assert (len(others.x), sorted(targets.x)) == (1, [1.4, 1.5, 1.6])
     ends = np.array(lines.x, np.float64)[1::3], np.array(lines.y, np.float64)[1::3]
@@ -40,14 +38,13 @@ def test_the_section_shows_targets_misses_and_their_spread(tmp_path: Path) -> No
     assert np.allclose(spread.figure.data[0].x, [100 * miss for miss in misses])
     assert np.allclose(spread.figure.data[0].y, [1 / 3, 2 / 3, 1])
     assert "misses" in [each.key for each in report_dataset(dataset).sections]
-    assert {path.name for path in write_pictures((section,), tmp_path)} == {"targets_and_misses.png", "miss_m.png"}
 
 
 def test_a_dataset_without_targets_has_no_section_but_one_without_misses_has(tmp_path: Path) -> None:
     assert show_targets(Dataset.open(Collection().collect(tmp_path / "plain"))) == ()
     (section,) = show_targets(Dataset.open(collect_targeted(tmp_path / "held", change=hold_ball)))
     assert section.text == "3 of 4 throws should end at a target. None of them ended anywhere."
-    (above,) = section.panels
+    (above,) = section.blocks[0]
     assert [trace.name for trace in above.figure.data] == ["throws of the dataset", "targets where no throw landed"]
 
 

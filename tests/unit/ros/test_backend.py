@@ -8,12 +8,11 @@ from pathlib import Path
 import pytest
 
 import throwcollect.ros
-from rclzenoh.interfaces.catalog import DEFINITIONS
 from rclzenoh.interfaces.typed_names import ACTIONS, MESSAGES, SERVICES
 from throwcollect.errors import ConfigError
 from throwcollect.ros import embedded
 from throwcollect.ros.middleware import RMW_VARIABLE, VARIABLE, _choose_installed, uses_rclpy
-from throwcollect.ros_installation import PACKAGES, missing, module_name
+from throwcollect.ros_installation import PACKAGES, missing
 
 ROOT = Path(__file__).parents[3]
 
@@ -36,10 +35,6 @@ def ros(monkeypatch, tmp_path):
     for package in ("rclpy", *PACKAGES):
         (tmp_path / package).mkdir()
         (tmp_path / package / "__init__.py").write_text("raise AssertionError")
-        for definition in (DEFINITIONS / package).glob("*/*"):
-            module = tmp_path / package / definition.parent.name / f"_{module_name(definition.stem)}.py"
-            module.parent.mkdir(exist_ok=True)
-            module.touch()
     index = tmp_path / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
     index.mkdir(parents=True)
     for name in ("rmw_fastrtps_cpp", "rmw_implementation"):
@@ -66,7 +61,6 @@ def test_rclpy_is_used_if_it_and_all_interfaces_are_installed(ros, monkeypatch):
     ("package", "files", "lacking"),
     [
         ("control_msgs", "__init__.py", "control_msgs"),
-        ("simulation_interfaces", "srv/_spawn_entities.py", "simulation_interfaces/srv/SpawnEntities"),
         ("rclpy", "__init__.py", "rclpy"),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 from throwcollect.errors import ConfigError
 from throwcollect.ros.fast_dds import client_profile, server_profile, write_temporarily
 from throwcollect.ros.router import discovery_server, router
-from throwcollect.ros_installation import how_to_install
+from throwcollect.ros_installation import HOW_TO_INSTALL
 
 ENDPOINT = "udp/127.0.0.1:7447"
 
@@ -69,7 +69,7 @@ def test_a_missing_discovery_server_program_is_an_error_with_a_hint(monkeypatch,
         discovery_server("udp/127.0.0.1:1"),
     ):
         pass
-    assert caught.value.hint == f"it comes with Fast DDS: {how_to_install()}; or set run.ros to embedded"
+    assert caught.value.hint == f"it comes with Fast DDS: {HOW_TO_INSTALL}; or set run.ros to embedded"
 
 
 @pytest.fixture

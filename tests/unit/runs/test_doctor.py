@@ -36,7 +36,6 @@ def test_doctor_finds_no_problem_on_a_machine_that_runs_the_tests(tmp_path: Path
         "embedded",
         "docker",
         "state",
-        "ports",
         "disk",
     ]
     assert [check for check in checks.values() if check.status == "problem"] == []
@@ -110,7 +109,7 @@ def test_doctor_reports_both_backends_and_their_missing_parts(tmp_path: Path, mo
     monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr("throwcollect.ros_installation.rmws", lambda: ["rmw_fastrtps_cpp"])
     monkeypatch.setattr("throwcollect.ros_installation.rclpy_version", lambda: "7.1.6")
-    monkeypatch.setattr("throwcollect.ros_installation.how_to_install", lambda: "pip install it")
+    monkeypatch.setattr("throwcollect.ros_installation.HOW_TO_INSTALL", "pip install it")
     monkeypatch.setattr("throwcollect.ros_installation.missing", lambda: ["rclpy"])
     assert backends(tmp_path)["rclpy"] == ("note", "not installed; to have it: pip install it")
     monkeypatch.setattr("throwcollect.ros_installation.missing", lambda: ["tf2_msgs"])
@@ -176,7 +175,7 @@ def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypa
     )
     with socketserver.ThreadingUnixStreamServer(str(path), Engine) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+        lacking = f"the image {default_tag()} is not there yet; make image, in a clone, builds it"
         assert check_docker() == ("note", f"Docker 27.1 answers at unix://{path}; {lacking}")
         monkeypatch.setattr(Engine, "images", (default_tag(),))
         assert check_docker() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
@@ -185,6 +184,6 @@ def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypa
         status, finding = check_docker()
         assert (status, finding.partition("; ")[2]) == (
             "note",
-            f"{outdated}; throwcollect image build makes it anew",
+            f"{outdated}; make image builds it anew",
         )
         server.shutdown()

@@ -25,24 +25,9 @@ NOW = datetime.now(timezone.utc)
 Make = Callable[..., RunRecord]
 
 
-def find(records: Records, named: str | None) -> Run:
-    return find_run_to_change(records, named, command="stop")
-
-
-def find_to_watch(records: Records, named: str) -> Run:
-    return find_run_to_watch(records, named, say=print)
-
-
-def find_watched(records: Records) -> tuple[RunRecord, list[str]]:
-    """The run that is watched if none is named, and what is printed about it."""
-    said: list[str] = []
-    return find_run_to_watch(records, None, say=said.append).record, said
-
-
 @pytest.fixture
 def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Records:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    # Runs are made in directories below.
     monkeypatch.chdir(tmp_path)
     return Records()
 
@@ -82,7 +67,7 @@ def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
 def test_a_run_is_found_by_its_id_or_the_beginning_of_it(named: str, records: Records, make: Make) -> None:
     make("a", "lives")
     record = make("b", "ended")
-    assert find(records, named).record == record
+    assert find_run_to_change(named).record == record
 
 
 def test_a_run_is_found_by_the_directory_of_its_dataset(
@@ -92,94 +77,57 @@ def test_a_run_is_found_by_the_directory_of_its_dataset(
     latest = make("b", "ended", age_h=1, directory=str(tmp_path / "data"))
     make("c", "ended", directory=str(tmp_path / "data"), volume="other")
     monkeypatch.chdir(tmp_path)
-    assert find(records, "data").record == latest
-    assert find(records, str(tmp_path / "data")).record == latest
+    assert find_run_to_change("data").record == latest
+    assert find_run_to_change(str(tmp_path / "data")).record == latest
 
 
 def test_an_ambiguous_or_unknown_id_is_refused_with_a_list_of_runs(records: Records, make: Make) -> None:
     with pytest.raises(ConfigError, match="no run 'x'"):
-        find(records, "x")
+        find_run_to_change("x")
     make("ab", "ended", age_h=1)
     make("ac", "ended")
     with pytest.raises(ConfigError, match=r"2 runs begin with 'a'\n  expected: one of ab-0123, ac-0123"):
-        find(records, "a")
+        find_run_to_change("a")
     with pytest.raises(ConfigError, match=r"no run 'x'; known: ab-0123 and ac-0123"):
-        find(records, "x")
+        find_run_to_change("x")
 
 
-@pytest.mark.parametrize("select", [find, find_to_watch])
+@pytest.mark.parametrize("select", [find_run_to_change, find_run_to_watch])
 def test_an_empty_name_selects_no_run(
-    select: Callable[[Records, str], Run], records: Records, make: Make, tmp_path: Path
+    select: Callable[[str], Run], records: Records, make: Make, tmp_path: Path
 ) -> None:
     # An empty path is the current directory, into which this run collects; every id begins with an empty text.
     make("a", "lives", directory=str(tmp_path))
     with pytest.raises(ConfigError, match="the name of the run is empty"):
-        select(records, "")
-    assert select(records, ".").id == "a-0123"
-
-
-@pytest.mark.parametrize("look", [find, find_to_watch])
-def test_an_ambiguous_id_means_the_only_living_run(
-    records: Records, make: Make, look: Callable[[Records, str], Run]
-) -> None:
-    make("ab", "ended")
-    make("ac", "died")
-    living = make("ad", "lives", age_h=3)
-    assert look(records, "a").record == living
-    make("ae", "lives", age_h=9)
-    with pytest.raises(ConfigError, match="4 runs begin with 'a'"):
-        look(records, "a")
+        select("")
+    assert select(".").id == "a-0123"
 
 
 def test_without_an_id_the_only_living_run_is_changed(records: Records, make: Make) -> None:
     with pytest.raises(ConfigError, match=r"no run lives\n  try: throwcollect up -d starts one"):
-        find(records, None)
+        find_run_to_change(None)
     make("a", "ended")
     make("b", "died")
     only = make("c", "lives")
-    assert find(records, None).record == only
+    assert find_run_to_change(None).record == only
     make("d", "lives")
     with pytest.raises(ConfigError, match=r"2 runs live\n  expected: c-0123, d-0123\n  try: name one of them"):
-        find(records, None)
+        find_run_to_change(None)
 
 
 def test_without_an_id_the_living_or_else_the_latest_run_is_watched(records: Records, make: Make) -> None:
     latest = make("a", "ended")
     make("b", "ended", age_h=1)
-    assert find_watched(records) == (latest, [])
+    assert find_run_to_watch(None).record == latest
     living = make("c", "lives", age_h=9)
-    assert find_watched(records) == (living, [])
-
-
-def test_a_run_of_another_directory_is_not_changed_without_its_id(records: Records, make: Make) -> None:
-    record = make("a", "lives", begun_in="/other", directory="/other/data")
-    with pytest.raises(ConfigError) as caught:
-        find_run_to_change(records, None, command="scale 4")
-    assert str(caught.value) == (
-        "no run of this directory lives; a-0123 was begun in /other\n"
-        "  try: throwcollect scale 4 --run a-0123, if that one is meant"
-    )
-    assert find_run_to_change(records, "a", command="scale 4").record == record
-    assert find_watched(records) == (record, ["run a-0123, which was begun in /other"])
-
-
-def test_a_run_belongs_to_the_directories_where_it_was_begun_and_collects(
-    records: Records, make: Make, tmp_path: Path
-) -> None:
-    make("a", "lives", begun_in="/other", directory="/other/data")
-    begun = make("b", "lives", begun_in=str(tmp_path), directory="/other/more")
-    assert find(records, None).record == begun
-    assert find_watched(records) == (begun, [])
-    make("c", "lives", begun_in="/other")
-    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: .-0123, .-0123\n"):
-        find(records, None)
+    assert find_run_to_watch(None).record == living
 
 
 def test_down_can_end_a_run_whose_launcher_died(records: Records, make: Make) -> None:
     record = make("a", "died")
-    assert find_run_to_change(records, None, command="down", died=True).record == record
+    assert find_run_to_change(None, died=True).record == record
     with pytest.raises(ConfigError, match="no run lives"):
-        find(records, None)
+        find_run_to_change(None)
 
 
 @pytest.mark.parametrize(
@@ -198,13 +146,13 @@ def test_the_error_of_an_ended_run_has_the_type_of_its_exit_code(
 
 def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
     record = make("a", "lives")
-    assert require_living(find(records, "a")) == record
+    assert require_living(find_run_to_change("a")) == record
     make("b", "ended")
     with pytest.raises(ConfigError, match="run b-0123 has ended"):
-        require_living(find(records, "b"))
+        require_living(find_run_to_change("b"))
     make("c", "died")
     with pytest.raises(WorkerError, match="run c-0123: its launcher died; finished throws are in /"):
-        require_living(find(records, "c"))
+        require_living(find_run_to_change("c"))
 
 
 def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:

@@ -47,18 +47,14 @@ def engine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def outdated(engine, monkeypatch: pytest.MonkeyPatch) -> Mock:
-    """An engine whose images are all outdated; returns the mock that builds images."""
+def outdated(engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An engine whose images are all outdated."""
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(docker_image, "is_outdated", lambda *_: True)
-    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: None)
-    build = Mock()
-    monkeypatch.setattr(docker_image, "build", build)
-    return build
 
 
 def lacks_image(*_: object, **__: object) -> None:
-    raise WorkerError("the image is not here and cannot be built")
+    raise WorkerError("the image is not here")
 
 
 def test_auto_chooses_processes_without_a_docker_engine_and_says_why(choose, no_engine, tmp_path: Path) -> None:
@@ -91,12 +87,11 @@ def test_requested_processes_need_no_docker_engine(choose, monkeypatch: pytest.M
     assert choose("local") == ("local", ["runtime: local processes"])
 
 
-def test_requested_containers_get_an_outdated_image_rebuilt(choose, outdated) -> None:
-    runtime, (warning, _) = choose("docker")
-    assert (runtime, outdated.call_args.args[1]) == ("docker", default_tag())
-    assert warning == (
-        f"! the image {default_tag()} was made from other sources than these; building it anew, which takes minutes"
-    )
+def test_an_outdated_default_image_is_not_used(choose, outdated) -> None:
+    problem = f"the image {default_tag()} was made from other sources than these; make image builds it anew"
+    assert choose("auto") == ("local", [f"runtime: local processes (auto, as {problem})"])
+    with pytest.raises(WorkerError, match=problem):
+        choose("docker")
 
 
 @pytest.mark.parametrize("runtime", ["auto", "docker"])
@@ -109,7 +104,6 @@ def test_an_outdated_image_that_the_user_names_is_used_with_a_warning(
     assert warning == (
         f"! the image {image} was made from other sources than these; it is used, as containers.image names it"
     )
-    outdated.assert_not_called()
 
 
 FAST_DDS = Middleware("rclpy", "rmw_fastrtps_cpp")

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
-from throwcollect.learning.learned_map import Axis, Correction, KeyRole, Kind, LearnedMap
-from throwcollect.learning.model_directory import write_model
-from throwcollect.learning.model_file import ModelFile, TrainedOn
+from throwcollect.learning.learned_map import EFFORT, Axis, Correction, KeyRole, Kind
+from throwcollect.learning.model import Model
+from throwcollect.learning.model_file import TrainedOn
 from throwcollect.learning.polynomial import Polynomial
 
 KEYS = ("task.a", "task.b")
@@ -23,9 +24,10 @@ def make_model(directory: Path, throws: int = 400) -> None:
     straight = Polynomial(np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     flat = Polynomial(np.array([[0, 0]]), np.array([[0.5]]))
     none = Correction(np.zeros(2), np.zeros(0), np.zeros(2))
-    learned = LearnedMap(Kind.LOCAL, axes, TARGETS, straight, flat, values, values, np.full(throws, 0.5), none)
+    columns = {"trial": np.arange(throws), EFFORT: np.full(throws, 0.5)}
+    columns |= {name: values[:, number] for names in (KEYS, TARGETS) for number, name in enumerate(names)}
     trained: dict[str, Any] = {"name": "quick", "robot": "talos", "task": "throw", "engine": "bullet", "digest": "0"}
-    file = ModelFile(
+    model = Model(
         version="0",
         kind=Kind.LOCAL,
         axes=axes,
@@ -43,6 +45,8 @@ def make_model(directory: Path, throws: int = 400) -> None:
             latents_count=False,
         ),
         adaptation=None,
+        points=pa.table(columns),
+        config="name: quick\n",
     )
     directory.parent.mkdir(exist_ok=True)
-    write_model(directory, file, learned, np.arange(throws), "name: quick\n")
+    model.save(directory)

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Served
 from tests.unit.serve.made_model import KEYS, TARGETS, make_model
 
-from throwcollect.learning.model_directory import write_score
+from throwcollect.learning.model import load_model
 from throwcollect.learning.score import Errors, Score, ThrowAtTarget, Trained
 
 URL = "/api/v1/models"
@@ -54,7 +54,7 @@ def test_a_model_shows_its_score_once_it_is_written(client: TestClient, models: 
         adapted=[],
         adapted_throws=[],
     )
-    write_score(models / "quick", score)
+    load_model(models / "quick").write_score(models / "quick", score)
     assert client.get(f"{URL}/quick").json()["score"] == score.model_dump(mode="json")
 
 

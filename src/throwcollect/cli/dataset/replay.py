@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.printing import print_json
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.extras import require
 from throwcollect.wording import format_count
-
-if TYPE_CHECKING:
-    from throwcollect.replay.other_engine import Deviation
 
 
 def replay_dataset(
@@ -31,9 +27,6 @@ def replay_dataset(
     engine: Annotated[
         str | None, typer.Option(metavar="NAME", help="Simulate them with another engine: how much differs?")
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="With --engine: a picture (PNG) of how far landings are apart.")
-    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs."""
@@ -44,8 +37,6 @@ def replay_dataset(
         raise ConfigError("which throws?", expected="either --trial K, which may be repeated, or --all")
     if sample is not None and not everything:
         raise ConfigError("--sample: should be given with --all")
-    if plot is not None and engine is None:
-        raise ConfigError("--plot: should be given with --engine")
     dataset = Dataset.open(directory)
     known = dataset.throws["trial"].to_pylist()
     for trial in trials or ():
@@ -55,7 +46,7 @@ def replay_dataset(
         dataset.episode(trial)
     chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
     if engine is not None:
-        _compare_engines(directory, engine, chosen, plot, json=json)
+        _compare_engines(directory, engine, chosen, json=json)
         return
     comparisons = []
     for comparison in replay_throws(directory, chosen):
@@ -74,30 +65,11 @@ def replay_dataset(
         typer.echo(f"{directory}: {format_count(len(comparisons), 'throw')} replayed, the same bit for bit")
 
 
-def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: Path | None, *, json: bool) -> None:
+def _compare_engines(directory: Path, engine: str, trials: Sequence[int], *, json: bool) -> None:
     """Simulate throws with another engine, and print by how much the results differ."""
-    from throwcollect.replay.other_engine import LANDING, simulate_with
+    from throwcollect.replay.other_engine import distributions, simulate_with
 
-    if plot is not None:
-        require("plotly", "matplotlib")
-        from throwcollect.report.throw.deviations import check_picture
-
-        check_picture(plot)
     deviations = list(simulate_with(directory, engine, trials))
-    # Print the numbers first, so that they are not lost if the picture cannot be drawn after all.
-    _print_deviations(directory, engine, deviations, json=json)
-    if plot is not None:
-        from throwcollect.report.throw.deviations import write_deviations
-
-        landed = [each.values for each in deviations if all(column in each.values for column in LANDING)]
-        if not landed:
-            raise ConfigError("--plot: no throw landed with both engines")
-        write_deviations([[each[column] for each in landed] for column in LANDING], engine, plot)
-
-
-def _print_deviations(directory: Path, engine: str, deviations: Sequence[Deviation], *, json: bool) -> None:
-    from throwcollect.replay.other_engine import distributions
-
     found = distributions(deviations)
     differ = sum(each.stored != each.again for each in deviations)
     if json:

@@ -48,25 +48,19 @@ def report_dataset(
             "--output", "-o", metavar="FILE", help="HTML file to write; DIR.html beside the dataset if not given."
         ),
     ] = None,
-    png: Annotated[
-        Path | None,
-        typer.Option("--png", metavar="DIR", help="Also write the main plots as pictures; must be new or empty."),
-    ] = None,
     model: Annotated[
         Path | None, typer.Option("--model", metavar="MODEL", help="Also show a model of the dataset, and how it hits.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a page that shows what a dataset holds, and pictures for papers."""
-    from throwcollect.report.write import write_report
+    """Write a page that shows what a dataset holds."""
+    from throwcollect.report.page import write_report
 
     resolved = directory.resolve()
     page = output or resolved.with_name(f"{resolved.name}.html")
-    written = write_report(directory, page, pictures=png, model=model)
-    size = written.page.stat().st_size
-    pictures = [str(path) for path in written.pictures]
-    document = {"page": str(written.page), "size_bytes": size, "pictures": pictures}
-    print_result(document, "\n".join([f"{written.page}: {size / 1e6:.1f} MB", *pictures]), json=json)
+    write_report(directory, page, model=model)
+    size = page.stat().st_size
+    print_result({"page": str(page), "size_bytes": size}, f"{page}: {size / 1e6:.1f} MB", json=json)
 
 
 def view_dataset(
@@ -92,19 +86,15 @@ def view_dataset(
 
 
 def read_trials(text: str) -> list[int]:
-    """Read numbers of trials such as ``3,5,7-9``, and keep their order."""
+    """Read numbers of trials such as ``3,5,7-9``, in their order."""
     chosen: list[int] = []
     for part in text.split(","):
         match = re.fullmatch(r"\s*([0-9]{1,7})\s*(?:-\s*([0-9]{1,7})\s*)?", part)
-        if match is None:
-            raise ConfigError(f"--trials: {part!r} is no trial", expected="numbers and ranges such as 3,5,7-9")
-        first, last = int(match[1]), int(match[2] or match[1])
-        if last < first:
-            raise ConfigError(f"--trials: {part!r} runs backwards", expected=f"{last}-{first}")
-        chosen += range(first, last + 1)
-    if len(set(chosen)) < len(chosen):
-        raise ConfigError(f"--trials: {text!r} names a trial twice", expected="each trial once")
-    return chosen
+        numbers = range(int(match[1]), int(match[2] or match[1]) + 1) if match else ()
+        if not numbers:
+            raise ConfigError(f"--trials: got {part!r}", expected="numbers and ranges such as 3,5,7-9")
+        chosen += numbers
+    return list(dict.fromkeys(chosen))
 
 
 def render_dataset(

@@ -3,32 +3,61 @@
 from __future__ import annotations
 
 import shlex
+from typing import Annotated, Any
 
 import typer
 
-from throwcollect.cli.options import RunOption
-from throwcollect.cli.ros.goals import action_app
-from throwcollect.cli.ros.parameters import param_app
+from throwcollect import ros
+from throwcollect.cli.options import RunOption as ShellRunOption
+from throwcollect.cli.ros.graph_session import (
+    GraphSession,
+    RunOption,
+    find_run_and_connection,
+    join_graph,
+    require_name,
+)
 from throwcollect.cli.ros.topics import topic_app
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.files import write_secret
+from throwcollect.ros.graph_names import absolute_name, find_interface
+from throwcollect.wording import command
 
 ros_app = typer.Typer(help="Look into the ROS graph, as the command `ros2` does.", no_args_is_help=True)
+action_app = typer.Typer(help="Actions: send.", no_args_is_help=True)
+param_app = typer.Typer(help="Parameters: get, set.", no_args_is_help=True)
 ros_app.add_typer(topic_app, name="topic")
 ros_app.add_typer(action_app, name="action")
 ros_app.add_typer(param_app, name="param")
 
+NodeArgument = Annotated[str, typer.Argument(metavar="NODE", help="Name of the node, with its namespace.")]
+ParameterArgument = Annotated[str, typer.Argument(metavar="NAME", help="Name of the parameter.")]
+
 _PROFILE = "fast_dds.xml"
+_SERVICE_S = 5.0
+"""Longest wait for the parameter services of a node."""
+_FIELDS = {
+    1: ("Boolean value is:", "bool_value"),
+    2: ("Integer value is:", "integer_value"),
+    3: ("Double value is:", "double_value"),
+    4: ("String value is:", "string_value"),
+    5: ("Byte values are:", "byte_array_value"),
+    6: ("Boolean values are:", "bool_array_value"),
+    7: ("Integer values are:", "integer_array_value"),
+    8: ("Double values are:", "double_array_value"),
+    9: ("String values are:", "string_array_value"),
+}
+"""Label and field of each number of rcl_interfaces/msg/ParameterType, with the labels of `ros2 param get`."""
+_STATUSES = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
+"""Names of the numbers of action_msgs/msg/GoalStatus."""
 
 
 @ros_app.command("env")
-def env(run: RunOption = None) -> None:
+def env(run: ShellRunOption = None) -> None:
     """Print the line that lets a shell's ROS 2 nodes join a run: eval "$(throwcollect ros env)"."""
-    from throwcollect.cli.ros.joined_run import find_run_and_connection, require_rmw_of_shell
     from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile
     from throwcollect.ros.middleware import RMW_VARIABLE
 
     found, connection = find_run_and_connection(run)
-    require_rmw_of_shell(found)
     middleware = found.record.middleware
     # The variables name files and hold no secret, because others may read the environment of a process.
     variables = {**connection.environment(), RMW_VARIABLE: middleware.rmw}
@@ -37,3 +66,131 @@ def env(run: RunOption = None) -> None:
         write_secret(profile, client_profile(connection.endpoint).encode())
         variables |= {PROFILE_VARIABLE: str(profile), **PLAIN_DISCOVERY}
     typer.echo("export " + " ".join(f"{name}={shlex.quote(value)}" for name, value in variables.items()))
+
+
+@action_app.command("send")
+def send_goal(
+    action: Annotated[str, typer.Argument(metavar="ACTION", help="Name of the action.")],
+    kind: Annotated[
+        str, typer.Argument(metavar="TYPE", help="Type, such as control_msgs/action/FollowJointTrajectory.")
+    ],
+    goal: Annotated[str, typer.Argument(metavar="GOAL", help="Fields of the goal in YAML.")],
+    feedback: Annotated[bool, typer.Option("-f", "--feedback", help="Print feedback, too.")] = False,
+    run: RunOption = None,
+) -> None:
+    """Send a goal and print its result; Ctrl-C cancels the goal."""
+    from throwcollect.cli.ros.yaml_values import parse
+    from throwcollect.ros.message_values import fill
+
+    action_type = find_interface("action", kind)
+    message = action_type.Goal()
+    fill(message, parse(goal, "GOAL"))
+    with join_graph(run) as session:
+        name = absolute_name(action)
+        actions = dict(ros.get_action_names_and_types(session.node))
+        require_name("action", name, actions)
+        client = ros.ActionClient(session.node, action_type, name)
+        if not client.server_is_ready():
+            raise ConfigError(f"nobody offers {name} as {kind}", expected=", ".join(actions[name]))
+        print(f"Sending goal:\n{_indent(message)}", flush=True)
+        sent = client.send_goal_async(message, feedback_callback=_show_feedback if feedback else None)
+        try:
+            handle = session.answer(sent, alive=client.server_is_ready, who=name)
+            if not handle.accepted:
+                echo = command("ros", "topic", "echo", "-f", "/rosout", *(("--run", run) if run is not None else ()))
+                raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node says why: {echo}")
+            print(f"Goal accepted with ID: {bytes(bytearray(handle.goal_id.uuid)).hex()}\n", flush=True)
+            response = session.answer(handle.get_result_async(), alive=client.server_is_ready, who=name)
+        except KeyboardInterrupt:
+            # Otherwise `join_graph` would only leave the graph, and the goal would go on. It may not be accepted yet.
+            handle = session.answer(sent, alive=client.server_is_ready, who=name)
+            if handle.accepted:
+                _cancel(session, client, handle, name)
+            raise Interrupted("") from None
+        status = _STATUSES[response.status]
+        print(f"Result:\n{_indent(response.result)}")
+        print(f"Goal finished with status: {status}", flush=True)
+    if status != "SUCCEEDED":
+        raise ThrowcollectError(f"{name}: the goal was not reached: {status}")
+
+
+def _cancel(session: GraphSession, client: ros.ActionClient, handle: Any, name: str) -> None:
+    print("Canceling goal...", flush=True)
+    response = session.answer(handle.cancel_goal_async(), alive=client.server_is_ready, who=name)
+    print("Goal canceled." if response.goals_canceling else "The goal cannot be canceled.", flush=True)
+
+
+def _show_feedback(message: Any) -> None:
+    print(f"Feedback:\n{_indent(message.feedback)}", flush=True)
+
+
+def _indent(message: Any) -> str:
+    from throwcollect.cli.ros.yaml_values import yaml_text
+    from throwcollect.ros.message_values import plain
+
+    return "".join(f"    {line}\n" for line in yaml_text(plain(message)).splitlines())
+
+
+@param_app.command("get")
+def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
+    """Print the value of a parameter."""
+    from throwcollect.ros.message_values import plain
+
+    with join_graph(run) as session:
+        owner = _find_node(session, node)
+        values = _ask(session, owner, "GetParameters", names=[name]).values
+        if not values:
+            require_name("parameter", name, _ask(session, owner, "ListParameters").result.names, of=owner)
+        if not values or values[0].type not in _FIELDS:
+            print("Parameter not set.")
+            return
+        label, field = _FIELDS[values[0].type]
+        print(label, plain(getattr(values[0], field)))
+
+
+# A value may be a negative number, which would otherwise be taken for an option.
+@param_app.command("set", context_settings={"ignore_unknown_options": True})
+def set_parameter(
+    node: NodeArgument,
+    name: ParameterArgument,
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="Value in YAML.")],
+    run: RunOption = None,
+) -> None:
+    """Set a parameter."""
+    parameter = _make_parameter(name, value)
+    with join_graph(run) as session:
+        owner = _find_node(session, node)
+        (result,) = _ask(session, owner, "SetParameters", parameters=[parameter]).results
+        if not result.successful:
+            raise ConfigError(f"setting {name} of {owner} failed: {result.reason}")
+        print("Set parameter successful" + (f": {result.reason}" if result.reason else ""))
+
+
+def _make_parameter(name: str, text: str) -> Any:
+    """Make the message of a parameter of the type that its value has in YAML; other types become strings."""
+    from throwcollect.cli.ros.yaml_values import parse
+
+    try:
+        value = parse(text, "VALUE")
+        return ros.Parameter(name, value=text if value is None else value).to_parameter_msg()
+    except (TypeError, ConfigError):
+        return ros.Parameter(name, value=text).to_parameter_msg()
+
+
+def _find_node(session: GraphSession, name: str) -> str:
+    owner = absolute_name(name)
+    nodes = session.node.get_node_names_and_namespaces()
+    require_name("node", owner, [f"{namespace.removesuffix('/')}/{each}" for each, namespace in nodes])
+    return owner
+
+
+def _ask(session: GraphSession, node: str, service: str, **fields: Any) -> Any:
+    service_type: Any = ros.get_service(f"rcl_interfaces/srv/{service}")
+    snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in service).strip("_")
+    client = session.node.create_client(service_type, f"{node}/{snake}")
+    if not client.wait_for_service(timeout_sec=_SERVICE_S):
+        raise WorkerError(f"{node} offers no {snake}")
+    future = client.call_async(service_type.Request(**fields))
+    response = session.answer(future, alive=client.service_is_ready, who=node)
+    session.node.destroy_client(client)
+    return response

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,6 +13,10 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.ros.graph_names import make_own_name
 from throwcollect.wording import suggest
+
+if TYPE_CHECKING:
+    from throwcollect.ros.connection import Connection
+    from throwcollect.runs.records import Run
 
 _WAIT_S = 0.2
 """Longest single wait: rclpy handles signals only between two waits."""
@@ -59,16 +63,23 @@ class GraphSession:
             raise WorkerError(f"{who} is gone and has not answered")
         return future.result()
 
-    def node_names(self) -> list[str]:
-        """Absolute names of all nodes but our own, sorted."""
-        nodes = self.node.get_node_names_and_namespaces()
-        own = self.node.get_name()
-        return sorted(f"{namespace.removesuffix('/')}/{name}" for name, namespace in nodes if name != own)
-
     def close(self) -> None:
         """Leave the graph."""
         self.node.destroy_node()
         ros.shutdown()
+
+
+def find_run_and_connection(run: str | None) -> tuple[Run, Connection]:
+    """Find a run, or the only one that lives, and the connection by which our own processes join it."""
+    # These load Zenoh, and every command of throwcollect loads this module.
+    from throwcollect.ros.connection import Connection
+    from throwcollect.runs.run_selection import find_run_to_change, require_living
+
+    found = find_run_to_change(run)
+    record = require_living(found)
+    if record.endpoint is None:
+        raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
+    return found, Connection(record.endpoint, found.key, record.domain_id, record.middleware.joining)
 
 
 def _settle_middleware(run: str | None) -> str | None:
@@ -77,8 +88,6 @@ def _settle_middleware(run: str | None) -> str | None:
     This has to happen before the process takes any name from `throwcollect.ros`.
     """
     if run is not None:
-        from throwcollect.cli.ros.joined_run import find_run_and_connection
-
         find_run_and_connection(run)[1].middleware.settle()
     return run
 
@@ -98,15 +107,10 @@ RunOption = Annotated[
 @contextmanager
 def join_graph(run: str | None) -> Iterator[GraphSession]:
     """Join the graph of a run, or without a run, the graph of the router that the environment names."""
-    # These load Zenoh, and every command of throwcollect loads this module.
     from throwcollect.ros.middleware import Middleware
 
-    connection = None
+    connection = None if run is None else find_run_and_connection(run)[1]
     try:
-        if run is not None:
-            from throwcollect.cli.ros.joined_run import find_run_and_connection
-
-            connection = find_run_and_connection(run)[1]
         try:
             ros.init(connection=connection)
         except ConfigError:

@@ -6,6 +6,7 @@ import statistics
 import time
 from collections import deque
 from itertools import pairwise
+from operator import attrgetter
 from typing import Annotated, Any
 
 import typer
@@ -14,8 +15,7 @@ from throwcollect import ros
 from throwcollect.cli.ros.graph_session import GraphSession, RunOption, join_graph, require_name
 from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError
-from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, full_name, is_hidden
-from throwcollect.wording import suggest
+from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, is_hidden
 
 topic_app = typer.Typer(help="Topics: list, echo, hz.", no_args_is_help=True)
 
@@ -24,6 +24,8 @@ TopicArgument = Annotated[str, typer.Argument(metavar="TOPIC", help="Name of the
 _DEPTH = 100
 """Messages that wait for `hz` to count them."""
 _REPORT_NS = 10**9
+_WINDOW = 10_000
+"""Number of messages that are averaged."""
 
 
 @topic_app.command("list")
@@ -44,10 +46,6 @@ def list_topics(
 @topic_app.command("echo")
 def echo(
     topic: TopicArgument,
-    kind: Annotated[
-        str | None,
-        typer.Argument(metavar="TYPE", help="Type, such as std_msgs/msg/String; needed if nobody publishes."),
-    ] = None,
     once: Annotated[bool, typer.Option("--once", help="End after the first message.")] = False,
     field: Annotated[
         str | None, typer.Option("--field", metavar="FIELD", help="Print this field alone, such as pose.pose.position.")
@@ -62,9 +60,7 @@ def echo(
     from throwcollect.ros.message_values import plain
 
     with join_graph(run) as session:
-        name, message_type = _find_message_type(session, topic, kind)
-        path = field.split(".") if field else []
-        _check_field(message_type, path)
+        name, message_type = _find_message_type(session, topic)
         printed = False
 
         def show(message: Any) -> None:
@@ -73,9 +69,10 @@ def echo(
             if once and printed:
                 return
             printed = True
-            for part in path:
-                message = getattr(message, part)
-            value = plain(message)
+            try:
+                value = plain(attrgetter(field)(message) if field else message)
+            except AttributeError as error:
+                raise ConfigError(f"--field {field}: {error}") from error
             print(yaml_text(value if full else shorten(value)), end="---\n", flush=True)
 
         qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
@@ -84,18 +81,11 @@ def echo(
 
 
 @topic_app.command("hz")
-def show_rate(
-    topic: TopicArgument,
-    window: Annotated[
-        int, typer.Option("-w", "--window", min=2, metavar="N", help="Number of messages that are averaged.")
-    ] = 10_000,
-    run: RunOption = None,
-) -> None:
-    """Print how often messages arrive."""
+def show_rate(topic: TopicArgument, run: RunOption = None) -> None:
+    """Print how often messages arrive, on average over the last 10,000."""
     with join_graph(run) as session:
-        name, message_type = _find_message_type(session, topic, None)
-        # A gap lies between two arrivals, so one arrival more is kept.
-        arrivals: deque[int] = deque(maxlen=window + 1)
+        name, message_type = _find_message_type(session, topic)
+        arrivals: deque[int] = deque(maxlen=_WINDOW)
         # A subscription that asks for less than the publisher offers is served; the other way round, nothing arrives.
         qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(
@@ -120,25 +110,8 @@ def _describe_rate(arrivals: deque[int]) -> str:
     )
 
 
-def _find_message_type(session: GraphSession, topic: str, kind: str | None) -> tuple[str, Any]:
+def _find_message_type(session: GraphSession, topic: str) -> tuple[str, Any]:
     """Find the absolute name of a topic and the class of its messages."""
     name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
-    kinds = topics.get(name, [])
-    if kind is None:
-        require_name("topic", name, (each for each in topics if not is_hidden(each) or each == name))
-        if len(kinds) > 1:
-            raise ConfigError(f"{name} has {len(kinds)} types", expected=f"one of {', '.join(kinds)}")
-        (kind,) = kinds
-    message_type = find_interface("msg", kind)
-    if kinds and (full := full_name("msg", kind)) not in kinds:
-        raise ConfigError(f"{name} is no {full}", expected=", ".join(kinds))
-    return name, message_type
-
-
-def _check_field(message_type: Any, path: list[str]) -> None:
-    value = message_type()
-    for part in path:
-        fields = value.get_fields_and_field_types() if hasattr(value, "get_fields_and_field_types") else {}
-        if part not in fields:
-            raise ConfigError(f"--field {'.'.join(path)}: no field {part!r}{suggest(part, fields)}")
-        value = getattr(value, part)
+    require_name("topic", name, (each for each in topics if not is_hidden(each) or each == name))
+    return name, find_interface("msg", topics[name][0])

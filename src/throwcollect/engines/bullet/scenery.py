@@ -93,7 +93,7 @@ def load_urdf(client: int, urdf: str, directory: Path, position: Vector, flags: 
     """Load URDF text, whose paths are relative to a directory, with a fixed base; return the number of the body."""
     path = directory / "body.urdf"
     path.write_text(urdf, encoding="utf-8")
-    with reading_natively("Bullet cannot load the description"):
+    with reading_natively():
         try:
             return int(pybullet.loadURDF(str(path), position, useFixedBase=True, flags=flags, physicsClientId=client))
         except pybullet.error as error:

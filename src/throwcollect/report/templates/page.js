@@ -56,7 +56,10 @@
     var data = spec.data.map(function (trace) {
       return trace.type === "heatmap" && trace.colorscale ? colours(trace, element.clientWidth < 480) : trace;
     });
-    return Plotly.react(element, data, layout, { responsive: true, displaylogo: false, displayModeBar: false });
+    return Plotly.react(element, data, layout, {
+      responsive: true, displaylogo: false, displayModeBar: "hover", modeBarButtons: [["toImage"]],
+      toImageButtonOptions: { format: "png", filename: element.id, scale: 4 }
+    });
   }
 
   function redraw() { specs.forEach(function (_, element) { draw(element); }); }

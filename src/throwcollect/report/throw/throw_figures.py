@@ -1,4 +1,4 @@
-"""Figures of throws, in plotly; `painter` draws the same ones with matplotlib for print."""
+"""Figures of throws."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from throwcollect.report.figures import (
     place_bars,
     single_precision,
 )
+from throwcollect.report.measured import choose_points
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.plotted_points import choose_points
-from throwcollect.report.throw.episodes import Residuals
-from throwcollect.report.throw.landings import CellAxis, Landings
+from throwcollect.report.throw.measured import CellAxis, Landings, Residuals
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 _SCALE = "Viridis"

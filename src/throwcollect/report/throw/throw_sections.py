@@ -10,13 +10,19 @@ from markupsafe import Markup
 from throwcollect.config.sweep import LANDING_HEIGHT
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
-from throwcollect.report.amounts import format_share
-from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile
+from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile, format_share
+from throwcollect.report.measured import MOST_POINTS
 from throwcollect.report.outcomes import LANDED, Outcomes
-from throwcollect.report.plotted_points import MOST_POINTS
 from throwcollect.report.throw import throw_figures
-from throwcollect.report.throw.episodes import Residuals, choose_examples, measure_residuals
-from throwcollect.report.throw.landings import Coverage, Landings, count_throws, read_landings
+from throwcollect.report.throw.measured import (
+    Coverage,
+    Landings,
+    Residuals,
+    choose_examples,
+    count_throws,
+    measure_residuals,
+    read_landings,
+)
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import trajectory_of
@@ -80,7 +86,7 @@ def _show_landings(
     others = len(landings) - len(planned)
     text += f". {format_count(others, 'further ball')} crossed the landing plane, too." if others else "."
     figure = throw_figures.draw_landing_map(landings, outcomes)
-    above = Panel("map", "Landings from above", figure, _say_how_many(landings), picture="landing_map")
+    above = Panel("map", "Landings from above", figure, _say_how_many(landings))
     return ReportSection("landing", "Landings", title, text, ((above, *_show_targets(coverage)),))
 
 
@@ -93,14 +99,13 @@ def _show_targets(coverage: Coverage | None) -> Iterator[Panel]:
         text += f"; {coverage.throws - int(coverage.counts.sum()):,} landed in no cell"
     if len(coverage.axes) == 1:
         figure = throw_figures.draw_coverage_bars(coverage.axes[0], coverage.counts)
-        yield Panel("cells", "Throws by target", figure, f"{text}.", picture="target_coverage")
+        yield Panel("cells", "Throws by target", figure, f"{text}.")
     for number, (first, second, counts) in enumerate(coverage.pairs):
         yield Panel(
             key=f"cells-{number}",
             title=f"{'Targets:' if coverage.configured else 'Throws by'} {first.name} and {second.name}",
             figure=throw_figures.draw_coverage_map(first, second, counts),
             text="" if number else f"{text}.",
-            picture="" if number else "target_coverage",
         )
 
 
@@ -114,7 +119,7 @@ def _show_releases(landings: Landings, outcomes: Outcomes) -> ReportSection:
         f"the median direction {abs(elevation_deg):.1f}° {'below' if elevation_deg < 0 else 'above'} the horizontal."
     )
     figure = throw_figures.draw_release_map(landings, outcomes)
-    panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings), picture="release")
+    panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings))
     return ReportSection("release", "Release", title, text, ((panel,),))
 
 
@@ -132,7 +137,7 @@ def _show_examples(dataset: Dataset, throws: Sequence[Throw], *, height_m: float
         text = f"{landed} throws that landed, from the nearest to the farthest. {text}"
     side, above = throw_figures.draw_ball_views(throws, height_m)
     views = (
-        Panel("side", "The ball from the side", side, picture="ball_paths"),
+        Panel("side", "The ball from the side", side),
         Panel("above", "The ball from above", above),
     )
     middle = _choose_middle(throws)
@@ -147,7 +152,6 @@ def _show_examples(dataset: Dataset, throws: Sequence[Throw], *, height_m: float
             title=name,
             figure=throw_figures.draw_joint(middle.joints[name], goal, release),
             text=f"Largest tracking error: {errors[name]:.2g}°.",
-            picture="joint_tracking",
             small=True,
         )
         for name, goal in commanded.items()
@@ -178,5 +182,5 @@ def _show_physics(residuals: Residuals) -> ReportSection:
     else:
         text += f"None departs by more than the tolerance of {BALLISTIC_TOLERANCE_M:g} m (dashed)."
     heading = "Largest distance of each flight from ballistic motion"
-    panel = Panel("residuals", heading, throw_figures.draw_residuals(residuals), picture="ballistic_residuals")
+    panel = Panel("residuals", heading, throw_figures.draw_residuals(residuals))
     return ReportSection("physics", "Physics", title, text, ((panel,),))

@@ -22,7 +22,7 @@ from throwcollect.runtimes.docker.container_options import (
     section_of,
 )
 from throwcollect.runtimes.docker.docker_engine import engine_errors
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.image import BUILD_COMMAND, default_tag
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
 from throwcollect.runtimes.ports import reserve_port
 from throwcollect.state_directory import state_directory
@@ -61,7 +61,7 @@ def _check(
         try:
             image_id = str(client.images.get(name).id)
         except ImageNotFound as error:
-            hint = "throwcollect image build" if name == default_tag() else f"docker pull {name}"
+            hint = BUILD_COMMAND if name == default_tag() else f"docker pull {name}"
             raise WorkerError(f"the Docker engine has no image {name}", hint=hint) from error
     problems: list[Problem] = []
     for key, section in sections.items():

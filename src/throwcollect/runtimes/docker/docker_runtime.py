@@ -16,8 +16,6 @@ from throwcollect.runtimes.docker.address import check_socket, engine_address, h
 from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
 
 if TYPE_CHECKING:
-    from docker.client import DockerClient
-
     from throwcollect.config.schema import Config
     from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 
@@ -53,20 +51,24 @@ class DockerRuntime(Runtime):
             check_socket()
         from throwcollect.runtimes.docker.container_options import image
         from throwcollect.runtimes.docker.docker_engine import PATIENCE_S, connect
-        from throwcollect.runtimes.docker.image import ensure, is_outdated, rmw_of
+        from throwcollect.runtimes.docker.image import BUILD_COMMAND, ensure, is_outdated, rmw_of
 
         name = image(config)
         with closing(connect(timeout_s=PATIENCE_S if config.run.runtime == "docker" else _PROBE_S)) as client:
             _refuse_other_machine()
             ensure(client, name, say=say)
             if is_outdated(client, name):
-                _handle_outdated_image(client, name, config, warn)
+                finding = f"the image {name} was made from other sources than these"
+                # It may collect other bytes, so it is used only if the user has named it.
+                if config.containers.image is None:
+                    raise WorkerError(f"{finding}; {BUILD_COMMAND} builds it anew")
+                warn(f"{finding}; it is used, as containers.image names it")
             return _choose_middleware(rmw_of(client, name), name, config, middleware)
 
     def check(self) -> Check:
         """Whether an engine answers, and has the image of these sources."""
         from throwcollect.runtimes.docker.docker_engine import connect, engine_errors
-        from throwcollect.runtimes.docker.image import default_tag, is_outdated, is_there
+        from throwcollect.runtimes.docker.image import BUILD_COMMAND, default_tag, is_outdated, is_there
 
         try:
             with closing(connect(timeout_s=_PROBE_S)) as client, engine_errors("the Docker engine fails"):
@@ -74,11 +76,11 @@ class DockerRuntime(Runtime):
                 engine = client.version()["Version"]
                 found = f"Docker {engine} answers at {engine_address()}"
                 if not is_there(client, default_tag()):
-                    lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+                    lacking = f"the image {default_tag()} is not there yet; {BUILD_COMMAND}, in a clone, builds it"
                     return Check("docker", "note", f"{found}; {lacking}")
                 if is_outdated(client, default_tag()):
                     old = f"the image {default_tag()} was made from other sources than these"
-                    return Check("docker", "note", f"{found}; {old}; throwcollect image build makes it anew")
+                    return Check("docker", "note", f"{found}; {old}; {BUILD_COMMAND} builds it anew")
         except WorkerError as error:
             return Check("docker", "note", f"{error.message}; runs use processes")
         return Check("docker", "ok", f"{found}, with the image {default_tag()}")
@@ -144,20 +146,3 @@ def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Mi
     if config.run.ros == "rclpy":
         raise ConfigError([Problem(problem, key="run.ros")], expected="embedded, or auto")
     return Middleware()
-
-
-def _handle_outdated_image(client: DockerClient, name: str, config: Config, warn: Callable[[str], None]) -> None:
-    """Handle an image that was made from other sources, which may collect other bytes.
-
-    It is used only if the user has named it; otherwise a new one is built.
-    """
-    from throwcollect.runtimes.docker.image import build
-
-    finding = f"the image {name} was made from other sources than these"
-    if config.containers.image is not None:
-        warn(f"{finding}; it is used, as containers.image names it")
-    elif config.run.runtime == "auto":
-        raise WorkerError(f"{finding}; throwcollect image build makes it anew")
-    else:
-        warn(f"{finding}; building it anew, which takes minutes")
-        build(client, name, say=lambda _line: None)

@@ -12,7 +12,7 @@ from throwcollect.cli.dataset.replay import replay_dataset
 from throwcollect.dataset import reader
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay import audit
-from throwcollect.replay.comparison import Comparison
+from throwcollect.replay.audit import Comparison
 
 DIFFERENT = Comparison(5, "aa", "bb", ("samples: 300 stored, 301 now", "effort: from 0.100 s on, by up to 1e-12"))
 

@@ -19,23 +19,12 @@ PAGE = Path(__file__).parents[4] / "docs" / "viewing.md"
 
 
 def test_view_takes_trials_as_numbers_and_ranges_in_the_given_order() -> None:
-    assert read_trials("7-9, 3,5-5") == [7, 8, 9, 3, 5]
+    assert read_trials("7-9, 3,5-5,3") == [7, 8, 9, 3, 5]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "'' is no trial"),
-        ("3,", "'' is no trial"),
-        ("3;4", "'3;4' is no trial"),
-        ("-1", "'-1' is no trial"),
-        ("1-99999999999", "'1-99999999999' is no trial"),
-        ("9-7", "'9-7' runs backwards"),
-        ("3,1-4", "'3,1-4' names a trial twice"),
-    ],
-)
-def test_view_refuses_malformed_lists_of_trials(text: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"--trials: {re.escape(message)}"):
+@pytest.mark.parametrize("text", ["", "3,", "3;4", "-1", "1-99999999999", "9-7"])
+def test_view_refuses_malformed_lists_of_trials(text: str) -> None:
+    with pytest.raises(ConfigError, match="--trials: got '"):
         read_trials(text)
 
 

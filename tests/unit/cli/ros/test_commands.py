@@ -157,7 +157,7 @@ def test_topic_echo_shows_a_latched_message_and_shortens_it_unless_asked_for_all
 
 
 def test_topic_echo_prints_a_message_or_one_of_its_fields_as_yaml(say: Callable[..., Said]) -> None:
-    text = say("topic", "echo", "/robot/states", "sensor_msgs/JointState", "--once").out.removesuffix("---\n")
+    text = say("topic", "echo", "/robot/states", "--once").out.removesuffix("---\n")
     assert YAML(typ="safe").load(text) == {
         "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
         "name": ["a"],
@@ -193,7 +193,7 @@ def test_action_send_prints_feedback_and_result_of_a_goal(say: Callable[..., Sai
 
 
 def test_an_aborted_goal_ends_with_exit_code_1_and_a_rejected_goal_with_2(say: Callable[..., Said]) -> None:
-    said = say("action", "send_goal", FOLLOW, FJT.TYPE, "{trajectory: {joint_names: [abort]}}")
+    said = say("action", "send", FOLLOW, FJT.TYPE, "{trajectory: {joint_names: [abort]}}")
     assert (said.code, said.err) == (1, f"throwcollect: {FOLLOW}: the goal was not reached: ABORTED\n")
     said = say("action", "send", FOLLOW, FJT.TYPE, "{}")
     assert said.code == 2
@@ -205,15 +205,13 @@ def test_an_aborted_goal_ends_with_exit_code_1_and_a_rejected_goal_with_2(say: C
     [
         ("topic echo /robot/state", "no topic /robot/state; did you mean '/robot/states'?"),
         ("topic echo //x", "'//x' is no name in ROS"),
-        ("topic echo /robot/states std_msgs/Sting", "unknown interface 'std_msgs/msg/Sting'"),
-        ("topic echo /robot/states --field header.stamp.x", "no field 'x'; known: sec and nanosec"),
+        ("topic echo /robot/states --field header.stamp.x", "--field header.stamp.x: "),
         (f"action send {FOLLOW} {FJT.TYPE} {{trajectory:", "GOAL: not YAML"),
         (f"action send {FOLLOW} {FJT.TYPE} {{trajectory:\\ 1}}", "trajectory: should be fields with values, got 1"),
         ("param get /robot/drive limit", "no node /robot/drive; did you mean '/robot/driver'?"),
         (f"action send /robot/x {FJT.TYPE} {{}}", f"no action /robot/x; did you mean '{FOLLOW}'?"),
         ("param get /robot/driver limits", "no parameter limits of /robot/driver; did you mean 'limit'?"),
         ("param set /robot/driver limits 1", "parameter 'limits' is not declared"),
-        ("param set /robot/driver limit 9223372036854775808", "VALUE: should be int64, got 9223372036854775808"),
         ("topic list --run nobody-1234", "no run 'nobody-1234'"),
     ],
 )
@@ -254,7 +252,6 @@ def write_record(run: OpenRun, directory: Path, endpoint: str, **fields: Any) ->
         launcher=os.getpid(),
         simulations=1,
         endpoint=endpoint,
-        begun_in=os.getcwd(),
     )
     run.write(replace(record, **fields))
 
@@ -304,43 +301,6 @@ def test_env_for_a_run_on_fast_dds_writes_a_profile_that_only_its_owner_can_read
     assert profile.stat().st_mode & 0o777 == 0o600
     assert "<udpv4><address>127.0.0.1</address><port>9</port></udpv4>" in profile.read_text(encoding="utf-8")
     assert run.key.private_key.read_text().splitlines()[1] not in said.out + profile.read_text(encoding="utf-8")
-    run.close()
-
-
-def test_env_refuses_a_run_on_an_rmw_that_the_ros_of_the_shell_does_not_have(
-    say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
-    run = Records().new("throws")
-    run.key.create()
-    write_record(run, tmp_path, "tls/127.0.0.1:9")
-    (tmp_path / "bin").mkdir()
-    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    # Without a ROS 2 to compare with, there is nothing to refuse.
-    assert say("env").code == 0
-    # A shim of a version manager lies elsewhere than the Python that it starts.
-    python = tmp_path / "bin" / "python3"
-    python.write_text(f"#!/bin/sh\necho {tmp_path / 'there'}\n")
-    python.chmod(0o755)
-    assert say("env").code == 0
-    index = tmp_path / "there" / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
-    index.mkdir(parents=True)
-    for name in ("rmw_implementation", "rmw_fastrtps_cpp"):
-        (index / name).touch()
-    said = say("env")
-    assert (said.code, said.out) == (2, "")
-    assert f"run {run.run} is on rmw_zenoh_cpp, and the ROS 2 of this shell has rmw_fastrtps_cpp alone\n" in said.err
-    assert "docs/ros.md, 'With another RMW than the run'" in said.err
-    run.update(middleware=Middleware("rclpy", "rmw_fastrtps_cpp"), endpoint="udp/127.0.0.1:9")
-    assert say("env").code == 0
-    run.update(middleware=Middleware(), endpoint="tls/127.0.0.1:9")
-    # The setup script of a ROS 2 that has both sets this variable.
-    other = tmp_path / "opt" / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
-    other.mkdir(parents=True)
-    (other / "rmw_zenoh_cpp").touch()
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "opt"))
-    assert say("env").code == 0
     run.close()
 
 

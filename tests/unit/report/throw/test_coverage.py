@@ -7,7 +7,7 @@ import pyarrow as pa
 import pytest
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.report.throw.landings import CellAxis, Landings, count_throws
+from throwcollect.report.throw.measured import CellAxis, Landings, count_throws
 from throwcollect.report.throw.throw_figures import draw_coverage_map
 
 

@@ -11,7 +11,7 @@ from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
-from throwcollect.replay.comparison import compare
+from throwcollect.replay.audit import compare
 from throwcollect.robots.description import full_description
 
 COUNT = 5

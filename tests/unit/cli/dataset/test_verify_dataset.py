@@ -1,3 +1,5 @@
+"""What `throwcollect dataset verify` prints."""
+
 from __future__ import annotations
 
 import json
@@ -8,10 +10,10 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.cli.dataset.verify_command import verify_dataset
+from throwcollect.cli.dataset.info import verify_dataset
 from throwcollect.errors import DatasetError
 from throwcollect.extras import MissingExtraError
-from throwcollect.replay.comparison import Comparison
+from throwcollect.replay.audit import Comparison
 
 
 @pytest.fixture

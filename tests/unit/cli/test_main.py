@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from throwcollect.arguments import refuse_argument
-from throwcollect.cli.execution import execute
+from throwcollect.cli.main import execute
 from throwcollect.errors import ConfigError, NotFoundError, Problem
 
 
@@ -56,16 +56,10 @@ def test_an_error_of_the_system_is_one_message_without_a_traceback(
     assert describe(error, capsys, code=code).startswith(f"throwcollect: {said}")
 
 
-def test_an_interruption_that_python_has_wrapped_is_none_of_our_errors(capsys: pytest.CaptureFixture[str]) -> None:
-    error = RuntimeError("Error calling __set_name__ on 'Field' instance")
-    error.__cause__ = KeyboardInterrupt()
-    assert describe(error, capsys, code=130) == "throwcollect: interrupted\n"
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_after_the_end_of_a_command_changes_nothing(number: signal.Signals) -> None:
     program = (
-        "import atexit, signal; from throwcollect.cli.execution import execute; "
+        "import atexit, signal; from throwcollect.cli.main import execute; "
         f"atexit.register(signal.raise_signal, {int(number)}); execute(lambda **_: print('done') or 0)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

@@ -1,14 +1,18 @@
+"""What figures are drawn from."""
+
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
+from throwcollect.dataset.journal import JournalLine
 from throwcollect.dataset.reader import Dataset
+from throwcollect.report.measured import SweptKey, choose_points, measure_throughput, read_parameters, summarise_peaks
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.swept_keys import SweptKey, read_parameters
 
 
 def parameters_of(directory: Path) -> tuple[SweptKey, ...]:
@@ -38,3 +42,38 @@ def test_few_distinct_values_of_a_key_get_a_bin_each(make_collection: Any, tmp_p
     assert mass.logarithmic
     assert mass.edges[[0, 6, 12]] == pytest.approx([0.01, 10**-1.5, 0.1])
     assert mass.counts[:, 0].tolist() == np.histogram(mass.values, mass.edges)[0].tolist()
+
+
+def test_peaks_are_grouped_by_the_joint_that_had_them() -> None:
+    throws = pa.table(
+        {"effort_peak_share": [0.5, 0.7, 1.0, None, 0.9], "effort_peak_joint": ["a", "a", "b", None, "a"]}
+    )
+    first, second = summarise_peaks(throws, "effort")
+    assert (first.joint, first.count, first.quartiles, first.reached) == ("b", 1, (1.0,) * 5, 1)
+    assert (second.joint, second.count, second.reached) == ("a", 3, 0)
+    assert second.quartiles == pytest.approx((0.5, 0.6, 0.7, 0.8, 0.9))
+
+
+def test_the_chosen_points_are_reproducible_and_irregularly_spaced() -> None:
+    assert choose_points(10, 20).tolist() == list(range(10))
+    chosen = choose_points(100_000, 1000)
+    assert np.array_equal(chosen, choose_points(100_000, 1000))
+    assert len(set(chosen.tolist())) == 1000
+    assert len(set(np.diff(chosen).tolist())) > 50
+
+
+def test_throughput_leaves_pauses_out() -> None:
+    events = [
+        JournalLine("opened", 100.0),
+        *(JournalLine("commit", 100.0 + i) for i in range(1, 11)),
+        JournalLine("fail", 112.0),
+        JournalLine("opened", 9000.0),
+        *(JournalLine("commit", 9000.0 + i) for i in range(1, 9)),
+    ]
+    found = measure_throughput(events)
+    assert found is not None
+    assert (found.commits, found.edges_s[-1], found.resumed_s) == (18, 20.0, (12.0,))
+    assert (found.failed_s, found.lost_s) == ((12.0,), ())
+    assert (found.rate_per_s * np.diff(found.edges_s)).sum() == pytest.approx(18)
+    assert measure_throughput([]) is None
+    assert measure_throughput([JournalLine("commit", 5.0)]) is None

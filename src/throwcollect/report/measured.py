@@ -1,0 +1,191 @@
+"""What figures are drawn from: numbers of tables and of a journal, summarised, and a choice of points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config, Range
+from throwcollect.config.shape import unit_of_key
+from throwcollect.config.values import keys_by_column
+from throwcollect.dataset.journal import JournalLine
+from throwcollect.report.outcomes import Outcomes
+
+MOST_POINTS = 5000
+"""Points in one plot."""
+
+
+def read_numbers(throws: pa.Table, name: str) -> NDArray[np.float64]:
+    """Read a column of numbers, nan for nulls, shape ``(n_trials,)``."""
+    return np.asarray(throws[name].to_numpy(), dtype=np.float64)
+
+
+def choose_points(count: int, most: int = MOST_POINTS) -> NDArray[np.intp]:
+    """Choose indices of points to draw, in order: all, or `most` of them, always the same random choice."""
+    if count <= most:
+        return np.arange(count)
+    # Every n-th point of a Sobol sequence or a grid lies on a lattice, which would look like a pattern in the data.
+    return np.sort(np.random.default_rng(0).choice(count, most, replace=False))
+
+
+_BINS = 12
+
+
+@dataclass(frozen=True)
+class SweptKey:
+    """One swept key.
+
+    Attributes:
+        key: Dotted key.
+        unit: Unit of its values; empty if they have none.
+        logarithmic: True if its logarithm, and not its value, was drawn evenly.
+        values: Value of each trial, shape ``(n_trials,)``.
+        edges: Edges of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
+        counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
+        steps: The distinct values, one a bin, if there are only a few; else None.
+    """
+
+    key: str
+    unit: str
+    logarithmic: bool
+    values: NDArray[np.float64]
+    edges: NDArray[np.float64]
+    counts: NDArray[np.intp]
+    steps: NDArray[np.float64] | None
+
+    @property
+    def ticks(self) -> dict[str, list[Any]]:
+        """Ticks of a logarithmic axis for plotly: its own are powers of ten, and most ranges contain none."""
+        values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
+        return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
+
+    @property
+    def short_label(self) -> tuple[str, str]:
+        """Last part of the key, and the parts before it with the unit."""
+        above, _, last = self.key.rpartition(".")
+        return last, f"{above} [{self.unit or '-'}]".strip()
+
+
+def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[SweptKey, ...]:
+    """Read all swept keys of a table of throws, in its order."""
+    columns = keys_by_column(config, throws.column_names)
+    return tuple(_read_parameter(config, key, read_numbers(throws, name), outcomes) for name, key in columns.items())
+
+
+def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> SweptKey:
+    swept = config.sweep.parameters.get(key)
+    logarithmic = isinstance(swept, Range) and swept.scale == "log"
+    distinct = np.unique(values)
+    steps = distinct if len(distinct) <= _BINS else None
+    if steps is not None:
+        edges = np.exp(_surround(np.log(steps))) if logarithmic and len(steps) > 1 else _surround(steps)
+        bins = np.searchsorted(steps, values)
+    else:
+        low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
+        # Bins have to cover all values, also those outside of the range of the sweep.
+        low, high = min(low, float(distinct[0])), max(high, float(distinct[-1]))
+        edges = np.geomspace(low, high, _BINS + 1) if logarithmic else np.linspace(low, high, _BINS + 1)
+        # The largest value lies on the last edge, and belongs to the last bin.
+        bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
+    counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
+    np.add.at(counts, (bins, outcomes.codes), 1)
+    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, counts, steps)
+
+
+def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Place edges half-way between values, and as far beyond the first and the last."""
+    if len(steps) == 1:
+        half = abs(steps[0]) / 2 or 0.5
+        return np.array([steps[0] - half, steps[0] + half])
+    middles = (steps[:-1] + steps[1:]) / 2
+    return np.concatenate([[2 * steps[0] - middles[0]], middles, [2 * steps[-1] - middles[-1]]])
+
+
+KINDS = ("position", "velocity", "effort")
+
+
+@dataclass(frozen=True)
+class JointPeaks:
+    """Peaks of one kind in the trials in which one joint came closest to its limit.
+
+    Attributes:
+        joint: The joint.
+        count: In how many trials it was this joint.
+        quartiles: Lowest, first quartile, median, third quartile and highest of its peaks, divided by the limit [-].
+        reached: In how many of them the limit was reached or passed.
+    """
+
+    joint: str
+    count: int
+    quartiles: tuple[float, float, float, float, float]
+    reached: int
+
+
+def summarise_peaks(throws: pa.Table, kind: str) -> tuple[JointPeaks, ...]:
+    """Summarise the peaks of one of `KINDS` by joint; the joint that came closest to its limit comes first."""
+    shares = read_numbers(throws, f"{kind}_peak_share")
+    joints = np.array(throws[f"{kind}_peak_joint"].to_pylist(), dtype=object)
+    measured = np.isfinite(shares)
+    peaks = []
+    for joint in sorted({str(name) for name in joints[measured]}):
+        own = shares[measured & (joints == joint)]
+        low, first, median, third, high = np.percentile(own, [0, 25, 50, 75, 100]).tolist()
+        peaks.append(JointPeaks(joint, len(own), (low, first, median, third, high), int((own >= 1).sum())))
+    return tuple(sorted(peaks, key=lambda each: (-each.quartiles[-1], each.joint)))
+
+
+_INTERVALS = 40
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """Episodes that came in over the time of collecting, without pauses. All times are since the first event.
+
+    Attributes:
+        edges_s: Edges of intervals of time [s], shape ``(n + 1,)``.
+        rate_per_s: Episodes per second in each interval, shape ``(n,)``.
+        commits: Number of episodes.
+        resumed_s: Times at which the collection was resumed [s].
+        failed_s: Times at which a simulation failed to return a trial [s].
+        lost_s: Times at which a trial was given up [s].
+    """
+
+    edges_s: NDArray[np.float64]
+    rate_per_s: NDArray[np.float64]
+    commits: int
+    resumed_s: tuple[float, ...]
+    failed_s: tuple[float, ...]
+    lost_s: tuple[float, ...]
+
+
+def measure_throughput(events: Iterable[JournalLine]) -> Throughput | None:
+    """Measure throughput from the entries of a journal, in order; None if no episode came in, or all at one time."""
+    times: dict[str, list[float]] = {kind: [] for kind in ("commit", "opened", "fail", "lost")}
+    elapsed = 0.0
+    last: float | None = None
+    for event in events:
+        # The time before an entry `opened` does not count, because nothing is collected before a run opens the journal.
+        if last is not None and event.event != "opened":
+            # If the clock was set back between two entries, no time counts between them.
+            elapsed += max(event.time_s - last, 0.0)
+        last = event.time_s
+        if event.event in times:
+            times[event.event].append(elapsed)
+    commits = times["commit"]
+    if not commits or elapsed <= 0:
+        return None
+    edges = np.linspace(0, elapsed, min(_INTERVALS, max(len(commits) // 5, 1)) + 1)
+    return Throughput(
+        edges_s=edges,
+        rate_per_s=np.histogram(commits, edges)[0] / np.diff(edges),
+        commits=len(commits),
+        # The first opening began the collection; each later one resumed it.
+        resumed_s=tuple(times["opened"][1:]),
+        failed_s=tuple(times["fail"]),
+        lost_s=tuple(times["lost"]),
+    )

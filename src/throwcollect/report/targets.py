@@ -1,0 +1,173 @@
+"""The section of a report on the targets of trials, and the figure of targets and misses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from throwcollect.config.task_config import TaskConfig
+from throwcollect.config.values import column_of
+from throwcollect.dataset.misses import read_targets, summarise_misses
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.summary import MissSummary
+from throwcollect.report.contents import Panel, ReportSection, Table
+from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
+from throwcollect.report.measured import choose_points, read_numbers
+from throwcollect.sweep.points import Targets
+from throwcollect.units import choose_shown_unit, unit_of_name
+from throwcollect.wording import format_count
+
+_MOST = 10_000
+"""A miss is drawn at most this many times as long as it is."""
+
+
+def choose_scale(targets: NDArray[np.float64], places: NDArray[np.float64]) -> int:
+    """Choose how many times as long misses are drawn, so that they are seen: the largest power of ten that fits.
+
+    It fits if the longest drawn miss is no longer than the targets are apart; the arrays are those of `draw_miss_map`.
+    """
+    if not len(targets):
+        return 1
+    targets, places = _take_two(targets), _take_two(places)
+    hit = np.isfinite(places).all(axis=1)
+    longest = float(np.abs(places[hit] - targets[hit]).max(initial=0.0))
+    span = float(np.ptp(targets, axis=0).max())
+    times = 1
+    while longest and times < _MOST and 10 * times * longest <= span:
+        times *= 10
+    return times
+
+
+def draw_miss_map(
+    ends: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    places: NDArray[np.float64],
+    titles: Sequence[str],
+    task: TaskConfig,
+    *,
+    times: int,
+) -> go.Figure:
+    """Draw targets amid the ends of other trials, and a line for each miss, in the first two columns.
+
+    `ends` have the shape ``(n, n_columns)``. `targets`, and the `places` where the trials at these targets ended, have
+    the shape ``(n_targets, n_columns)``; a place is NaN if its trial has no end. Misses are drawn `times` as long.
+    """
+    figure = go.Figure()
+    ends, targets, places = map(_take_two, (ends, targets, places))
+    if len(ends):
+        grey = {"color": NEUTRAL, "size": 3, "opacity": 0.5, "symbol": "circle"}
+        figure.add_scatter(x=ends[:, 0], y=ends[:, 1], mode="markers", marker=grey, name=f"{task.noun}s of the dataset")
+    hit = np.isfinite(places).all(axis=1)
+    missed = f"targets where no {task.noun} {task.success}"
+    for own, name, colour in ((hit, "targets", BLUE), (~hit, missed, LIMIT_LINE["color"])):
+        if own.any():
+            marker = {"color": colour, "size": 7, "symbol": "cross"}
+            figure.add_scatter(x=targets[own, 0], y=targets[own, 1], mode="markers", marker=marker, name=name)
+    if hit.any():
+        tips = targets[hit] + times * (places[hit] - targets[hit])
+        x, y = (
+            # None separates the lines from each other.
+            [end for line in zip(starts.tolist(), ends.tolist(), strict=True) for end in (*line, None)]
+            for starts, ends in zip(targets[hit].T, tips.T, strict=True)
+        )
+        line = {"color": LIMIT_LINE["color"], "width": 1.5}
+        figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {times}" if times > 1 else "misses")
+    first, second = [*titles, ""][:2]
+    figure.update_xaxes(title=first).update_yaxes(title=second, scaleanchor="x")
+    return figure.update_layout(height=420, legend=LEGEND_ABOVE)
+
+
+def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The first two columns; if there is only one, a column of zeros after it."""
+    return np.column_stack([points, np.zeros(len(points))])[:, :2]
+
+
+def title_misses(targets: str, times: int) -> str:
+    """Title of a map of misses; `targets` is the word for the targets, and misses are drawn `times` as long."""
+    return f"{targets}, and misses drawn {times:,} times as long" if times > 1 else f"{targets} and misses"
+
+
+def title_column(column: str, task: TaskConfig) -> str:
+    """Title of an axis for a column of places: the word that the task has for it, or its own name, and the unit."""
+    words = {each.of: each.word for each in task.target_columns}
+    unit = unit_of_name(column)
+    return f"{words.get(column, column.removesuffix(f'_{unit}'))} [{unit}]" if unit else column
+
+
+_TITLE = "How targets are missed"
+
+
+def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
+    """Show the targets of trials; nothing if they have none."""
+    targets = read_targets(dataset.throws)
+    if targets is None:
+        return ()
+    misses = summarise_misses(dataset.config, dataset.throws)
+    targeted = int((~np.isnan(targets.values)).any(axis=1).sum())
+    said = [
+        "{}: median {}, 9 of 10 below {}".format(name, *each.format_misses(unit_of_name(name))[:2])
+        for name, each in misses.items()
+        if each.measured
+    ]
+    text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
+    text += f"{'; '.join(said)}, in simulation." if said else "None of them ended anywhere."
+    panels = [
+        _show_map(dataset, targets),
+        *(
+            Panel(name, f"Share of misses below a distance: {name}", _draw_share(dataset, name))
+            for name, each in misses.items()
+            if each.measured
+        ),
+    ]
+    return (ReportSection("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(misses))),)
+
+
+def _show_map(dataset: Dataset, targets: Targets) -> Panel:
+    """Show the first two columns of targets."""
+    declared = {column.name: column for column in dataset.config.task.target_columns}
+    throws, shown = dataset.throws, targets.names[:2]
+    nowhere = np.full(len(throws), np.nan)
+    sources = [column_of(declared[name].of) for name in shown]
+    ends = [read_numbers(throws, name) if name in throws.column_names else nowhere for name in sources]
+    chosen = choose_points(len(throws))
+    goals, places = targets.values[chosen, : len(shown)], np.column_stack(ends)[chosen]
+    aimed = ~np.isnan(goals).any(axis=1)
+    titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
+    times = choose_scale(goals[aimed], places[aimed])
+    figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, dataset.config.task, times=times)
+    return Panel("map", title_misses("Targets", times), figure)
+
+
+def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
+    scale, unit = choose_shown_unit(unit_of_name(miss))
+    values: NDArray[np.float64] = np.sort(dataset.throws[miss].drop_null().to_numpy()) * scale
+    figure = go.Figure()
+    chosen = choose_points(len(values))
+    figure.add_scatter(
+        x=values[chosen],
+        # The values are sorted, so this share of them is not greater than the value at this index.
+        y=(chosen + 1) / len(values),
+        mode="lines+markers",
+        line={"color": BLUE, "width": 2},
+        marker={"color": BLUE, "size": 4, "symbol": "circle"},
+    )
+    figure.update_xaxes(title=f"distance from the target [{unit}]", rangemode="tozero")
+    figure.update_yaxes(title="share of trials", range=[0, 1.02])
+    return figure.update_layout(height=420, showlegend=False)
+
+
+def _tabulate(misses: dict[str, MissSummary]) -> Table:
+    rows = tuple(
+        (
+            name,
+            f"{each.targets:,}",
+            f"{each.measured:,}",
+            *each.format_misses(unit_of_name(name)),
+        )
+        for name, each in misses.items()
+    )
+    head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
+    return Table(head=head, rows=rows, number_columns=(1, 2, 3, 4, 5))

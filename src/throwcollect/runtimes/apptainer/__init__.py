@@ -1,1 +1,0 @@
-"""The image as one file that Apptainer and Singularity run, as clusters have them."""
