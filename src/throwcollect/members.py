@@ -29,9 +29,11 @@ _OWN = MappingProxyType(
     {
         "robots": {
             "talos": "throwcollect.robots.talos:TALOS",
+            "talos_left": "throwcollect.robots.talos:TALOS_LEFT",
             "panda": "throwcollect.robots.example_robots:PANDA",
             "ur5": "throwcollect.robots.example_robots:UR5",
             "xarm7": "throwcollect.robots.example_robots:XARM7",
+            "so101": "throwcollect.robots.example_robots:SO101",
             "tiago": "throwcollect.robots.example_robots:TIAGO",
         },
         "tools": {"spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig"},

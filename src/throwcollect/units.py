@@ -19,9 +19,11 @@ _SUFFIXES = {
     "_nm": "N m",
     "_hz": "Hz",
     "_m": "m",
+    "_n": "N",
     "_s": "s",
 }
 _ASCII = str.maketrans({"²": "^2", "³": "^3"})
+_OF_SLIDING = {"_radps2": "_mps2", "_radps": "_mps", "_rad": "_m", "_nm": "_n"}
 _SHOWN_AS = {"m": (100.0, "cm"), "rad": (math.degrees(1), "°")}
 _LEAST_SHOWN = 0.01
 """A smaller number is shown with two significant digits, because its first two decimals would be zeros."""
@@ -56,3 +58,9 @@ def format_distance(distance: float | None, unit: str) -> str:
     number = factor * distance
     digits = ".2f" if number == 0 or number >= _LEAST_SHOWN else ".2g"
     return f"{number:{digits}}{'' if shown == '°' else ' '}{shown}"
+
+
+def name_sliding(name: str) -> str:
+    """Name a quantity of a joint that slides, by its name for joints that turn: ``_m`` for ``_rad`` and so on."""
+    suffix = next((each for each in _OF_SLIDING if name.endswith(each)), "")
+    return name.removesuffix(suffix) + _OF_SLIDING.get(suffix, "")

@@ -28,8 +28,8 @@ class RobotConfig(Section):
 
     name: RobotName = "talos"
     """Robot model, with its base fixed: Talos of PAL Robotics is `talos_reduced` of example-robot-data. Packages may
-    add others; `throwcollect robot list` lists them. With `urdf`, the robot's name in files and in ROS: by default, that
-    of the URDF."""
+    add others; `throwcollect robot list` lists them. With `urdf`, it is the robot's name in files and in ROS, by default
+    that of the URDF."""
     base_height_m: Annotated[float, Field(ge=0, le=3)] = 1.01927
     """Height of the fixed base link above the ground."""
     posture: dict[Joint, Angle] = {}
@@ -60,7 +60,7 @@ class RobotConfig(Section):
 
 
 class ToolPose(Section):
-    """Pose of the hand, which holds the tool, in the flange: the spoon's handle lies along -z, its cup opens along +x."""
+    """Pose of the hand, which holds the tool, in the flange; the spoon's handle lies along -z, and opens along +x."""
 
     position_m: _Vector = [0.0, 0.0, 0.0]
     """Origin."""
@@ -111,7 +111,7 @@ class DescribedRobotConfig(RobotConfig):
     tool_pose: ToolPose = ToolPose()
     """Pose of the hand in the flange."""
     controllers: dict[Name, list[str] | ChainConfig] | None = None
-    """Joints of each joint trajectory controller, or the two links that a controller's joints lie between; null makes one
+    """Joints of each joint trajectory controller, or the two links that its joints lie between; null makes one
     controller of the joints between base and flange."""
     fixed: dict[str, float] = {}
     """Positions of joints without a controller [rad; m], which are rigid; 0 by default."""
@@ -125,6 +125,8 @@ class DescribedRobotConfig(RobotConfig):
     holding: list[str] | None = None
     """Links that hold the tool and are not checked for collisions with it; null takes the flange and the three links
     before it."""
+    prismatic: list[str] = []
+    """Joints of controllers that slide: their positions are in m, and their efforts in N. An import finds them."""
     sha256: str | None = None
     """Digest of the files of an imported robot; it is written with a dataset."""
 

@@ -31,6 +31,7 @@ from throwcollect.extras import lazily
 from throwcollect.files import StrPath
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
+from throwcollect.robots.robot import Robot
 from throwcollect.sweep.arrow_column import count_values, find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
@@ -115,7 +116,9 @@ class Dataset(Sequence[Throw]):
         if isinstance(which, slice):
             return replace(self, throws=self.throws.take(pa.array(range(len(self))[which], pa.int64())))
         position = range(len(self))[which]
-        return Throw(self.throws, position, self.plan.keys, self._stored[position], str(self.directory))
+        return Throw(
+            self.throws, position, self.plan.keys, self._stored[position], str(self.directory), self._robot.sliding
+        )
 
     def __contains__(self, column: object) -> bool:
         return column in self.throws.column_names
@@ -266,12 +269,16 @@ class Dataset(Sequence[Throw]):
     @property
     def joints(self) -> tuple[str, ...]:
         """All joints of the robot, in the order of the columns of joints."""
-        return robot_of(self.config).joints
+        return self._robot.joints
 
     @property
     def moving_joints(self) -> tuple[str, ...]:
         """Joints that the task moves, in the order of `joints`, as exports have them; all others hold still."""
         return tuple(joint for joint in self.joints if joint in self.config.task.end)
+
+    @cached_property
+    def _robot(self) -> Robot:
+        return robot_of(self.config)
 
     @cached_property
     def _stored(self) -> Sequence[StoredThrow | None]:

@@ -118,6 +118,7 @@ class Throw:
         parameters: Swept keys.
         episode: Where its episode lies, or the episode itself; None if it has none.
         source: Directory of its dataset, or its configuration, for messages.
+        sliding: Joints that are prismatic.
     """
 
     def __init__(
@@ -127,12 +128,14 @@ class Throw:
         parameters: tuple[str, ...],
         episode: StoredThrow | Episode | None,
         source: str,
+        sliding: frozenset[str] = frozenset(),
     ) -> None:
         self._table = table
         self._position = position
         self._keys = parameters
         self._episode = episode
         self._source = source
+        self._sliding = sliding
 
     def __repr__(self) -> str:
         text = f"Throw({self.trial}: {self.outcome}"
@@ -160,7 +163,7 @@ class Throw:
     def __reduce__(self) -> tuple[type[Throw], tuple[object, ...]]:
         # Another process gets neither the whole table nor the arrays that were read.
         table = pa.Table.from_pylist([self.row], schema=self._table.schema)
-        return Throw, (table, 0, self._keys, self._episode, self._source)
+        return Throw, (table, 0, self._keys, self._episode, self._source, self._sliding)
 
     @cached_property
     def row(self) -> Row:
@@ -300,5 +303,5 @@ class Throw:
         for name in (*JOINT_COLUMNS, *BALL_COLUMNS):
             series, _, quantity = name.partition("_")
             values = getattr(getattr(self, series), quantity)
-            columns |= dict(zip(name_components(name, self.joints.names), values.T, strict=True))
+            columns |= dict(zip(name_components(name, self.joints.names, self._sliding), values.T, strict=True))
         return pd.DataFrame(columns, index=pd.Index(self.ball.time_s, name=TIMES))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import mmap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
@@ -29,7 +29,7 @@ from throwcollect.episode.trajectory_rows import (
     view_as_bytes,
 )
 from throwcollect.errors import DatasetError
-from throwcollect.units import NS_PER_S
+from throwcollect.units import NS_PER_S, name_sliding
 
 TIMES = "time_s"
 BALL_COLUMNS = ("ball_position", BALL_ORIENTATION, *BALL_VELOCITIES)
@@ -85,14 +85,16 @@ class StoredThrow:
         return rows
 
 
-def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
+def name_components(column: str, joints: Sequence[str], sliding: Collection[str] = ()) -> tuple[str, ...]:
     """Name the components of a column, with units, for a table in which each has a column of its own.
 
-    The column is any of `COLUMNS` but times and stamps. A column of joints has the joints `joints`.
+    The column is any of `COLUMNS` but times and stamps. A column of joints has the joints `joints`, of
+    which some may be `sliding`.
     """
     series, _, quantity = column.partition("_")
     if series == "joints":
-        return tuple(f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints)
+        names = {joint: f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints}
+        return tuple(name_sliding(name) if joint in sliding else name for joint, name in names.items())
     return tuple(f"ball_{component}" for component in _BALL_COMPONENTS[quantity])
 
 

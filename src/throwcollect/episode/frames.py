@@ -37,7 +37,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class MovingFrame(Frame):
-    """A frame that a joint turns about an axis or, if it `slides`, moves along it: a unit vector in the frame itself."""
+    """A frame that a joint turns about an axis or, if it `slides`, moves along it: a unit vector in the frame."""
 
     joint: str
     axis: tuple[float, float, float]

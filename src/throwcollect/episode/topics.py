@@ -199,19 +199,21 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     pairs = [(WORLD, BALL, (0.0, 0.0, 0.0)), *((frame.parent, frame.child, frame.translation) for frame in frames)]
     message = get_message(kind)(transforms=[_make_transform(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
     variable = [f"transforms.{n}.{path}" for n in range(len(pairs)) for path in (*_STAMP, "transform.rotation")]
-    layout = MessageLayout(message, [*variable, "transforms.0.transform.translation"])
+    # The translations of frames that joints turn stand in the template.
+    moved = [0, *(number for number, frame in enumerate(frames, start=1) if frame.slides)]
+    layout = MessageLayout(message, [*variable, *(f"transforms.{n}.transform.translation" for n in moved)])
 
     def fill(rows: Rows, recording: Recording) -> None:
         samples = recording.samples
         for number in range(len(pairs)):
             put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
-        # Only the ball changes its place; the translations of frames that joints turn stand in the template.
         rows["transforms.0.transform.translation"] = samples.ball_position
         rows["transforms.0.transform.rotation"] = samples.ball_orientation_xyzw
         for number, (frame, column) in enumerate(zip(frames, columns, strict=True), start=1):
             position = samples.position[:, column]
             if frame.slides:
                 rows[f"transforms.{number}.transform.translation"] = frame.translation_at(position)
+                rows[f"transforms.{number}.transform.rotation"] = frame.rotation_xyzw
             else:
                 rows[f"transforms.{number}.transform.rotation"] = frame.rotation_at(position)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from operator import index
 from pathlib import Path
 
@@ -21,10 +21,11 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.progress_log import ProgressLog
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.task import trajectory_of
-from throwcollect.units import NS_PER_S, ascii_unit, unit_of_name
+from throwcollect.units import NS_PER_S, ascii_unit, name_sliding, unit_of_name
 
 interpolate = lazily("scipy.interpolate", extra="export")
 
@@ -72,10 +73,15 @@ class Signal:
         return self.components or (self.name,)
 
 
-def list_signals(joints: Sequence[str], moving: Sequence[str], targets: Sequence[TargetColumn]) -> tuple[Signal, ...]:
-    """Describe all signals of an exported throw; those of targets have the same value in all its samples."""
+def list_signals(
+    joints: Sequence[str], moving: Sequence[str], targets: Sequence[TargetColumn], sliding: Collection[str] = ()
+) -> tuple[Signal, ...]:
+    """Describe all signals of an exported throw; those of targets have the same value in all its samples.
+
+    Arrays of joints have the units of joints that turn in their names; components that are `sliding` have their own.
+    """
     every = f"{len(joints)} joints"
-    return (
+    signals = (
         Signal("time_s", "Time since the start of the trial.", pattern="time_s"),
         _describe_joints("joint_position_rad", "Measured joint positions.", joints, every),
         _describe_joints("joint_velocity_radps", "Measured joint velocities.", joints, every),
@@ -93,6 +99,12 @@ def list_signals(joints: Sequence[str], moving: Sequence[str], targets: Sequence
         ),
         *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
     )
+    slide = tuple(f"{joint}_" for joint in sliding)
+
+    def name(component: str) -> str:
+        return name_sliding(component) if component.startswith(slide) else component
+
+    return tuple(replace(each, components=tuple(map(name, each.components))) for each in signals)
 
 
 def _describe_joints(name: str, description: str, joints: Sequence[str], each: str = "moving joints") -> Signal:
@@ -183,7 +195,7 @@ class ExportSource:
             dataset,
             rate_hz,
             targets,
-            list_signals(dataset.joints, dataset.moving_joints, targets),
+            list_signals(dataset.joints, dataset.moving_joints, targets, robot_of(dataset.config).sliding),
             throws,
             dataset.throws.drop_columns(list(_PLACES)),
             ProgressLog(len(dataset.throws), "trial", "exported"),

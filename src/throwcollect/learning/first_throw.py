@@ -1,4 +1,4 @@
-"""Searches a first throw of a robot: a start posture that holds the ball, a motion that lands it, and ranges to sweep."""
+"""Searches a first throw of a robot: a posture that holds the ball, a motion that lands it, and ranges to sweep."""
 
 from __future__ import annotations
 
@@ -111,9 +111,8 @@ class _Search:
         self._velocity = limits.velocity[order]
         self._lower = np.maximum(limits.lower[order], -2 * math.pi) + _MARGIN_RAD
         self._upper = np.minimum(limits.upper[order], 2 * math.pi) - _MARGIN_RAD
-        model, hand = self._postures.model, self._postures.hand
-        self._data = model.createData()
-        self._carrying = [joint - 1 for joint in model.supports[model.frames[hand].parentJoint] if joint > 0]
+        self._data = self._postures.model.createData()
+        self._carrying = self._postures.carrying
         self._base_m = robot.base_height_m
 
     def run(self) -> FirstThrow:

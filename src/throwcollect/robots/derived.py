@@ -1,4 +1,4 @@
-"""Derives what a URDF does not say: the links that may overlap, and a posture in which the hand holds the tool upright."""
+"""Derives what a URDF does not say: links that may overlap, and a posture in which the hand holds the tool upright."""
 
 from __future__ import annotations
 
@@ -39,6 +39,7 @@ class Postures:
         model: All joints, in whose order postures are.
         joints: Their names.
         allowed: Links that may overlap, by pairs in alphabetical order; more may be added.
+        carrying: Numbers of the joints that carry the hand.
         hand: Frame in the model of the link that holds the tool.
         tool: Pose in which it holds the tool.
     """
@@ -53,15 +54,24 @@ class Postures:
         self._links = [self.model.frames[shape.parentFrame].name for shape in self.geometry.geometryObjects]
         self._pairs = [(pair.first, pair.second) for pair in self.geometry.collisionPairs]
         self.hand = self.model.getFrameId(robot.hand, pinocchio.BODY)
+        self.carrying = [joint - 1 for joint in self.model.supports[self.model.frames[self.hand].parentJoint] if joint]
         self.tool = pose_of(robot.tool_pose)
         self.allowed: set[tuple[str, str]] = set()
         self._random = np.random.default_rng(_SEED)
 
     def draw(self) -> NDArray[np.float64]:
-        """Draw a posture within the limits, and within half a turn, in the order of the model [rad]."""
+        """Draw a posture within the limits, and within half a turn, in the order of the model [rad].
+
+        Joints that do not carry the hand are at rest, where the robot has a posture at rest.
+        """
         lower = np.maximum(self.model.lowerPositionLimit, -math.pi)
         upper = np.minimum(self.model.upperPositionLimit, math.pi)
-        return np.asarray(lower + (upper - lower) * self._random.random(self.model.nq))
+        posture = lower + (upper - lower) * self._random.random(self.model.nq)
+        if self._robot.srdf_path.is_file():
+            rest = np.array([self._robot.rest_posture[joint] for joint in self.joints])
+            rest[self.carrying] = posture[self.carrying]
+            posture = rest
+        return np.asarray(posture)
 
     def find_overlaps(self, posture: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Find the pairs of shapes that overlap in a posture."""

@@ -118,16 +118,18 @@ class Feasibility:
         middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
         if worst := _find_worst(positions - middle, half + _POSITION_SLACK_RAD):
             row, joint = worst
+            unit = self._robot.unit_of(joints[joint])
             side, limit = ("upper", limits.upper) if positions[worst] > middle[joint] else ("lower", limits.lower)
             return (
-                f"{joints[joint]} is at {positions[worst]:.4g} {self._robot.unit_of(joints[joint])} at {times[row]:.3f} s; "
-                f"its {side} limit is {limit[joint]:.4g} {self._robot.unit_of(joints[joint])}"
+                f"{joints[joint]} is at {positions[worst]:.4g} {unit} at {times[row]:.3f} s; "
+                f"its {side} limit is {limit[joint]:.4g} {unit}"
             )
         if worst := _find_worst(velocities, limits.velocity):
             row, joint = worst
+            unit = self._robot.unit_of(joints[joint])
             return (
-                f"{joints[joint]} moves at {abs(velocities[worst]):.4g} {self._robot.unit_of(joints[joint])}/s at {times[row]:.3f} s; "
-                f"its limit is {limits.velocity[joint]:.4g} {self._robot.unit_of(joints[joint])}/s"
+                f"{joints[joint]} moves at {abs(velocities[worst]):.4g} {unit}/s at {times[row]:.3f} s; "
+                f"its limit is {limits.velocity[joint]:.4g} {unit}/s"
             )
         limit = np.where([joint in locked for joint in joints], np.inf, limits.effort * config.robot.effort_scale)
         # The model without locked joints is faster and decides most trials. A trial near a limit is computed again
@@ -139,9 +141,10 @@ class Feasibility:
         efforts = self._dynamics.efforts(config, tool, motion)
         if worst := _find_worst(efforts, limit):
             row, joint = worst
+            unit = "N" if joints[joint] in self._robot.sliding else "Nm"
             return (
-                f"{joints[joint]} needs {abs(efforts[worst]):.4g} Nm at {times[row]:.3f} s; "
-                f"its limit is {limit[joint]:.4g} Nm"
+                f"{joints[joint]} needs {abs(efforts[worst]):.4g} {unit} at {times[row]:.3f} s; "
+                f"its limit is {limit[joint]:.4g} {unit}"
             )
         return None
 

@@ -17,7 +17,7 @@ HOME = "home"
 """Name of the posture at rest in the SRDF of an imported robot."""
 _NAME = 16
 """Length of the names of meshes."""
-_KEYS = {"name", "urdf", "srdf", "flange", "tool_pose", "controllers", "holding", "sha256"}
+_KEYS = {"name", "urdf", "srdf", "flange", "tool_pose", "controllers", "prismatic", "holding", "sha256"}
 """Keys that the robot depends on."""
 
 
@@ -44,6 +44,7 @@ def _make_robot(keys: str) -> Robot:
         hand=section.flange,
         tool_pose=Placement(_as_vector(section.tool_pose.position_m), _as_vector(section.tool_pose.rpy_rad)),
         holding=tuple(section.holding or ()),
+        sliding=frozenset(section.prismatic),
     )
 
 

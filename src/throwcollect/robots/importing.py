@@ -1,8 +1,8 @@
 """Imports a robot from its URDF: cleans it, derives what it does not say, and keeps the result as a directory.
 
 The directory has a URDF of the joints that controllers command, an SRDF with the posture at rest and the links that may
-overlap, meshes by the digests of their contents, and ``robot.yaml``: a section `robot` in which every key has its value,
-with a comment on where it came from.
+overlap, meshes by the digests of their contents, and ``robot.yaml``: a section `robot` in which every key has its
+value, with a comment on where it came from.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def import_robot(section: DescribedRobotConfig) -> DescribedRobotConfig:
 
 _DERIVED = {
     *("name", "urdf", "srdf", "packages", "flange", "tool_pose", "controllers", "fixed", "home", "limits", "gripper"),
-    *("holding", "sha256"),
+    *("prismatic", "holding", "sha256"),
 }
 
 
@@ -349,6 +349,7 @@ class _Import:
         section, given = self._section, self._section.model_fields_set
         self.notes |= {
             "urdf": f"from {self._path.name}",
+            "prismatic": "as in the URDF",
             "flange": "given",
             "tool_pose": "given" if "tool_pose" in given else "the handle along +z of the flange",
             "base_height_m": "given" if "base_height_m" in given else "on a table",
@@ -360,6 +361,7 @@ class _Import:
             "flange": section.flange,
             "tool_pose": section.tool_pose.model_dump(),
             "controllers": self.controllers,
+            "prismatic": [joint for joint in sorted(self._moving) if self.urdf.joints[joint].kind == "prismatic"],
             "holding": self._list_holding(),
             "base_height_m": section.base_height_m,
         }

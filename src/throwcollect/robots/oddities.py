@@ -45,7 +45,8 @@ def find_oddities(robot: Robot) -> Iterator[str]:
         yield f"{one} and {other} overlap in the posture at rest"
     tilt = math.acos(min(1.0, max(-1.0, postures.find_uprightness(home))))
     if tilt > _TILT_RAD:
-        yield f"the posture at rest tilts the tool by {math.degrees(tilt):.0f}°; a task needs a start that holds the ball"
+        degrees = math.degrees(tilt)
+        yield f"the posture at rest tilts the tool by {degrees:.0f}°; a task needs a start that holds the ball"
     reach = max(postures.find_reach(postures.draw()) for _ in range(_DRAWS))
     if not _LEAST_REACH_M < reach < _MOST_REACH_M:
         yield f"the hand is at most {reach:.3g} m from the base: are its lengths in metres?"

@@ -43,6 +43,7 @@ class Robot:
             end with ``_``.
         rigid: For each group of links that only mimic joints move, the prefix of the links' names. Links of a group are
             not checked for collisions with each other.
+        sliding: Joints that are prismatic, whose positions are in metres and efforts in newtons.
         ros1_names: Name of each controller in the robot's ROS 1 software; empty if the names are the same.
         goal_tolerance_rad: Largest distance of each joint from the end of a trajectory whose goal has no tolerances
             of its own; 0 is not checked.
@@ -65,6 +66,7 @@ class Robot:
     open_hand: str = ""
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
+    sliding: frozenset[str] = frozenset()
     ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     goal_tolerance_rad: float = 0.0
     goal_time_s: float = 0.0
@@ -90,11 +92,6 @@ class Robot:
             if joint in joints:
                 return controller
         raise KeyError(joint)
-
-    @cached_property
-    def sliding(self) -> frozenset[str]:
-        """The joints that are prismatic: their positions are in metres, and their efforts in newtons."""
-        return frozenset(name for name in self.joints if self.description.joints[name].kind == "prismatic")
 
     def unit_of(self, joint: str) -> str:
         """Return the unit of the positions of a joint: ``rad`` or ``m``."""
@@ -186,9 +183,10 @@ class Robot:
                 f"{path}: joints that move, but have no controller of {self.title}: {', '.join(more)}",
                 hint='make them type="fixed" in a copy of the URDF, or add them to a controller if they are revolute',
             )
-        if others := [name for name in self.joints if kinds[name] not in ("revolute", "prismatic")]:
+        wanted = {name: "prismatic" if name in self.sliding else "revolute" for name in self.joints}
+        if others := [name for name in self.joints if kinds[name] != wanted[name]]:
             raise ConfigError(
-                f"{path}: joints of controllers should be revolute or prismatic; "
+                f"{path}: joints of controllers should be {wanted[others[0]]}; "
                 + ", ".join(name + (" " if urdf.joints[name].mimics else " is ") + kinds[name] for name in others),
                 hint='a continuous joint becomes type="revolute" with a <limit> that has lower and upper',
             )

@@ -6,6 +6,7 @@ configuration (talos_controller_configuration, humble-devel 2.0).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -74,3 +75,13 @@ TALOS = Robot(
     rigid=("gripper_left_", "gripper_right_"),
 )
 """The humanoid with its 32 actuated joints; the hand is the right gripper."""
+
+TALOS_LEFT = replace(
+    TALOS,
+    name="talos_left",
+    title="Talos (left hand)",
+    hand="gripper_left_base_link",
+    open_hand="gripper_left_",
+    holding=("gripper_left_", "wrist_left_", "arm_left_5_", "arm_left_6_", "arm_left_7_"),
+)
+"""The same humanoid with the tool in its left gripper."""

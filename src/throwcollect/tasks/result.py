@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import Field, dataclass, fields, replace
 from enum import Enum
 from types import NoneType
@@ -11,7 +11,8 @@ from typing import Any, Generic, TypeVar
 
 from throwcollect.errors import DatasetError
 from throwcollect.tasks.measures import Peak
-from throwcollect.tasks.result_columns import Columns, JointColumns, Number, PeakColumns, columns_of, measured
+from throwcollect.tasks.result_columns import Column, Columns, JointColumns, Number, PeakColumns, columns_of, measured
+from throwcollect.units import name_sliding
 
 LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lost"
 """Outcomes that every task has: the trial succeeded, but a joint violated a limit; a controller did not carry out its
@@ -65,11 +66,18 @@ class ResultColumns(Generic[AnyResult]):
         columns: First the columns of the measures that the task adds, then the columns that all tasks have.
     """
 
-    def __init__(self, results: type[AnyResult], joints: Sequence[str], *, tool: str) -> None:
+    def __init__(
+        self, results: type[AnyResult], joints: Sequence[str], *, tool: str, sliding: Collection[str] = ()
+    ) -> None:
         self._results = results
         self._joints = tuple(joints)
         self._fields = [
-            (field.name, columns, columns.declare(field.name, joints)) for field, columns in _list_declared(results)
+            (
+                field.name,
+                columns,
+                [_say_unit(each, field.name, sliding) for each in columns.declare(field.name, joints)],
+            )
+            for field, columns in _list_declared(results)
         ]
         self.columns = tuple(
             replace(column, description=column.description.replace("{tool}", tool))
@@ -114,6 +122,13 @@ class ResultColumns(Generic[AnyResult]):
             values = [row[column.name] for column in declared]
             measures[name] = None if None in values else columns.join(values, self._joints)
         return self._results(outcome, reason, **measures)
+
+
+def _say_unit(column: Column, field: str, sliding: Collection[str]) -> Column:
+    """Put metres in the place of radians in the column that a field has for a joint that slides."""
+    if column.name.removesuffix(f"_{field}") not in sliding:
+        return column
+    return replace(column, name=name_sliding(column.name), description=column.description.replace("[rad]", "[m]"))
 
 
 def _list_declared(results: type[Result]) -> list[tuple[Field[Any], Columns]]:

@@ -64,7 +64,9 @@ class Task(ABC, Generic[AnyResult]):
     @property
     def columns(self) -> ResultColumns[AnyResult]:
         """The columns of the task's results, in the table of a collection of this configuration."""
-        return ResultColumns(self.results, tuple(self.config.task.end), tool=self.config.tool.name)
+        return ResultColumns(
+            self.results, tuple(self.config.task.end), tool=self.config.tool.name, sliding=robot_of(self.config).sliding
+        )
 
     def trajectory(self) -> JointTrajectory:
         """Plan the motion of a trial: by the family of `task.trajectory`, from `task.start` to `task.end`.

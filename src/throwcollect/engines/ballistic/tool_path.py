@@ -89,8 +89,8 @@ def _read_joint(joint: BodyJoint, moving: Sequence[str]) -> _Joint:
     x, y, z = joint.axis
     length = math.hypot(x, y, z)
     column = moving.index(joint.name) if joint.moves else None
-    axis = x / length, y / length, z / length
-    return _Joint(turn, np.array(place).reshape(3, 1), axis, column, joint.kind == "prismatic")
+    direction = x / length, y / length, z / length
+    return _Joint(turn, np.array(place).reshape(3, 1), direction, column, joint.kind == "prismatic")
 
 
 def _make_rotations(axis: Sequence[float], angles: Array) -> Array:
