@@ -16,7 +16,6 @@ if __name__ == "__main__":
     # from all members.
     members.entry_points = lambda **_: EntryPoints(())  # type: ignore[assignment]
 
-from throwcollect.config.kinds import all_joints
 from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section
@@ -86,7 +85,7 @@ def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
             yield f"### Keys that may be swept\n\n{_list_sweepable()}\n"
         elif len(alternatives) > 1 and all(each.keys for each in alternatives):
             for each in alternatives:
-                yield f"### `{key}` with `{_find_discriminator(each)}`\n\n{each.node['description']}\n"
+                yield f"{'###' if prefix else '##'} `{key}` with `{_find_discriminator(each)}`\n\n{each.node['description']}\n"
                 yield from _write_sections(each, f"{key}.")
         elif len(twins := _find_twins(shape, child)) > 1:
             if name == twins[0]:
@@ -95,15 +94,16 @@ def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
         elif child.keys:
             yield f"## `{key}`\n\n{child.node['description']}\n"
             yield from _write_sections(child, f"{key}.")
-        elif child.child(0).keys:
-            yield f"### Items of `{key}`\n\n{child.child(0).node['description']}\n"
-            yield _write_table(child.child(0), "")
+        else:
+            for item in (each for part in (0, "") for each in child.child(part).alternatives if each.keys):
+                yield f"### Items of `{key}`\n\n{item.node['description']}\n"
+                yield _write_table(item, "")
 
 
 def _find_discriminator(shape: ValueShape) -> str:
-    """Find what distinguishes a section from its alternatives: a key that takes one word, or else its first key."""
+    """Find what distinguishes a section from its alternatives: a key that takes one word, or its first required key."""
     words = (f"{name}: {child.node['const']}" for name, child in shape.keys.items() if "const" in child.node)
-    return next(words, next(iter(shape.keys)))
+    return next(words, next(iter(shape.node.get("required", shape.keys))))
 
 
 def _find_twins(shape: ValueShape, child: ValueShape) -> list[str]:
@@ -160,7 +160,7 @@ def _list_sweepable() -> str:
     primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
     learned: Section = config.task.model_copy(update={"trajectory": primitive})
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
-    joints = "|".join(all_joints())
+    joints = "|".join(config.robot.find().joints)
     general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _generalise, key) for key in keys)
     where = (
         "A joint must be in `task.end`, one with an offset in `robot.joint_offsets`, too, and a weight in "

@@ -122,9 +122,11 @@ def _find_robot(document: Document, directory: Path) -> Any:
     if isinstance(section, DescribedRobotConfig):
         section = section.below(directory)
     try:
-        document.values["robot"] = section = complete_robot(section)
+        section = complete_robot(section)
     except ConfigError as error:
         raise ConfigError([document.place(problem) for problem in error.problems], hint=error.hint) from error
+    if isinstance(section, DescribedRobotConfig):
+        document.values["robot"] = section
     return section.find()
 
 
@@ -138,9 +140,8 @@ def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> Robo
     for override in overrides:
         document.override(override)
     document.values = {"robot": document.values.get("robot", {})}
-    if _find_robot(document, Path() if path is None else path.parent) is None:
-        document.validate(_RobotOnly)
-    section: RobotConfig = document.values["robot"]
+    _find_robot(document, Path() if path is None else path.parent)
+    section: RobotConfig = document.validate(_RobotOnly).robot
     return section
 
 

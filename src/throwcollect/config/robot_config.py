@@ -89,11 +89,7 @@ class ChainConfig(Section):
 
 
 class DescribedRobotConfig(RobotConfig):
-    """A robot that a URDF describes; `throwcollect robot import` writes all of these keys, and how each was found.
-
-    Attributes:
-        sha256: Digest of the files of a robot that has been imported; None if the URDF is as its makers wrote it.
-    """
+    """A robot that a URDF describes; `throwcollect robot import` writes all of these keys, and how each was found."""
 
     name: Name = ""
     base_height_m: Annotated[float, Field(ge=0, le=3)] = 0.8
