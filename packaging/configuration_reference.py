@@ -85,7 +85,8 @@ def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
             yield f"### Keys that may be swept\n\n{_list_sweepable()}\n"
         elif len(alternatives) > 1 and all(each.keys for each in alternatives):
             for each in alternatives:
-                yield f"{'###' if prefix else '##'} `{key}` with `{_find_discriminator(each)}`\n\n{each.node['description']}\n"
+                yield f"{'###' if prefix else '##'} `{key}` with `{_find_discriminator(each)}`\n"
+                yield f"{each.node['description']}\n"
                 yield from _write_sections(each, f"{key}.")
         elif len(twins := _find_twins(shape, child)) > 1:
             if name == twins[0]:

@@ -104,11 +104,9 @@ def read_robot(robot: str, flange: str | None = None, settings: list[str] | None
     if robot in names_of("robots"):
         return read_robot_section(None, [f"robot.name={robot}", *keys])
     if not flange:
-        known = suggest(robot, names_of("robots"))
-        raise ConfigError(
-            f"{robot}: no such robot is installed{known}",
-            hint="a URDF needs the link that holds the tool: --flange LINK (docs/robots.md)",
-        )
+        known = f"no such robot is installed{suggest(robot, names_of('robots'))}"
+        wrong = "a URDF needs the link that holds the tool: --flange LINK" if path.is_file() else known
+        raise ConfigError(f"{robot}: {wrong}", hint="docs/robots.md says how a robot is described")
     given = {"urdf": robot, "flange": flange}
     return read_robot_section(None, [*(f"robot.{key}={value_as_yaml(each)}" for key, each in given.items()), *keys])
 

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -124,7 +125,8 @@ def _find_robot(document: Document, directory: Path) -> Any:
     try:
         section = complete_robot(section)
     except ConfigError as error:
-        raise ConfigError([document.place(problem) for problem in error.problems], hint=error.hint) from error
+        placed = [document.place(replace(problem, key=problem.key or "robot")) for problem in error.problems]
+        raise ConfigError(placed, expected=error.expected, hint=error.hint) from error
     if isinstance(section, DescribedRobotConfig):
         document.values["robot"] = section
     return section.find()

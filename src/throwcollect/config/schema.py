@@ -237,7 +237,8 @@ class Config(Section):
             unknown = [joint for joint in joints if joint not in robot.joints]
             if unknown and section in ("task.start", "task.end") and section[5:] not in self.task.model_fields_set:
                 # The user has written none of these joints: they come from the default.
-                init = f"throwcollect init --robot {self.robot.name}"
+                which = self.robot.name if type(self.robot) is RobotConfig else f"URDF --flange {robot.hand}"
+                init = f"throwcollect init --robot {which}"
                 yield section, f"missing, and the default has joints that {robot.title} lacks; `{init}` writes one"
                 continue
             for joint in unknown:
