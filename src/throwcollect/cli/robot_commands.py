@@ -103,6 +103,8 @@ def read_robot(robot: str, flange: str | None = None, settings: list[str] | None
         return read_robot_section(path / SECTION if path.is_dir() else path, keys)
     if robot in names_of("robots"):
         return read_robot_section(None, [f"robot.name={robot}", *keys])
+    if not flange and path.is_file():
+        raise ConfigError(f"{robot}: a URDF needs the link that holds the tool", hint="name it: --flange LINK")
     if not flange:
         known = suggest(robot, names_of("robots"))
         raise ConfigError(

@@ -28,8 +28,8 @@ class RobotConfig(Section):
 
     name: RobotName = "talos"
     """Robot model, with its base fixed: Talos of PAL Robotics is `talos_reduced` of example-robot-data. Packages may
-    add others; `throwcollect robot list` lists them. With `urdf`, it is the robot's name in files and in ROS, by default
-    that of the URDF."""
+    add others; `throwcollect robot list` lists them. With `urdf`, it is the robot's name in files and ROS, by default that
+    of the URDF."""
     base_height_m: Annotated[float, Field(ge=0, le=3)] = 1.01927
     """Height of the fixed base link above the ground."""
     posture: dict[Joint, Angle] = {}

@@ -43,6 +43,7 @@ _TURN = 6.283185307179586
 _LARGEST_M = 10.0
 """No part of a robot is larger; meshes in millimetres are."""
 _MOST_TRIANGLES = 1_000_000
+_LARGE_BYTES = 100_000
 _HOLDING = 3
 """So many links before the flange hold the tool."""
 _KNOWN_CONTROLLERS = (
@@ -166,7 +167,8 @@ class _Import:
             # A package is a directory of its name, mostly one of those that the URDF lies in.
             places += [above / package for above in self._path.resolve().parents]
             places += [above for above in self._path.resolve().parents if above.name == package]
-            places += _list_shares(package)
+            # The meshes of an imported robot lie in the directory of its URDF.
+            places += [*_list_shares(package), self._path.parent]
             for place in places:
                 if (place / rest).is_file():
                     self.sources.add(place / rest)
@@ -316,6 +318,16 @@ class _Import:
             )
         return replace(shape, mesh=Mesh(self._keep(shape.mesh.encode_hull(), ".stl")))
 
+    def _keep_visual(self, path: Path) -> Path:
+        """Keep a mesh for viewers: a large one without colours of its own more coarsely."""
+        try:
+            content, suffix = path.read_bytes(), path.suffix.lower()
+        except OSError as error:
+            raise ConfigError(f"{path}: cannot be read as a mesh: {error.strerror}") from error
+        if suffix == ".stl" and len(content) > _LARGE_BYTES:
+            content = Mesh(path).encode_coarse()
+        return self._keep(content, suffix)
+
     def _keep(self, content: bytes, suffix: str) -> Path:
         name = hashlib.sha256(content).hexdigest()[:16] + suffix
         self.files[name] = content
@@ -334,11 +346,7 @@ class _Import:
             if element.tag == "link":
                 for visual in copy.deepcopy(links[element.get("name")].findall("visual")):
                     for mesh in visual.iter("mesh"):
-                        path = self._find_mesh(mesh.get("filename", ""))
-                        try:
-                            kept = self._keep(path.read_bytes(), path.suffix.lower())
-                        except OSError as error:
-                            raise ConfigError(f"{path}: cannot be read as a mesh: {error.strerror}") from error
+                        kept = self._keep_visual(self._find_mesh(mesh.get("filename", "")))
                         mesh.set("filename", f"{PACKAGE}{package}/{kept}")
                     element.append(visual)
             robot.append(element)
