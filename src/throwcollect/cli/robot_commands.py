@@ -103,10 +103,13 @@ def read_robot(robot: str, flange: str | None = None, settings: list[str] | None
         return read_robot_section(path / SECTION if path.is_dir() else path, keys)
     if robot in names_of("robots"):
         return read_robot_section(None, [f"robot.name={robot}", *keys])
+    if not flange and path.is_file():
+        raise ConfigError(f"{robot}: a URDF needs the link that holds the tool", hint="name it: --flange LINK")
     if not flange:
-        known = f"no such robot is installed{suggest(robot, names_of('robots'))}"
-        wrong = "a URDF needs the link that holds the tool: --flange LINK" if path.is_file() else known
-        raise ConfigError(f"{robot}: {wrong}", hint="docs/robots.md says how a robot is described")
+        known = suggest(robot, names_of("robots"))
+        raise ConfigError(
+            f"{robot}: no such robot is installed{known}", hint="docs/robots.md says how a robot is described"
+        )
     given = {"urdf": robot, "flange": flange}
     return read_robot_section(None, [*(f"robot.{key}={value_as_yaml(each)}" for key, each in given.items()), *keys])
 

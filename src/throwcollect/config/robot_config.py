@@ -29,9 +29,9 @@ class RobotConfig(Section):
     """The robot and how its motors follow commands."""
 
     name: Annotated[str, AfterValidator(_require_robot), WithJsonSchema({"enum": [*names_of("robots")]})] = "talos"
-    """Robot model, with its base fixed: Talos of PAL Robotics is `talos_reduced` of example-robot-data. Packages may
-    add others; `throwcollect robot list` lists them. With `urdf`, it is the robot's name in files and in ROS, by
-    default that of the URDF."""
+    """Robot, with its base fixed: Talos of PAL Robotics is `talos_reduced` of example-robot-data. Packages may add
+    others; `throwcollect robot list` lists them. With `urdf`, it is the name in files and ROS, by default that
+    of the URDF."""
     base_height_m: Annotated[float, Field(ge=0, le=3)] = 1.01927
     """Height of the fixed base link above the ground."""
     posture: dict[Joint, Angle] = {}

@@ -22,6 +22,8 @@ STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", 
 """A triangle in a binary STL file, which has a title of 80 bytes and the number of triangles before them."""
 
 _LARGEST_COORDINATE = 1e6
+_CELLS = 60
+"""Cells of the grid of a coarse mesh along its longest edge: of 5 mm or less for a link of an arm."""
 _LEAST_THICKNESS = 1e-6
 """Least extent of a solid in its thinnest direction, as a share of its extent in the longest."""
 
@@ -77,6 +79,17 @@ class Mesh:
     def encode(self) -> bytes:
         """Encode the triangles as binary STL."""
         return encode(self.triangles)
+
+    def encode_coarse(self) -> bytes:
+        """Encode a coarser mesh for viewers as binary STL: corners in one cell of a grid become one."""
+        corners = self.triangles.reshape(-1, 3)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        cells = np.round((corners - low) / max(float((high - low).max()) / _CELLS, 1e-9)).astype(np.int64)
+        # A number for each cell: sorting numbers is faster than sorting rows.
+        _, first, number = np.unique(cells @ [1, 1 << 10, 1 << 20], return_index=True, return_inverse=True)
+        one, two, three = first[number.reshape(-1, 3)].T
+        keep = (one != two) & (two != three) & (three != one)
+        return encode(corners[np.stack([one, two, three], axis=-1)[keep]])
 
     def encode_hull(self) -> bytes:
         """Encode the convex hull as binary STL."""

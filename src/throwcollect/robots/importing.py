@@ -45,6 +45,7 @@ _LARGEST_M = 10.0
 """No part of a robot is larger; meshes in millimetres are."""
 _MOST_MESH_BYTES = 50_000_000
 """As many as a million triangles have in a binary STL."""
+_LARGE_BYTES = 100_000
 _HOLDING = 3
 """So many links before the flange hold the tool."""
 _KNOWN_CONTROLLERS = (
@@ -179,10 +180,9 @@ class _Import:
             # A package is a directory of its name, mostly one of those that the URDF lies in.
             places += [above / package for above in self._path.resolve().parents]
             places += [above for above in self._path.resolve().parents if above.name == package]
-            places += _list_shares(package)
-            # Meshes of a robot that has been imported before lie beside its URDF.
-            places += [self._path.parent] * (package == package_of(self._source.get("name", "")))
-            found = next((place / rest for place in places if (place / rest).is_file()), Path(rest))
+            # The meshes of an imported robot lie in the directory of its URDF.
+            places += [*_list_shares(package), self._path.parent]
+            found = next((place / rest for place in places if (place / rest).is_file()), self._path.parent / rest)
             missing = f"not found; robot.packages says where the directory of {package} is"
         else:
             found = locate_mesh(filename, self._path.parent, self._path.parent)
@@ -328,6 +328,16 @@ class _Import:
             )
         return replace(shape, mesh=Mesh(self._keep(shape.mesh.encode_hull(), ".stl")))
 
+    def _keep_visual(self, path: Path) -> Path:
+        """Keep a mesh for viewers: a large one without colours of its own more coarsely."""
+        try:
+            content, suffix = path.read_bytes(), path.suffix.lower()
+        except OSError as error:
+            raise ConfigError(f"{path}: cannot be read as a mesh: {error.strerror}") from error
+        if suffix == ".stl" and len(content) > _LARGE_BYTES:
+            content = Mesh(path).encode_coarse()
+        return self._keep(content, suffix)
+
     def _keep(self, content: bytes, suffix: str) -> Path:
         name = hashlib.sha256(content).hexdigest()[:16] + suffix
         self.files[name] = content
@@ -346,11 +356,7 @@ class _Import:
             if element.tag == "link":
                 for visual in copy.deepcopy(links[element.get("name")].findall("visual")):
                     for mesh in visual.iter("mesh"):
-                        path = self._find_mesh(mesh.get("filename", ""))
-                        try:
-                            kept = self._keep(path.read_bytes(), path.suffix.lower())
-                        except OSError as error:
-                            raise ConfigError(f"{path}: cannot be read as a mesh: {error.strerror}") from error
+                        kept = self._keep_visual(self._find_mesh(mesh.get("filename", "")))
                         mesh.set("filename", f"{PACKAGE}{package}/{kept}")
                     element.append(visual)
             robot.append(element)

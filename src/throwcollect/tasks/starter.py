@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import value_as_yaml
+from throwcollect.config.robot_config import RobotConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import root
 from throwcollect.config.task_config import TaskConfig
@@ -90,11 +91,12 @@ def check_choices(task: str, sampler: str) -> None:
 
 def begin_at_default(robot: str, task: str) -> Beginning | None:
     """Find the default motion of a task with a robot; None if the default is for another robot and the task throws."""
+    throws = load_member("tasks", task).throws
+    if throws and robot != RobotConfig().name:
+        return None
     try:
         found = _describe_motion(robot, task).task
     except ValidationError:
-        if load_member("tasks", task).throws:
-            return None
         found = _find_short_motion(robot, task)
     end, start, duration_s = found.end, found.start, found.duration_s
     joint = max(end, key=lambda name: abs(end[name] - start[name]))
