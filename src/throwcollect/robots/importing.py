@@ -190,8 +190,8 @@ class _Import:
         if not found.is_file():
             raise ConfigError(f"{filename}: {missing}")
         if (size := found.stat().st_size) > _MOST_MESH_BYTES:
-            most = f"at most {_MOST_MESH_BYTES // 10**6} MB, a million triangles in STL"
-            raise ConfigError(f"{found}: a mesh of {size // 10**6} MB", expected=most)
+            most = f"at most {_MOST_MESH_BYTES // 10**6} MB, which is a million triangles of STL"
+            raise ConfigError(f"{found}: should have {most}, has {size // 10**6} MB")
         self.sources.add(found)
         return found
 
