@@ -140,10 +140,11 @@ OF_THE_PROCESSOR = re.compile(
 HARMLESS = {
     "engines/as_described.py": {"np.sin", "np.cos", "np.linalg.norm", "np.linalg.eigvalsh", "@"},  # with tolerances
     "engines/bullet/scenery.py": {"@"},  # what is compared there
-    "engines/mesh.py": {"np.linalg.svd"},  # whether a mesh is flat
+    "engines/mesh.py": {"np.linalg.svd", "@"},  # whether a mesh is flat, and numbers of cells, which are integers
     "engines/mujoco/scenery.py": {"@"},  # what is compared there
     "robots/clear_postures.py": {"np.linalg.norm", "@"},  # bounds, compared with room to spare
-    "robots/description.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
+    "robots/derived.py": {"np.linalg.norm"},  # a reach that is only shown
+    "robots/joint_model.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
 }
 

@@ -117,7 +117,7 @@ FILES = {
     "mesh missing": (collide("a.stl"), ": {}/arm.urdf: link upper_link: a.stl: there is no file {}/a.stl"),
     "package missing": (
         collide("package://my_arm/a.stl"),
-        ": {}/arm.urdf: link upper_link: package://my_arm/a.stl: not found; robot.packages says where the directory",
+        ": {}/arm.urdf: link upper_link: package://my_arm/a.stl: not found; robot.packages takes the directory",
     ),
     "mesh unreadable": (collide("a.stl", b"x" * 200), ": {}/a.stl: cannot be read as a mesh: 200 bytes are no whole"),
     "mesh of another format": (
@@ -209,8 +209,8 @@ KEYS = {
     ),
     "no such example": ({"urdf": "example-robot-data:none.urdf"}, ".urdf: "),
     "no such package": (
-        {"urdf": "package://none/a.urdf"},
-        ".urdf: package://none/a.urdf: no such file\n  try: docs/robots",
+        {"urdf": "package://none/arm.urdf"},
+        ".urdf: package://none/arm.urdf: no such file\n  try: docs/robots",
     ),
     "a directory": ({"urdf": "."}, ".urdf: {}: is a directory"),
     "a number": ({"urdf": "3"}, ".urdf: should be a valid string, got 3"),

@@ -10,14 +10,12 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-import os
 import re
 import shutil
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from throwcollect.config.document import Document
@@ -25,26 +23,22 @@ from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.robot_config import ChainConfig, DescribedRobotConfig, LimitsConfig
 from throwcollect.engines.body import BodyJoint, BodyModel, LinkShape, to_text
 from throwcollect.engines.mesh import Mesh
-from throwcollect.errors import ConfigError, Problem
-from throwcollect.extras import MissingExtraError
-from throwcollect.files import suggest_path
+from throwcollect.errors import ConfigError
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.derived import derive
+from throwcollect.robots.description_files import find_mesh, find_urdf, make_error
 from throwcollect.robots.imported import SRDF, URDF, hash_files, make_robot, package_of
 from throwcollect.robots.joint_model import move_joint
-from throwcollect.robots.urdf import PACKAGE, locate_mesh, read_urdf, read_xml
+from throwcollect.robots.urdf import PACKAGE, read_urdf, read_xml
 from throwcollect.state_directory import state_directory
 from throwcollect.version import __version__
 from throwcollect.wording import suggest
 
 SECTION = "robot.yaml"
 _SOURCES = "sources.json"
-_EXAMPLES = "example-robot-data:"
 _TURN = 6.283185307179586
 _LARGEST_M = 10.0
 """No part of a robot is larger; meshes in millimetres are."""
-_MOST_MESH_BYTES = 50_000_000
-"""As many as a million triangles have in a binary STL."""
 _LARGE_BYTES = 100_000
 _HOLDING = 3
 """So many links before the flange hold the tool."""
@@ -69,7 +63,7 @@ def import_robot(section: DescribedRobotConfig) -> DescribedRobotConfig:
         # Such a directory may come from somebody else; in a workspace of ROS, links are usual.
         here = path.parent.resolve()
         if out := [each for each in path.parent.iterdir() if not each.resolve().is_relative_to(here)]:
-            raise _make_error("urdf", f"{out[0]}: a link that leads out of the directory of the robot")
+            raise make_error("urdf", f"{out[0]}: a link that leads out of the directory of the robot")
     directory = _find_cache(section, path)
     if not _is_current(directory):
         shutil.rmtree(directory, ignore_errors=True)
@@ -84,44 +78,6 @@ _DERIVED = {
     *("name", "urdf", "srdf", "packages", "flange", "tool_pose", "controllers", "fixed", "home", "limits", "gripper"),
     *("prismatic", "holding", "sha256"),
 }
-
-
-def find_urdf(urdf: str) -> Path:
-    """Find the file that the key `robot.urdf` names."""
-    if urdf.startswith(_EXAMPLES):
-        path = _find_examples() / urdf.removeprefix(_EXAMPLES)
-    elif urdf.startswith(PACKAGE):
-        package, _, rest = urdf.removeprefix(PACKAGE).partition("/")
-        path = next((share / rest for share in _list_shares(package)), Path(rest))
-    else:
-        path = Path(urdf)
-    if not path.is_file():
-        wrong = "is a directory" if path.is_dir() else "no such file"
-        near = "" if path.is_dir() or ":" in urdf else suggest_path(path)
-        raise _make_error(
-            "urdf",
-            f"{path if path.is_absolute() else urdf}: {wrong}{near}",
-            hint="docs/robots.md says how a robot is described",
-        )
-    return path
-
-
-def _find_examples() -> Path:
-    try:
-        return Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")))
-    except PackageNotFoundError as error:
-        raise MissingExtraError("example-robot-data", "collect") from error
-
-
-def _list_shares(package: str) -> Iterator[Path]:
-    """List the directories in which ROS has installed a package, by the environment."""
-    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        if prefix and (share := Path(prefix, "share", package)).is_dir():
-            yield share
-
-
-def _make_error(key: str, sentence: str, hint: str | None = None) -> ConfigError:
-    return ConfigError([Problem(sentence, f"robot.{key}" if key else "robot")], hint=hint)
 
 
 def _find_cache(section: DescribedRobotConfig, path: Path) -> Path:
@@ -159,7 +115,7 @@ class _Import:
         self.name = self._find_name()
         if section.flange not in self.urdf.links:
             sentence = f"{path} has no link {section.flange!r}{suggest(section.flange, self.urdf.links)}"
-            raise _make_error("flange", sentence)
+            raise make_error("flange", sentence)
         self._above = {joint.child: joint for joint in self.urdf.model.joints}
         self.chain = self._find_chain(section.flange)
         self.controllers = self._find_controllers()
@@ -170,28 +126,11 @@ class _Import:
         self.notes["name"] = "given" if given else "the name in the URDF"
         member = load_member("robots", name) if name in names_of("robots") else self._section
         if not (isinstance(member, DescribedRobotConfig) and (given or member.urdf == self._section.urdf)):
-            raise _make_error("name", f"{name} is the name of an installed robot; give another one")
+            raise make_error("name", f"{name} is the name of an installed robot; give another one")
         return name
 
     def _find_mesh(self, filename: str) -> Path:
-        if filename.startswith(PACKAGE):
-            package, _, rest = filename.removeprefix(PACKAGE).lstrip("/").partition("/")
-            places = [Path(given) for name, given in self._section.packages.items() if name == package]
-            # A package is a directory of its name, mostly one of those that the URDF lies in.
-            places += [above / package for above in self._path.resolve().parents]
-            places += [above for above in self._path.resolve().parents if above.name == package]
-            places += _list_shares(package)
-            # The meshes of an imported robot lie in the directory of its URDF.
-            found = next((place / rest for place in places if (place / rest).is_file()), self._path.parent / rest)
-            missing = f"not found; robot.packages says where the directory of {package} is"
-        else:
-            found = locate_mesh(filename, self._path.parent, self._path.parent)
-            missing = f"there is no file {found}"
-        if not found.is_file():
-            raise ConfigError(f"{filename}: {missing}")
-        if (size := found.stat().st_size) > _MOST_MESH_BYTES:
-            most = f"at most {_MOST_MESH_BYTES // 10**6} MB, which is a million triangles of STL"
-            raise ConfigError(f"{found}: should have {most}, has {size // 10**6} MB")
+        found = find_mesh(filename, self._path, self._section.packages)
         self.sources.add(found)
         return found
 
@@ -203,7 +142,7 @@ class _Import:
             chain.insert(0, self._above[link])
             link = self._above[link].parent
         if base is not None and link != base:
-            raise _make_error("controllers", f"no joints lead from the link {base} to {tip}")
+            raise make_error("controllers", f"no joints lead from the link {base} to {tip}")
         return chain
 
     def _find_controllers(self) -> dict[str, list[str]]:
@@ -211,11 +150,11 @@ class _Import:
         for key, names in (("fixed", section.fixed), ("limits", section.limits)):
             if unknown := [name for name in names if name not in joints]:
                 sentence = f"{self._path} has no joint {unknown[0]!r}{suggest(unknown[0], joints)}"
-                raise _make_error(f"{key}.{unknown[0]}", sentence)
+                raise make_error(f"{key}.{unknown[0]}", sentence)
         if section.controllers is None:
             found = [joint.name for joint in self.chain if self._can_move(joint) and joint.name not in section.fixed]
             if not found:
-                raise _make_error("flange", f"no joint moves {section.flange}")
+                raise make_error("flange", f"no joint moves {section.flange}")
             kind = f"{self.urdf.model.name} {self.name}".lower()
             known = (name for pattern, name in _KNOWN_CONTROLLERS if re.search(pattern, kind))
             name = next(known, _UNNAMED).format(self.name)
@@ -227,11 +166,11 @@ class _Import:
         given = {name: self._list_joints(name, each) for name, each in section.controllers.items()}
         named = [joint for each in given.values() for joint in each]
         if not all(given.values()) or not {joint.name for joint in self.chain} & set(named):
-            raise _make_error("controllers", f"each should have joints, and some should move {section.flange}")
+            raise make_error("controllers", f"each should have joints, and some should move {section.flange}")
         if twice := [joint for joint in named if named.count(joint) > 1]:
-            raise _make_error("controllers", f"the joint {twice[0]} is there twice")
+            raise make_error("controllers", f"the joint {twice[0]} is there twice")
         if both := [joint for joint in named if joint in section.fixed]:
-            raise _make_error(f"fixed.{both[0]}", "a controller commands this joint")
+            raise make_error(f"fixed.{both[0]}", "a controller commands this joint")
         return given
 
     def _list_joints(self, controller: str, given: list[str] | ChainConfig) -> list[str]:
@@ -239,15 +178,15 @@ class _Import:
         if isinstance(given, ChainConfig):
             for link in given.chain:
                 if link not in self.urdf.links:
-                    raise _make_error(key, f"{self._path} has no link {link!r}{suggest(link, self.urdf.links)}")
+                    raise make_error(key, f"{self._path} has no link {link!r}{suggest(link, self.urdf.links)}")
             base, tip = given.chain
             return [joint.name for joint in self._find_chain(tip, base) if self._can_move(joint)]
         for name in given:
             if name not in joints:
-                raise _make_error(key, f"{self._path} has no joint {name!r}{suggest(name, joints)}")
+                raise make_error(key, f"{self._path} has no joint {name!r}{suggest(name, joints)}")
             if not self._can_move(joint := joints[name]):
                 kind = f"mimics {joint.mimics}" if joint.mimics else f"is {joint.kind}"
-                raise _make_error(key, f"the joint {name} {kind}, so that no controller can command it")
+                raise make_error(key, f"the joint {name} {kind}, so that no controller can command it")
         return given
 
     @staticmethod
@@ -270,7 +209,7 @@ class _Import:
         given = self._section.limits.get(joint.name, LimitsConfig())
         key = f"limits.{joint.name}"
         if joint.limits is None and (given.max_velocity is None or given.max_effort is None):
-            raise _make_error(key, f"the joint is {joint.kind} without limits: give max_velocity and max_effort")
+            raise make_error(key, f"the joint is {joint.kind} without limits: give max_velocity and max_effort")
         lower, upper, velocity, effort = joint.limits or (-_TURN, _TURN, 0.0, 0.0)
         if joint.kind == "continuous":
             lower, upper = -_TURN, _TURN
@@ -278,10 +217,10 @@ class _Import:
         upper = upper if given.max_position is None else given.max_position
         velocity, effort = given.max_velocity or velocity, given.max_effort or effort
         if not lower < upper:
-            raise _make_error(key, f"min_position should be below max_position, got {lower:g} and {upper:g}")
+            raise make_error(key, f"min_position should be below max_position, got {lower:g} and {upper:g}")
         for name, value in (("max_velocity", velocity), ("max_effort", effort)):
             if value <= 0:
-                raise _make_error(key, f"the URDF has no {name} above 0: give one")
+                raise make_error(key, f"the URDF has no {name} above 0: give one")
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
         return replace(joint, kind=kind, limits=(lower, upper, velocity, effort))
 
