@@ -96,12 +96,12 @@ def find_mesh(package: str, path: str) -> Path:
 
 
 def _find_carried(*names: str) -> Path | None:
-    """Find a mesh that the dataset of a run carries; as names are made of contents, it does not matter which dataset."""
-    for update in (lambda: None, _look_for_carried):
-        update()
-        for name in names:
-            if (file := _carried.get(name)) is not None and file.is_file():
-                return file
+    """Find a mesh that a dataset of a run carries; it does not matter which one, as names are made of contents."""
+    for is_known in (True, False):
+        if not is_known:
+            _look_for_carried()
+        if found := [file for name in names if (file := _carried.get(name)) is not None and file.is_file()]:
+            return found[0]
     return None
 
 

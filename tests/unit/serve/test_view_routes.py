@@ -78,7 +78,9 @@ def test_a_robot_is_drawn_from_the_dataset_that_carries_it(
 ) -> None:
     directory = tmp_path / "datasets" / "a"
     directory.mkdir(parents=True)
-    (tmp_path / "panda.yaml").write_text("trials: 3\nrobot: {name: panda}\ntask: {start: {panda_joint4: -2.0}, end: {panda_joint4: -1.0}}\n")
+    (tmp_path / "panda.yaml").write_text(
+        "trials: 3\nrobot: {name: panda}\ntask: {start: {panda_joint4: -2.0}, end: {panda_joint4: -1.0}}\n"
+    )
     write_config(directory, load(tmp_path / "panda.yaml"))
     shutil.rmtree(state / "robots")
     remember("a", lives=False)
