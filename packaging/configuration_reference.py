@@ -16,12 +16,12 @@ if __name__ == "__main__":
     # from all members.
     members.entry_points = lambda **_: EntryPoints(())  # type: ignore[assignment]
 
-from throwcollect.config.kinds import all_joints
 from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section
 from throwcollect.config.shape import ValueShape, json_schema, root
 from throwcollect.config.values import sweepable_keys
+from throwcollect.robots.talos import TALOS
 
 _INTRODUCTION = """\
 # Configuration
@@ -160,7 +160,7 @@ def _list_sweepable() -> str:
     primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
     learned: Section = config.task.model_copy(update={"trajectory": primitive})
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
-    joints = "|".join(all_joints())
+    joints = "|".join(TALOS.joints)
     general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _generalise, key) for key in keys)
     where = (
         "A joint must be in `task.end`, one with an offset in `robot.joint_offsets`, too, and a weight in "

@@ -6,10 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
-from pydantic_core import CoreSchema
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
-from throwcollect.members import import_own, usable_names
+from throwcollect.members import import_own
 from throwcollect.wording import suggest
 
 
@@ -43,12 +42,6 @@ def unknown_joint(name: str, robot: Any) -> str:
     return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"
 
 
-def all_joints() -> tuple[str, ...]:
-    """List the joints of all robots that can be loaded, each once."""
-    robots = [find_robot(name) for name in usable_names("robots")]
-    return tuple(dict.fromkeys(joint for robot in robots for joint in robot.joints))
-
-
 def _require_joint(name: str, info: ValidationInfo) -> str:
     # The context is the robot, which only the loader passes. Without it, `Config` checks the joints later.
     if info.context is not None and name not in info.context.joints:
@@ -56,15 +49,11 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
     return name
 
 
-class _JointSchema:
-    """Lists the joints only when a JSON Schema is made, because listing them imports all robots."""
-
-    @staticmethod
-    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"type": "string", "title": "Joint", "enum": list(all_joints())}
-
-
-Joint = Annotated[str, AfterValidator(_require_joint), _JointSchema]
+# Any URDF may name other joints, so the JSON Schema lists none. Pydantic describes keys of mappings only if they have a
+# bound; `shape` tells joints by that.
+Joint = Annotated[
+    str, AfterValidator(_require_joint), WithJsonSchema({"type": "string", "title": "Joint", "minLength": 1})
+]
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 LONGEST_NAME = 64
 NAME_WORDS = f"up to {LONGEST_NAME} lower-case letters, digits, - and _, first a letter or digit"

@@ -21,7 +21,7 @@ from throwcollect.coordinator.prepare import (
     prepare,
     read_listed_points,
 )
-from throwcollect.dataset.carried_robot import config_text, write_config
+from throwcollect.dataset.carried_robot import carry_robot, config_text, find_files, write_config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import METADATA, PLAN, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
@@ -74,6 +74,10 @@ def resume(
         stored = _read_stored_config(directory)
         if stored is not None:
             refuse_changes(directory, stored, given)
+            # The files may be damaged; those of the given configuration are the same.
+            carry_robot(given, directory)
+        if find_files(given) is not None:
+            _ = given.robot.find().directory
         damaged = _find_damaged(directory, onlooker)
         old = None if PLAN in damaged else _read_stored_plan(directory, stored, given)
         # The list may be read and written below, and a link in its place could lead to any file of the user.

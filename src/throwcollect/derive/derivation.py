@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 
 from throwcollect.config.values import column_of
+from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.directory import CARD, SOURCES, shard_of
@@ -95,6 +96,7 @@ def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
     _check_copies(copies, plan)
     channels = _read_channels(sources)
     create(directory, plan, listed=plan.trials.points)
+    carry_robot(sources[0].config, directory)
     table, rows = ThrowsTable.of(plan), [RowsByTrial(source.throws) for source in sources]
     tables, recordings = [], []
     progress = log_progress(copies, len(copies), "trial", "written")

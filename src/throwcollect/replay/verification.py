@@ -10,7 +10,7 @@ from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.provenance import find_versions, read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.errors import DatasetError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError
 from throwcollect.files import StrPath
 from throwcollect.replay.audit import replay_throws, require_simulating, select_trials
@@ -48,6 +48,10 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: 
         dataset = Dataset.open(directory)
         if count := count_replayed(dataset, replay):
             findings += _find_different_throws(dataset, count)
+    except ConfigError:
+        # The files of the robot may be damaged.
+        if not findings:
+            raise
     except DatasetError as error:
         if not findings:
             findings.append(Finding("", "", f"cannot be replayed: {error.message}"))
