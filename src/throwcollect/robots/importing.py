@@ -359,7 +359,7 @@ class _Import:
             "urdf": f"from {self._path.name}",
             "prismatic": "as in the URDF",
             "flange": "given",
-            "tool_pose": "given" if "tool_pose" in given else "the handle along +z of the flange",
+            "tool_pose": "given" if "tool_pose" in given else "the handle begins at the flange, along +z of it",
             "base_height_m": "given" if "base_height_m" in given else "on a table",
         }
         return {
