@@ -11,8 +11,7 @@ from typing import Any
 
 import zenoh
 
-from rclzenoh.attachment import Attachment, unpack
-from rclzenoh.endpoint import Endpoint
+from rclzenoh.endpoint import Attachment, Endpoint, unpack
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces import Message, deserialize, serialize
 from rclzenoh.interfaces import Service as ServiceType

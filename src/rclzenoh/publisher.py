@@ -9,8 +9,7 @@ from typing import Any
 import zenoh
 from zenoh.ext import CacheConfig, MissDetectionConfig, declare_advanced_publisher
 
-from rclzenoh.attachment import Attachment
-from rclzenoh.endpoint import Endpoint
+from rclzenoh.endpoint import Attachment, Endpoint
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces import Message, serialize
 from rclzenoh.keys import EntityKind

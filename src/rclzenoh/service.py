@@ -9,8 +9,7 @@ from typing import Any
 
 import zenoh
 
-from rclzenoh.attachment import Attachment, unpack
-from rclzenoh.endpoint import Endpoint
+from rclzenoh.endpoint import Attachment, Endpoint, unpack
 from rclzenoh.interfaces import Message, deserialize, serialize
 from rclzenoh.interfaces import Service as ServiceType
 from rclzenoh.keys import EntityKind

@@ -10,8 +10,7 @@ from typing import Any
 import zenoh
 from zenoh.ext import HistoryConfig, RecoveryConfig, declare_advanced_subscriber
 
-from rclzenoh.attachment import unpack
-from rclzenoh.endpoint import Endpoint
+from rclzenoh.endpoint import Endpoint, unpack
 from rclzenoh.interfaces import Message, deserialize
 from rclzenoh.keys import EntityKind
 from rclzenoh.mailbox import Receiver

@@ -48,7 +48,7 @@ ATTEMPT = f"""
 import json, os, sys, time, zenoh
 from throwcollect.errors import ConfigError
 from throwcollect.ros.zenoh_errors import zenoh_errors
-from rclzenoh.health import REQUEST, attachment
+from throwcollect.ros.health_check import REQUEST, attachment
 from rclzenoh.session_config import environment_config
 {BECOME_NOBODY}
 heard = []

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import zenoh
 
-from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.endpoint import Attachment, unpack
 from rclzenoh.interfaces import deserialize, get_service, serialize, type_hash
 from rclzenoh.keys import data_key
 from rclzenoh.qos import QoSProfile

@@ -15,7 +15,6 @@ from throwcollect.config.values import differences
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.prepare import (
     check_room,
-    count_before,
     draw_plan,
     make_self_contained,
     prepare,
@@ -34,8 +33,6 @@ from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
-
-_NO_EPISODE = "no whole episode of it was left"
 
 
 def resume(
@@ -123,7 +120,7 @@ def _make_plan(
         # The digest of the plan also depends on the order of keys, which may have been changed in the file.
         lost_list = own_list and (TRIALS in damaged or not _has_own_list(directory, old))
         return replace(old, config=old.config.run_as(config)), old.trials.points if lost_list else None
-    check_room(directory, count_before(given))
+    check_room(directory, given.trials or 0)
     drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
     plan = _extend(directory, old, replace(drawn, config=config))
     return plan, read_listed_points(given, directory=sweep_directory)

@@ -16,7 +16,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.extras import require, require_engine
 from throwcollect.progress_log import log_progress
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
-from throwcollect.trial.choice import choose_trials
+from throwcollect.sweep.trials import choose_trials
 
 _Found = TypeVar("_Found")
 
