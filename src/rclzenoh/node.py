@@ -12,8 +12,8 @@ from rclzenoh.node_graph import NodeGraph
 from rclzenoh.node_parameters import NodeParameters, offer_parameters
 from rclzenoh.parameter import Parameter
 from rclzenoh.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events, qos_profile_rosout
-from rclzenoh.subscription import Subscription
 from rclzenoh.time import Time
+from rclzenoh.topic import Subscription
 
 _CLOCK_TOPIC = "/clock"
 _USE_SIM_TIME = "use_sim_time"
