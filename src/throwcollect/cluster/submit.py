@@ -14,7 +14,7 @@ from pathlib import Path
 from throwcollect.cluster import slurm
 from throwcollect.cluster.cluster_run import ClusterRun
 from throwcollect.cluster.script import BatchScripts
-from throwcollect.cluster.site import with_site
+from throwcollect.cluster.slurm import with_site
 from throwcollect.cluster.submission import (
     CLUSTER,
     Job,

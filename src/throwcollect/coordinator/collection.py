@@ -13,9 +13,8 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from throwcollect.coordinator.leases import Leases
+from throwcollect.coordinator.leases import Leases, Prefix
 from throwcollect.coordinator.lookahead import Lookahead
-from throwcollect.coordinator.prefix import Prefix
 from throwcollect.coordinator.prepare import count_first, feasibility_check
 from throwcollect.coordinator.progress import Progress, TrialRate
 from throwcollect.coordinator.replay_check import ReplayCheck

@@ -19,9 +19,9 @@ from rclzenoh.keys import data_key
 from rclzenoh.session_config import OPEN, connect_endpoint, domain_of_environment, environment_config
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import is_beating
+from throwcollect.ros.connection import zenoh_errors
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
-from throwcollect.ros.zenoh_errors import zenoh_errors
 
 NODE_VARIABLE = "THROWCOLLECT_NODE"
 """Name of the environment variable that names the node of a container."""
