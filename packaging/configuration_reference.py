@@ -86,7 +86,8 @@ def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
             yield f"### Keys that may be swept\n\n{_list_sweepable()}\n"
         elif len(alternatives) > 1 and all(each.keys for each in alternatives):
             for each in alternatives:
-                yield f"### `{key}` with `{_find_discriminator(each)}`\n\n{each.node['description']}\n"
+                yield f"{'###' if prefix else '##'} `{key}` with `{_find_discriminator(each)}`\n"
+                yield f"{each.node['description']}\n"
                 yield from _write_sections(each, f"{key}.")
         elif len(twins := _find_twins(shape, child)) > 1:
             if name == twins[0]:
@@ -95,15 +96,16 @@ def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
         elif child.keys:
             yield f"## `{key}`\n\n{child.node['description']}\n"
             yield from _write_sections(child, f"{key}.")
-        elif child.child(0).keys:
-            yield f"### Items of `{key}`\n\n{child.child(0).node['description']}\n"
-            yield _write_table(child.child(0), "")
+        else:
+            for item in (each for part in (0, "") for each in child.child(part).alternatives if each.keys):
+                yield f"### Items of `{key}`\n\n{item.node['description']}\n"
+                yield _write_table(item, "")
 
 
 def _find_discriminator(shape: ValueShape) -> str:
-    """Find what distinguishes a section from its alternatives: a key that takes one word, or else its first key."""
+    """Find what distinguishes a section from its alternatives: a key that takes one word, or its first required key."""
     words = (f"{name}: {child.node['const']}" for name, child in shape.keys.items() if "const" in child.node)
-    return next(words, next(iter(shape.keys)))
+    return next(words, next(iter(shape.node.get("required", shape.keys))))
 
 
 def _find_twins(shape: ValueShape, child: ValueShape) -> list[str]:

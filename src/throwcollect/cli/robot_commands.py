@@ -108,8 +108,7 @@ def read_robot(robot: str, flange: str | None = None, settings: list[str] | None
     if not flange:
         known = suggest(robot, names_of("robots"))
         raise ConfigError(
-            f"{robot}: no such robot is installed{known}",
-            hint="a URDF needs the link that holds the tool: --flange LINK (docs/robots.md)",
+            f"{robot}: no such robot is installed{known}", hint="docs/robots.md says how a robot is described"
         )
     given = {"urdf": robot, "flange": flange}
     return read_robot_section(None, [*(f"robot.{key}={value_as_yaml(each)}" for key, each in given.items()), *keys])

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -122,9 +123,12 @@ def _find_robot(document: Document, directory: Path) -> Any:
     if isinstance(section, DescribedRobotConfig):
         section = section.below(directory)
     try:
-        document.values["robot"] = section = complete_robot(section)
+        section = complete_robot(section)
     except ConfigError as error:
-        raise ConfigError([document.place(problem) for problem in error.problems], hint=error.hint) from error
+        placed = [document.place(replace(problem, key=problem.key or "robot")) for problem in error.problems]
+        raise ConfigError(placed, expected=error.expected, hint=error.hint) from error
+    if isinstance(section, DescribedRobotConfig):
+        document.values["robot"] = section
     return section.find()
 
 
@@ -138,9 +142,8 @@ def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> Robo
     for override in overrides:
         document.override(override)
     document.values = {"robot": document.values.get("robot", {})}
-    if _find_robot(document, Path() if path is None else path.parent) is None:
-        document.validate(_RobotOnly)
-    section: RobotConfig = document.values["robot"]
+    _find_robot(document, Path() if path is None else path.parent)
+    section: RobotConfig = document.validate(_RobotOnly).robot
     return section
 
 

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, WithJsonSchema
 from typing_extensions import Self
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint, Name, find_robot
 from throwcollect.config.section import Section, any_of
 from throwcollect.members import names_of
+from throwcollect.wording import suggest
 
-if TYPE_CHECKING:
-    RobotName = str
-else:
-    # The members are known only when the program runs.
-    RobotName = Literal[names_of("robots")]
+
+def _require_robot(name: str) -> str:
+    if name not in (known := names_of("robots")):
+        raise ValueError(f"no robot {name!r} is installed{suggest(name, known)}; docs/robots.md says how to add one")
+    return name
+
 
 _Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 
@@ -26,7 +28,7 @@ _Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 class RobotConfig(Section):
     """The robot and how its motors follow commands."""
 
-    name: RobotName = "talos"
+    name: Annotated[str, AfterValidator(_require_robot), WithJsonSchema({"enum": [*names_of("robots")]})] = "talos"
     """Robot, with its base fixed: Talos of PAL Robotics is `talos_reduced` of example-robot-data. Packages may add
     others; `throwcollect robot list` lists them. With `urdf`, it is the name in files and ROS, by default that
     of the URDF."""
@@ -89,11 +91,7 @@ class ChainConfig(Section):
 
 
 class DescribedRobotConfig(RobotConfig):
-    """A robot that a URDF describes; `throwcollect robot import` writes all of these keys, and how each was found.
-
-    Attributes:
-        sha256: Digest of the files of a robot that has been imported; None if the URDF is as its makers wrote it.
-    """
+    """A robot that a URDF describes; `throwcollect robot import` writes all of these keys, and how each was found."""
 
     name: Name = ""
     base_height_m: Annotated[float, Field(ge=0, le=3)] = 0.8

@@ -16,7 +16,7 @@ from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import ContradictionError, Name
+from throwcollect.config.kinds import ContradictionError, Name, unknown_joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
@@ -237,11 +237,12 @@ class Config(Section):
             unknown = [joint for joint in joints if joint not in robot.joints]
             if unknown and section in ("task.start", "task.end") and section[5:] not in self.task.model_fields_set:
                 # The user has written none of these joints: they come from the default.
-                init = f"throwcollect init --robot {self.robot.name}"
+                which = self.robot.name if type(self.robot) is RobotConfig else f"URDF --flange {robot.hand}"
+                init = f"throwcollect init --robot {which}"
                 yield section, f"missing, and the default has joints that {robot.title} lacks; `{init}` writes one"
                 continue
             for joint in unknown:
-                yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
+                yield f"{section}.{joint}", unknown_joint(joint, robot)
 
     def without_run(self) -> Config:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""

@@ -52,7 +52,9 @@ class ValueShape:
     def child(self, part: str | int) -> ValueShape:
         """Find the shape of the value under a key or an index; it allows anything if there should be no value."""
         for shape in self.alternatives:
-            rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
+            # A mapping whose keys match a pattern has its values below this pattern.
+            values = [*shape.node.get("patternProperties", {}).values(), shape.node.get("additionalProperties")]
+            rest = shape.node.get("items") if isinstance(part, int) else values[0]
             if node := shape.node.get("properties", {}).get(part) or rest:
                 # The numbers of a mapping or a list have the unit of the key that holds it, such as angles by joint.
                 inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
@@ -101,8 +103,6 @@ def _describe(shape: ValueShape) -> str:
     node = shape.node
     if own := node.get("words"):
         return str(own)
-    if node.get("title") == "Joint":
-        return "joint"
     if words := _list_words(node):
         return " or ".join(f"'{word}'" for word in words)
     kind = str(node.get("type", "anything"))
@@ -113,6 +113,6 @@ def _describe(shape: ValueShape) -> str:
             return "{" + ", ".join(f"{key}: …" for key in required) + "}"
         if "properties" in node:
             return "keys and values"
-        return f"mapping from {'joint' if 'propertyNames' in node else 'key'} to {shape.child('')}"
+        return f"mapping from {node.get('propertyNames', {}).get('words', 'key')} to {shape.child('')}"
     bounds = ", ".join(f"{sign} {node[bound]}" for bound, sign in _BOUNDS.items() if bound in node)
     return " ".join(filter(None, [kind, bounds, shape.unit if kind in ("number", "integer") else ""]))

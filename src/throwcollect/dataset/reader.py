@@ -31,7 +31,6 @@ from throwcollect.extras import lazily
 from throwcollect.files import StrPath
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.robot import Robot
 from throwcollect.sweep.arrow_column import count_values, find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
@@ -116,9 +115,7 @@ class Dataset(Sequence[Throw]):
         if isinstance(which, slice):
             return replace(self, throws=self.throws.take(pa.array(range(len(self))[which], pa.int64())))
         position = range(len(self))[which]
-        return Throw(
-            self.throws, position, self.plan.keys, self._stored[position], str(self.directory), self._robot.sliding
-        )
+        return Throw(self.throws, position, self.plan.keys, self._stored[position], str(self.directory), self._sliding)
 
     def __contains__(self, column: object) -> bool:
         return column in self.throws.column_names
@@ -269,7 +266,7 @@ class Dataset(Sequence[Throw]):
     @property
     def joints(self) -> tuple[str, ...]:
         """All joints of the robot, in the order of the columns of joints."""
-        return self._robot.joints
+        return robot_of(self.config).joints
 
     @property
     def moving_joints(self) -> tuple[str, ...]:
@@ -277,8 +274,8 @@ class Dataset(Sequence[Throw]):
         return tuple(joint for joint in self.joints if joint in self.config.task.end)
 
     @cached_property
-    def _robot(self) -> Robot:
-        return robot_of(self.config)
+    def _sliding(self) -> frozenset[str]:
+        return robot_of(self.config).sliding
 
     @cached_property
     def _stored(self) -> Sequence[StoredThrow | None]:

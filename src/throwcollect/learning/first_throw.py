@@ -109,10 +109,12 @@ class _Search:
         limits = joint_limits(self._robot)
         order = [self._robot.joints.index(joint) for joint in self._joints]
         self._velocity = limits.velocity[order]
-        self._lower = np.maximum(limits.lower[order], -2 * math.pi) + _MARGIN_RAD
-        self._upper = np.minimum(limits.upper[order], 2 * math.pi) - _MARGIN_RAD
+        lower = np.maximum(limits.lower[order], -2 * math.pi)
+        upper = np.minimum(limits.upper[order], 2 * math.pi)
+        margin = np.minimum(_MARGIN_RAD, (upper - lower) / 20)
+        self._lower, self._upper = lower + margin, upper - margin
         self._data = self._postures.model.createData()
-        self._carrying = self._postures.carrying
+        self._carrying = [index for index in self._postures.carrying if self._velocity[index] > 0]
         self._base_m = robot.base_height_m
 
     def run(self) -> FirstThrow:
@@ -127,6 +129,8 @@ class _Search:
         candidates = sorted(
             (each for start in starts for each in self._draw_motions(start)), key=lambda each: -each.speed
         )
+        if not candidates:
+            raise ConfigError(f"{self._robot.title}: no joint that carries the hand can move by {_LEAST_RAD:g} rad")
         self._say(f"{format_count(len(starts), 'posture')} hold the ball; tries {len(candidates)} motions")
         config = self._make_config(candidates[0].start, candidates[0].end, 1.0, self._carrying)
         feasibility, simulator = Feasibility(config), Simulator(config)
@@ -156,7 +160,7 @@ class _Search:
     def _draw_motions(self, start: NDArray[np.float64]) -> Iterator[_Candidate]:
         """Draw motions from a posture, with a rough speed of the ball at its release [m/s]."""
         begin = np.clip(start, self._lower, self._upper)
-        for _ in range(_MOTIONS):
+        for _ in range(_MOTIONS if self._carrying else 0):
             count = int(self._random.integers(1, min(_MOST_MOVING, len(self._carrying)) + 1))
             moving = self._random.choice(self._carrying, size=count, replace=False)
             end = begin.copy()

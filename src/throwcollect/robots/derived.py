@@ -142,6 +142,11 @@ def derive(robot: Robot, section: DescribedRobotConfig) -> tuple[str, str]:
         postures.allowed |= set(_read_allowed(source, set(robot.description.links)))
         pairs = f"those of {Path(section.srdf or '').name}, {pairs}"
     home, origin = _find_home(robot, section, source, postures)
+    for joint, position in home.items():
+        lower, upper, *_ = robot.description.joints[joint].limits or (0.0, 0.0)
+        if not lower <= position <= upper:
+            sentence = f"{position:g} is beyond the limits of {joint}, {lower:g} to {upper:g}; from: {origin}"
+            raise ConfigError([Problem(sentence, "robot.home")])
     root = ElementTree.Element("robot", name=robot.name)
     state = ElementTree.SubElement(root, "group_state", name=HOME, group="all")
     for joint, position in home.items():

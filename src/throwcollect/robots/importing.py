@@ -27,6 +27,7 @@ from throwcollect.engines.body import BodyJoint, BodyModel, LinkShape, to_text
 from throwcollect.engines.mesh import Mesh
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.extras import MissingExtraError
+from throwcollect.files import suggest_path
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.derived import derive
 from throwcollect.robots.imported import SRDF, URDF, hash_files, make_robot, package_of
@@ -42,7 +43,8 @@ _EXAMPLES = "example-robot-data:"
 _TURN = 6.283185307179586
 _LARGEST_M = 10.0
 """No part of a robot is larger; meshes in millimetres are."""
-_MOST_TRIANGLES = 1_000_000
+_MOST_MESH_BYTES = 50_000_000
+"""As many as a million triangles have in a binary STL."""
 _LARGE_BYTES = 100_000
 _HOLDING = 3
 """So many links before the flange hold the tool."""
@@ -63,6 +65,11 @@ def import_robot(section: DescribedRobotConfig) -> DescribedRobotConfig:
         ConfigError: If a file cannot be read, or something in it or in the section is wrong.
     """
     path = find_urdf(section.urdf)
+    if (path.parent / SECTION).is_file():
+        # Such a directory may come from somebody else; in a workspace of ROS, links are usual.
+        here = path.parent.resolve()
+        if out := [each for each in path.parent.iterdir() if not each.resolve().is_relative_to(here)]:
+            raise _make_error("urdf", f"{out[0]}: a link that leads out of the directory of the robot")
     directory = _find_cache(section, path)
     if not _is_current(directory):
         shutil.rmtree(directory, ignore_errors=True)
@@ -90,7 +97,12 @@ def find_urdf(urdf: str) -> Path:
         path = Path(urdf)
     if not path.is_file():
         wrong = "is a directory" if path.is_dir() else "no such file"
-        raise _make_error("urdf", f"{path}: {wrong}", hint="docs/robots.md says how a robot is described")
+        near = "" if path.is_dir() or ":" in urdf else suggest_path(path)
+        raise _make_error(
+            "urdf",
+            f"{path if path.is_absolute() else urdf}: {wrong}{near}",
+            hint="docs/robots.md says how a robot is described",
+        )
     return path
 
 
@@ -156,7 +168,8 @@ class _Import:
         given = self._section.name
         name = given or re.sub(r"[^a-z0-9_-]+", "_", self.urdf.model.name.lower()).strip("_-") or "robot"
         self.notes["name"] = "given" if given else "the name in the URDF"
-        if name in names_of("robots") and not isinstance(load_member("robots", name), DescribedRobotConfig):
+        member = load_member("robots", name) if name in names_of("robots") else self._section
+        if not (isinstance(member, DescribedRobotConfig) and (given or member.urdf == self._section.urdf)):
             raise _make_error("name", f"{name} is the name of an installed robot; give another one")
         return name
 
@@ -169,16 +182,16 @@ class _Import:
             places += [above for above in self._path.resolve().parents if above.name == package]
             # The meshes of an imported robot lie in the directory of its URDF.
             places += [*_list_shares(package), self._path.parent]
-            for place in places:
-                if (place / rest).is_file():
-                    self.sources.add(place / rest)
-                    return place / rest
-            raise ConfigError(
-                f"{filename}: not found; robot.packages says where the directory of {package} is",
-            )
-        found = locate_mesh(filename, self._path.parent, self._path.parent)
+            found = next((place / rest for place in places if (place / rest).is_file()), self._path.parent / rest)
+            missing = f"not found; robot.packages says where the directory of {package} is"
+        else:
+            found = locate_mesh(filename, self._path.parent, self._path.parent)
+            missing = f"there is no file {found}"
         if not found.is_file():
-            raise ConfigError(f"{filename}: there is no file {found}")
+            raise ConfigError(f"{filename}: {missing}")
+        if (size := found.stat().st_size) > _MOST_MESH_BYTES:
+            most = f"at most {_MOST_MESH_BYTES // 10**6} MB, which is a million triangles of STL"
+            raise ConfigError(f"{found}: should have {most}, has {size // 10**6} MB")
         self.sources.add(found)
         return found
 
@@ -213,6 +226,8 @@ class _Import:
         self.notes["controllers"] = "given"
         given = {name: self._list_joints(name, each) for name, each in section.controllers.items()}
         named = [joint for each in given.values() for joint in each]
+        if not all(given.values()) or not {joint.name for joint in self.chain} & set(named):
+            raise _make_error("controllers", f"each should have joints, and some should move {section.flange}")
         if twice := [joint for joint in named if named.count(joint) > 1]:
             raise _make_error("controllers", f"the joint {twice[0]} is there twice")
         if both := [joint for joint in named if joint in section.fixed]:
@@ -233,8 +248,6 @@ class _Import:
             if not self._can_move(joint := joints[name]):
                 kind = f"mimics {joint.mimics}" if joint.mimics else f"is {joint.kind}"
                 raise _make_error(key, f"the joint {name} {kind}, so that no controller can command it")
-        if not given:
-            raise _make_error(key, "names no joint")
         return given
 
     @staticmethod
@@ -307,9 +320,6 @@ class _Import:
         """Replace a mesh by its convex hull, as which it collides in every engine."""
         if shape.mesh is None:
             return shape
-        count = len(shape.mesh.triangles)
-        if count > _MOST_TRIANGLES:
-            raise ConfigError(f"{shape.mesh.path}: a mesh of {count} triangles", expected=f"at most {_MOST_TRIANGLES}")
         corners = shape.mesh.triangles.reshape(-1, 3) * shape.size
         if (extent := float((corners.max(axis=0) - corners.min(axis=0)).max())) > _LARGEST_M:
             raise ConfigError(
@@ -416,6 +426,10 @@ def _fill(directory: Path, section: DescribedRobotConfig, path: Path) -> None:
             # Another process has imported the same robot meanwhile.
             if not _is_current(directory):
                 raise
+    except ConfigError as error:
+        # The user knows the source, and not the copy.
+        known = [replace(each, message=each.message.replace(str(scratch / URDF), str(path))) for each in error.problems]
+        raise ConfigError(known, expected=error.expected, hint=error.hint) from error
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 

@@ -34,6 +34,14 @@ PACKAGE = "package://"
 """Beginning of the URLs of meshes in a description, which the name of a package follows."""
 
 _LARGEST_NUMBER = 1e6
+_LARGEST_BYTES = 32 << 20
+_OTHERS = {
+    "mujoco": "MJCF, not URDF; mjcf-urdf-simple-converter converts it",
+    "sdf": "SDF, not URDF; sdf2urdf of sdformat_tools converts it",
+    "#usda": "USD, not URDF; usd_to_urdf of nvidia-srl-usd-to-urdf converts it",
+    "PXR-U": "USD, not URDF; usd_to_urdf of nvidia-srl-usd-to-urdf converts it",
+}
+"""Other formats, by the root or the first bytes of a file, and what converts them."""
 _LEAST_AXIS = 1e-3
 _KINDS = ("fixed", "revolute", "continuous", "prismatic", "floating", "planar")
 
@@ -69,7 +77,11 @@ def parse_xml(content: str | bytes, name: str) -> ElementTree.Element:
         return ElementTree.fromstring(content)  # noqa: S314 - expat limits the growth of entities since 2.4
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         # An encoding that Python does not know is a LookupError.
-        raise ConfigError(f"{name}: cannot be read as robot description: not well-formed XML: {error}") from error
+        begin = content[:5] if isinstance(content, str) else content[:5].decode("latin-1")
+        wrong = f"not well-formed XML: {error}" if begin else "the file is empty"
+        if begin in _OTHERS:
+            wrong = f"is {_OTHERS[begin]}"
+        raise ConfigError(f"{name}: cannot be read as robot description: {wrong}") from error
 
 
 def read_xml(path: Path) -> ElementTree.Element:
@@ -79,6 +91,10 @@ def read_xml(path: Path) -> ElementTree.Element:
         ConfigError: If it cannot be read.
     """
     try:
+        if (size := path.stat().st_size) > _LARGEST_BYTES:
+            raise ConfigError(
+                f"{path}: a description of {size >> 20} MB", expected=f"at most {_LARGEST_BYTES >> 20} MB"
+            )
         content = path.read_bytes()
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read as robot description: {error.strerror}") from error
@@ -134,8 +150,8 @@ class _Reader:
     def read(self) -> Urdf:
         root = self._root
         if root.tag != "robot":
-            self._fail(f"is <{root.tag:.40}>, not URDF, whose root is <robot>")
-        if any("xacro" in element.tag for element in root.iter()):
+            self._fail(f"is {_OTHERS.get(root.tag, f'<{root.tag:.40}>, not URDF, whose root is <robot>')}")
+        if any("xacro" in each.tag or "${" in "".join(each.attrib.values()) for each in root.iter()):
             self._fail("is xacro, not URDF; convert it with `xacro FILE > robot.urdf`")
         elements = {self._read_name(link): link for link in root.findall("link")}
         joints = {self._read_name(joint): self._read_joint(joint) for joint in root.findall("joint")}

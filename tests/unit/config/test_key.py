@@ -57,7 +57,10 @@ def test_sweepable_keys_are_those_with_an_effect_on_physics_or_task():
 
 
 def test_keys_that_name_files_or_resources_of_a_machine_are_operator_keys():
-    assert list_operator_keys() == ("sweep.file", "run", "containers", "cluster")
+    assert list_operator_keys() == (
+        *("robot.urdf", "robot.packages", "robot.srdf"),
+        *("sweep.file", "run", "containers", "cluster"),
+    )
 
 
 def test_operator_keys_are_found_in_sections_of_unions_and_optional_sections():

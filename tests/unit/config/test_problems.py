@@ -12,7 +12,7 @@ from throwcollect.errors import ConfigError, PlanError, Problem
     ("text", "messages"),
     [
         ("trails: 3", ["trails: unknown key; did you mean 'trials'?"]),
-        ("robot: {urdf: my.urdf}", ["robot.urdf: unknown key; known: name, base_height_m, posture, locked,"]),
+        ("robot: {urdf: my.urdf}", ["robot.flange: missing"]),
         (
             "containers: {sim: {options: {shm_siez: 1m}}}",
             ["containers.sim.options.shm_siez: unknown key; did you mean"],

@@ -1,6 +1,8 @@
 import pytest
 
+from throwcollect.config.kinds import NAME_WORDS
 from throwcollect.config.shape import json_schema, shape_of
+from throwcollect.members import names_of
 
 
 @pytest.mark.parametrize(
@@ -8,8 +10,10 @@ from throwcollect.config.shape import json_schema, shape_of
     [
         (("seed",), "integer ≥ 0, < 4294967296"),
         (("trials",), "integer ≥ 1, ≤ 10000000 or null"),
-        (("robot",), "keys and values"),
-        (("robot", "name"), "'talos'"),
+        (("robot",), "keys and values or {urdf: …, flange: …}"),
+        (("robot", "name"), " or ".join(map(repr, names_of("robots")))),
+        (("robot", "locked"), "'auto' or 'none' or list of joint"),
+        (("robot", "controllers"), f"mapping from {NAME_WORDS} to list of string or {{chain: …}} or null"),
         (("robot", "position_gain_per_s"), "number > 0, ≤ 1000 1/s"),
         (("task", "trajectory", "weights"), "mapping from joint to list of number rad"),
         (("sweep", "parameters"), "mapping from key to {min: …, max: …} or {values: …}"),

@@ -47,9 +47,16 @@ def test_the_path_of_the_tool_of_a_planar_arm_agrees_with_trigonometry() -> None
         assert turn[row][:, 0] == pytest.approx((math.cos(angle), math.sin(angle), 0.0), abs=1e-12)
 
 
-def test_a_prismatic_joint_is_refused_by_name() -> None:
-    with pytest.raises(ConfigError, match="joint elbow: the engine ballistic knows no prismatic joints"):
-        ToolPath(planar("prismatic"))
+def test_a_prismatic_joint_moves_the_tool_along_its_axis() -> None:
+    place, turn = ToolPath(planar("prismatic")).along(np.array([[0.3, 0.2]]))
+    x, y = math.cos(0.2) + 0.5 * math.cos(0.7), math.sin(0.2) + 0.5 * math.sin(0.7)
+    assert place[0].ravel() == pytest.approx((x, y, 1.5), abs=1e-12)
+    assert turn[0][:, 0] == pytest.approx((math.cos(0.7), math.sin(0.7), 0.0), abs=1e-12)
+
+
+def test_a_joint_of_another_kind_is_refused_by_name() -> None:
+    with pytest.raises(ConfigError, match="joint elbow: the engine ballistic knows no floating joints"):
+        ToolPath(planar("floating"))
 
 
 def test_the_ball_stays_in_the_spoon_until_the_spoon_brakes() -> None:

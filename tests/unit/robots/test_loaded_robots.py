@@ -16,7 +16,8 @@ from throwcollect.errors import ConfigError
 from throwcollect.members import load_member
 from throwcollect.robots import description
 from throwcollect.robots.clearance import Clearance
-from throwcollect.robots.description import joint_model, physics_description
+from throwcollect.robots.description import physics_description
+from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.scene import scene_of
@@ -92,7 +93,7 @@ def make_robot(path: Path, directory: Path) -> Robot:
 
 def load_everywhere(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     """Do what a plan does with a robot: describe it, read its shapes, and load it into each engine."""
-    monkeypatch.setattr(description, "load_member", lambda *_: robot)
+    monkeypatch.setattr(description, "find_robot", lambda _: robot)
     scene = scene_of(CONFIG, physics_description(CONFIG))
     Clearance(robot, joint_model(robot), tool_of(CONFIG))
     for name in ("bullet", "mujoco"):

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.members import load_member, names_of
+from throwcollect.members import names_of
 from throwcollect.robots.clearance import Clearance
-from throwcollect.robots.description import joint_model
+from throwcollect.robots.described import find_robot
+from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import tool_of
@@ -20,7 +21,7 @@ sys.path.append(str(Path(__file__).parents[2] / "plugins"))
 
 from planar_arm.robot import PLANAR_ARM
 
-ROBOTS = [*(load_member("robots", name) for name in names_of("robots")), PLANAR_ARM]
+ROBOTS = [*(find_robot(name) for name in names_of("robots")), PLANAR_ARM]
 
 of_every_robot = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 

@@ -8,7 +8,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.robots.clearance import Clearance
-from throwcollect.robots.description import joint_model
+from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import tool_of
 
@@ -60,8 +60,9 @@ def test_the_unchanged_description_is_accepted(tmp_path: Path) -> None:
 def test_a_number_that_cannot_be_right_is_named_and_refused(
     kind: str, old: str, new: str, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    arm = make_arm(tmp_path, kind, old, new)
     with pytest.raises(ConfigError, match=said):
-        joint_model(make_arm(tmp_path, kind, old, new))
+        _ = joint_model(arm), arm.rest_posture
     # The parser of URDF would print its own complaints to the terminal.
     assert capfd.readouterr().err == ""
 

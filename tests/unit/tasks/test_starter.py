@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,10 +15,10 @@ from throwcollect.cli.show import init
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import load
 from throwcollect.errors import ConfigError
-from throwcollect.tasks.starter import make_starter, samplers
+from throwcollect.tasks.starter import begin_at_default, make_starter, samplers
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
-ADD = "; CONTRIBUTING.md describes how to add one"
+ADD = "; docs/robots.md describes how to add one"
 
 
 @pytest.mark.parametrize("sampler", samplers())
@@ -37,7 +38,7 @@ def test_a_starter_names_mujoco_where_bullet_has_no_wheel(
 ) -> None:
     monkeypatch.setattr("throwcollect.tasks.starter.has_wheel", lambda _package: there)
     path = tmp_path / "throws.yaml"
-    path.write_text(make_starter("talos", "throw", "sobol")[str(DEFAULT_CONFIG)])
+    path.write_text(make_starter("throw", "sobol", begin_at_default("talos", "throw"))[str(DEFAULT_CONFIG)])
     assert load(path).sim.engine == engine
 
 
@@ -68,11 +69,13 @@ def test_a_starter_for_a_robot_of_another_package_has_no_joints_of_talos(tmp_pat
     printed = init_with_plugins(tmp_path, "--robot", "planar_arm")
     assert "name: planar_arm" in printed
     assert "arm_right" not in printed
-    assert "name: planar_arm # one of talos, planar_arm" in (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8")
+    assert "name: planar_arm # `throwcollect robot list` lists others" in (tmp_path / DEFAULT_CONFIG).read_text(
+        encoding="utf-8"
+    )
 
 
 def test_a_starter_explains_the_keys_of_its_task(tmp_path: Path) -> None:
-    text = make_starter("talos", "throw", "sobol")[str(DEFAULT_CONFIG)]
+    text = make_starter("throw", "sobol", begin_at_default("talos", "throw"))[str(DEFAULT_CONFIG)]
     meaning = "The ball counts as released when it has been out of the spoon for this long"
     assert f"  recatch_gap_s: 0.02 # {meaning}\n" in text
     assert "  tolerance_rad: 0.01\n" in init_with_plugins(tmp_path, "--task", "reach")
@@ -90,8 +93,8 @@ def test_a_missing_configuration_is_an_error_that_names_init(tmp_path: Path, mon
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (("my.urdf", "throw", "sobol"), f"--robot my.urdf: no such robot is installed; known: .*talos.*{ADD}"),
-        (("tallos", "throw", "sobol"), "--robot tallos: no such robot is installed; did you mean 'talos'\\?"),
+        (("my.urdf", "throw", "sobol"), "my.urdf: no such robot is installed; known: talos, .*\n.*docs/robots.md"),
+        (("tallos", "throw", "sobol"), "tallos: no such robot is installed; did you mean 'talos'"),
         (("talos", "juggle", "sobol"), f"--task juggle: no such task is installed; known: .*throw.*{ADD}"),
         (("talos", "throw", "halton"), "--sampler halton: no such sampler is installed; known: grid, uniform, "),
     ],
@@ -99,6 +102,8 @@ def test_a_missing_configuration_is_an_error_that_names_init(tmp_path: Path, mon
 def test_an_unknown_robot_task_or_sampler_is_an_error_with_the_known_ones(
     names: tuple[str, str, str], said: str
 ) -> None:
+    robot, task, sampler = names
     # Other tests of the same process may have made further packages known.
-    with pytest.raises(ConfigError, match=f"^{said}"):
-        make_starter(*names)
+    with pytest.raises(ConfigError) as caught:
+        init(robot=robot, task=task, sampler=sampler)
+    assert re.match(said, str(caught.value))

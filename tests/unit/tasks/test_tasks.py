@@ -11,7 +11,7 @@ from throwcollect.config.task_config import TaskConfig, is_target
 from throwcollect.members import load_member, load_part, names_of
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
-from throwcollect.tasks.starter import find_first_motion
+from throwcollect.tasks.starter import begin_at_default
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import unit_of_name
 
@@ -28,8 +28,9 @@ def fill(section: type[TaskConfig]) -> TaskConfig:
     """Fill the section as `throwcollect init` does, since a task need not have a default motion."""
     if section is ReachConfig:
         return section()  # its package is not installed, so no configuration can name it
-    start, end, duration_s = find_first_motion(Config().robot.name, section.model_fields["name"].default)
-    return section(start=start, end=end, duration_s=duration_s)
+    found = begin_at_default(Config().robot.name, section.model_fields["name"].default)
+    assert found is not None
+    return section(start=found.start, end=found.end, duration_s=found.duration_s)
 
 
 def make_task(section: type[TaskConfig]) -> Task:
