@@ -49,11 +49,8 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
     return name
 
 
-# Any URDF may name other joints, so the JSON Schema lists none. Pydantic describes keys of mappings only if they have a
-# bound; `shape` tells joints by that.
-Joint = Annotated[
-    str, AfterValidator(_require_joint), WithJsonSchema({"type": "string", "title": "Joint", "minLength": 1})
-]
+Joint = Annotated[str, AfterValidator(_require_joint), WithJsonSchema({"type": "string", "words": "joint"})]
+"""Any URDF may name other joints, so the JSON Schema lists none."""
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 LONGEST_NAME = 64
 NAME_WORDS = f"up to {LONGEST_NAME} lower-case letters, digits, - and _, first a letter or digit"
