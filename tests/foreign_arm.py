@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 FLANGE = "flange_link"
+MOUNT = 'rpy="0 -1.5707963267948966 3.141592653589793"'
+"""How the flange is turned: z along the forearm and x upwards, so that the default tool pose holds the ball."""
 _LINK = """  <link name="{name}">
     <inertial><origin xyz="{x} 0 0"/><mass value="{mass}"/>
       <inertia ixx="0.002" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>
@@ -39,11 +41,10 @@ ARM = "".join(
             )
         ),
         f'  <joint name="mount" type="fixed"><parent link="fore_link"/><child link="{FLANGE}"/>\n'
-        '    <origin xyz="0.3 0 0" rpy="0 -1.5707963267948966 3.141592653589793"/></joint>\n',
+        f'    <origin xyz="0.3 0 0" {MOUNT}/></joint>\n',
         "</robot>\n",
     ]
 )
-"""Its flange has z along the forearm and x upwards, so that the default tool pose holds the ball."""
 BOX = '<collision><origin xyz="0.2 0 0"/><geometry><box size="0.3 0.05 0.05"/></geometry></collision>'
 """The collision shape of the upper arm."""
 CORNERS = np.array([(x, y, z) for x in (-0.15, 0.15) for y in (-0.02, 0.02) for z in (-0.02, 0.02)])
