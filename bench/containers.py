@@ -10,7 +10,7 @@ from docker.client import DockerClient
 from docker.errors import DockerException
 
 from bench import collection
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.sweep.plan import Plan
 
 MANY = 8

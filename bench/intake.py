@@ -13,7 +13,6 @@ import tempfile
 import time
 from pathlib import Path
 
-from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
@@ -21,8 +20,8 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Episode, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.task import task_of
-from throwcollect.trial.conditions import Conditions, Settings, build_of
+from throwcollect.tasks.task import task_of, trajectory_of
+from throwcollect.trial.conditions import Settings, conditions_from_json
 
 _SECRET = b"key of a run"
 _SIGNER = Signer(_SECRET)
@@ -35,29 +34,23 @@ def measure(directory: Path) -> tuple[float, float]:
         directory: A finished dataset, whose episodes are collected once more.
     """
     dataset = Dataset.open(directory)
-    acceptance, settings = Acceptance(dataset.config), Settings(dataset.config)
-    build = build_of(dataset.config)
+    settings = Settings(dataset.config)
     columns = task_of(dataset.config).columns
     messages = []
     for episode in dataset.episodes():
         trial = dataset.plan.trial(episode.header.trial)
         config = dataset.plan.config_of(trial)
         result = columns.to_json(judge_episode(config, episode))
-        conditions = Conditions(
-            build=build,
-            settings=settings.digest,
-            values=settings.find_replaced(config),
-            trajectory=task_of(config).trajectory().digest,
-        )
+        conditions = settings.conditions_of(config, trajectory_of(config).digest)
         judged = Episode(episode.header, episode.chunk, result=result, conditions=conditions.to_json())
         messages.append(pack(judged, _SIGNER))
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        taken_in = _take_in(messages, dataset.plan, acceptance, Path(scratch) / "data")
+        taken_in = _take_in(messages, dataset.plan, settings, Path(scratch) / "data")
         return taken_in, _raw(messages, Path(scratch) / "raw")
 
 
-def _take_in(messages: list[bytes], plan: Plan, acceptance: Acceptance, directory: Path) -> float:
+def _take_in(messages: list[bytes], plan: Plan, settings: Settings, directory: Path) -> float:
     create(directory, plan)
     writer = DatasetWriter(directory, plan)
     task = task_of(plan.config)
@@ -67,7 +60,9 @@ def _take_in(messages: list[bytes], plan: Plan, acceptance: Acceptance, director
         episode = unpack(message, _SIGNER)
         assert isinstance(episode, Episode)
         trial = plan.trial(episode.header.trial)
-        if acceptance.find_difference(episode.conditions, plan, trial):
+        config = plan.config_of(trial)
+        expected = settings.conditions_of(config, trajectory_of(config).digest)
+        if conditions_from_json(episode.conditions).explain(expected):
             raise ValueError(f"trial {trial.number} is refused")
         writer.append(episode, columns.from_json(task.outcomes, episode.result))
     seconds = time.perf_counter() - began

@@ -21,6 +21,7 @@ from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section
 from throwcollect.config.shape import ValueShape, json_schema, root
 from throwcollect.config.values import sweepable_keys
+from throwcollect.robots.talos import TALOS
 
 _INTRODUCTION = """\
 # Configuration
@@ -161,7 +162,7 @@ def _list_sweepable() -> str:
     primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
     learned: Section = config.task.model_copy(update={"trajectory": primitive})
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
-    joints = "|".join(config.robot.find().joints)
+    joints = "|".join(TALOS.joints)
     general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _generalise, key) for key in keys)
     where = (
         "A joint must be in `task.end`, one with an offset in `robot.joint_offsets`, too, and a weight in "

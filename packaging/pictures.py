@@ -1,7 +1,7 @@
 """Make the pictures of the README: ``python packaging/pictures.py``, with the package and a Chromium installed.
 
-It collects `configs/wide.yaml` and `configs/quickstart.yaml` into a temporary directory, which takes some minutes, and
-writes ``docs/pictures/throw.webp``, ``landing-map.webp`` and ``report.webp``.
+It collects `configs/wide.yaml`, `ur5.yaml` and `quickstart.yaml` into a temporary directory, which takes some minutes,
+and writes ``docs/pictures/throw.webp``, ``ur5.webp``, ``landing-map.webp`` and ``report.webp``.
 """
 
 from __future__ import annotations
@@ -53,8 +53,9 @@ def main(kept: Path) -> None:
     sys.path.insert(0, str(ROOT))
     from tests.e2e.chromium import browse
 
-    wide, quickstart = (collect(name, kept / name) for name in ("wide", "quickstart"))
-    render(wide, PICTURES / "throw.webp", trial=far_throw(wide), slow=1.5)
+    wide, ur5, quickstart = (collect(name, kept / name) for name in ("wide", "ur5", "quickstart"))
+    for picture, dataset in (("throw", wide), ("ur5", ur5)):
+        render(dataset, PICTURES / f"{picture}.webp", trial=far_throw(dataset), slow=1.5)
     page = Path(tempfile.mkdtemp(dir=kept), "report.html")
     command = [sys.executable, "-m", "throwcollect", "dataset", "report", str(quickstart)]
     subprocess.run([*command, "--output", str(page)], check=True)

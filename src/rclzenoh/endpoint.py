@@ -1,8 +1,9 @@
-"""The identity, the token and the end of publishers, subscriptions, services and clients."""
+"""The identity, the token and the end of publishers, subscriptions, services and clients, and what they send along."""
 
 from __future__ import annotations
 
-from typing import Any
+import struct
+from typing import Any, NamedTuple
 
 import zenoh
 from xxhash import xxh3_64_hexdigest
@@ -13,6 +14,9 @@ from rclzenoh.keys import EntityKind, Token, data_key, dds_type
 from rclzenoh.node_base import NodeBase
 from rclzenoh.qos import QoSProfile, encode
 
+_LAYOUT = struct.Struct("<qqB16s")
+GID_LENGTH = 16
+"""Length of the identifier of an endpoint [bytes]."""
 _ENCODING = "application/cdr;key="
 """Beginning of the encodings that name the key which something is sent to."""
 
@@ -86,3 +90,29 @@ class Endpoint:
         if not self._has_complained:
             self._has_complained = True
             self.node.get_logger().warning(f"{self.name}: ignored (this is logged once): {problem}")
+
+
+class Attachment(NamedTuple):
+    """What rmw_zenoh_cpp (0.2.4 and later) puts on every sample, request and reply: who sent it, and when.
+
+    Attributes:
+        sequence: Number of the message, counted from 1 by its sender; a reply has that of the request.
+        source_timestamp: System time of the sender [ns].
+        gid: Identifier of the sending endpoint; a reply has that of the request.
+    """
+
+    sequence: int
+    source_timestamp: int
+    gid: bytes
+
+    def pack(self) -> bytes:
+        """The 33 bytes on the wire."""
+        return _LAYOUT.pack(self.sequence, self.source_timestamp, GID_LENGTH, self.gid)
+
+
+def unpack(data: bytes) -> Attachment:
+    """Attachment from its bytes."""
+    if len(data) != _LAYOUT.size or data[16] != GID_LENGTH:
+        raise ValueError(f"attachment of {len(data)} bytes is not that of a ROS 2 Jazzy node")
+    sequence, timestamp, _, gid = _LAYOUT.unpack(data)
+    return Attachment(sequence, timestamp, gid)

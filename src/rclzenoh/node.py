@@ -9,12 +9,11 @@ from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces.msg import Clock, Log, ParameterEvent
 from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.node_graph import NodeGraph
-from rclzenoh.node_parameters import NodeParameters
+from rclzenoh.node_parameters import NodeParameters, offer_parameters
 from rclzenoh.parameter import Parameter
-from rclzenoh.parameter_service import offer_parameters
 from rclzenoh.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events, qos_profile_rosout
-from rclzenoh.subscription import Subscription
 from rclzenoh.time import Time
+from rclzenoh.topic import Subscription
 
 _CLOCK_TOPIC = "/clock"
 _USE_SIM_TIME = "use_sim_time"

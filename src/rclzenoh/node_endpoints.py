@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from rclzenoh.client import Client
 from rclzenoh.context import Context
 from rclzenoh.interfaces import Message
 from rclzenoh.interfaces import Service as ServiceType
 from rclzenoh.node_base import NodeBase
-from rclzenoh.publisher import Publisher
 from rclzenoh.qos import QoSProfile, qos_profile_services_default
-from rclzenoh.service import Service
-from rclzenoh.subscription import Subscription
+from rclzenoh.service import Client, Service
 from rclzenoh.time import S_TO_NS, Timer
+from rclzenoh.topic import Publisher, Subscription
 
 _E = TypeVar("_E", Publisher, Subscription, Service, Client)
 
@@ -78,21 +76,15 @@ class NodeEndpoints(NodeBase):
         self.mailbox.submit(None)
         return timer
 
-    def destroy_publisher(self, publisher: Publisher) -> bool:
-        """Withdraw a publisher; returns whether it belonged to this node."""
-        return self._destroy(publisher)
+    def _destroy(self, entity: Publisher | Subscription | Service | Client) -> bool:
+        """Withdraw an endpoint; returns whether it belonged to this node."""
+        known = entity in self._entities
+        if known:
+            self._entities.remove(entity)
+            entity.destroy()
+        return known
 
-    def destroy_subscription(self, subscription: Subscription) -> bool:
-        """Withdraw a subscription; returns whether it belonged to this node."""
-        return self._destroy(subscription)
-
-    def destroy_service(self, service: Service) -> bool:
-        """Withdraw a service; returns whether it belonged to this node."""
-        return self._destroy(service)
-
-    def destroy_client(self, client: Client) -> bool:
-        """Withdraw a client; returns whether it belonged to this node."""
-        return self._destroy(client)
+    destroy_publisher = destroy_subscription = destroy_service = destroy_client = _destroy
 
     def destroy_endpoints(self) -> None:
         """Withdraw all endpoints and timers."""
@@ -103,13 +95,6 @@ class NodeEndpoints(NodeBase):
     def _keep(self, entity: _E) -> _E:
         self._entities.append(entity)
         return entity
-
-    def _destroy(self, entity: Publisher | Subscription | Service | Client) -> bool:
-        known = entity in self._entities
-        if known:
-            self._entities.remove(entity)
-            entity.destroy()
-        return known
 
 
 def _make_profile(qos: QoSProfile | int) -> QoSProfile:

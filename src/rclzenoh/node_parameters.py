@@ -1,33 +1,47 @@
-"""The parameters of a node, with the methods that rclpy's nodes have, and the values that descriptors allow."""
+"""The parameters of a node, with the methods that rclpy's nodes have, and the services by which others change them."""
 
 from __future__ import annotations
 
 import copy
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from rclzenoh.exceptions import (
     InvalidParameterValueException,
     ParameterAlreadyDeclaredException,
+    ParameterException,
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
+from rclzenoh.interfaces import AnyMessage, Service
 from rclzenoh.interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
     ListParametersResult,
     ParameterDescriptor,
     ParameterEvent,
+    ParameterValue,
     SetParametersResult,
 )
-from rclzenoh.interfaces.srv import ListParameters
+from rclzenoh.interfaces.msg import Parameter as ParameterMessage
+from rclzenoh.interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.parameter import Parameter, ParameterKind
+from rclzenoh.qos import qos_profile_parameters
 
 _RELATIVE_TOLERANCE = 1e-6
 """A value this close to a bound or a step of its range counts as equal to it; rclpy has the same tolerance."""
 
 
+_T = TypeVar("_T")
 OnSet = Callable[[list[Parameter]], SetParametersResult]
 """Callback that accepts or refuses parameters before they are set."""
 PostSet = Callable[[list[Parameter]], None]
@@ -213,3 +227,54 @@ def _check_double(parameter: Parameter, allowed: FloatingPointRange) -> SetParam
         if not math.isclose(nearest, value, rel_tol=_RELATIVE_TOLERANCE):
             return _refuse(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
     return SetParametersResult(successful=True)
+
+
+def offer_parameters(node: NodeEndpoints, parameters: NodeParameters) -> None:
+    """Let other nodes read and change a node's parameters.
+
+    A request that names an unknown parameter is answered with an empty list, as rclpy's nodes do.
+    """
+
+    def read_each(names: list[str], read: Callable[[str], _T]) -> list[_T]:
+        try:
+            return [read(name) for name in names]
+        except ParameterException as error:
+            node.get_logger().warning(f"parameter service: {error.message}")
+            return []
+
+    def find_type(name: str) -> int:
+        # `describe_parameter` raises an error if the parameter is not declared. One without a value is no error.
+        parameters.describe_parameter(name)
+        return int(parameters.get_parameter_or(name).type_.value)
+
+    def find_value(name: str) -> ParameterValue:
+        return parameters.get_parameter(name).get_parameter_value()
+
+    def set_together(messages: list[ParameterMessage]) -> SetParametersResult:
+        try:
+            return parameters.set_parameters_atomically([Parameter.from_parameter_msg(message) for message in messages])
+        except (ParameterException, ValueError) as error:
+            node.get_logger().warning(f"parameter service: {error}")
+            return SetParametersResult(successful=False, reason=str(error))
+
+    def offer(service: type[Service], name: str, field: str, find: Callable[[Any], object]) -> None:
+        """Offer a service that answers with one field."""
+
+        def answer(request: AnyMessage, response: AnyMessage) -> AnyMessage:
+            setattr(response, field, find(request))
+            return response
+
+        node.create_service(service, f"~/{name}", answer, qos_profile=qos_profile_parameters)
+
+    describe = parameters.describe_parameter
+    offer(DescribeParameters, "describe_parameters", "descriptors", lambda asked: read_each(asked.names, describe))
+    offer(GetParameters, "get_parameters", "values", lambda asked: read_each(asked.names, find_value))
+    offer(GetParameterTypes, "get_parameter_types", "types", lambda asked: read_each(asked.names, find_type))
+    offer(
+        ListParameters,
+        "list_parameters",
+        "result",
+        lambda asked: parameters.list_parameters(asked.prefixes, asked.depth),
+    )
+    offer(SetParameters, "set_parameters", "results", lambda asked: [set_together([each]) for each in asked.parameters])
+    offer(SetParametersAtomically, "set_parameters_atomically", "result", lambda asked: set_together(asked.parameters))

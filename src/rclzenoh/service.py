@@ -1,23 +1,33 @@
-"""Services."""
+"""Services and their clients."""
 
 from __future__ import annotations
 
 import inspect
+import threading
 import time
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import zenoh
 
-from rclzenoh.attachment import Attachment, unpack
-from rclzenoh.endpoint import Endpoint
+from rclzenoh.endpoint import Attachment, Endpoint, unpack
+from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces import Message, deserialize, serialize
 from rclzenoh.interfaces import Service as ServiceType
 from rclzenoh.keys import EntityKind
 from rclzenoh.mailbox import Receiver
 from rclzenoh.node_base import NodeBase
 from rclzenoh.qos import QoSProfile
-from rclzenoh.task import start
+from rclzenoh.task import Future, start
+
+_PATIENT_SERVICE = "/_action/get_result"
+_ENDLESS_S = 1e9
+"""Timeout of requests that may last as long as an action."""
+_LOST_S = 10.0
+"""A request that has no answer after this time keeps no other back. It may have been lost with a link to the router,
+which Zenoh reports only when the request times out, ten minutes later."""
 
 Callback = Callable[[Any, Any], Any]
 
@@ -108,3 +118,134 @@ def _refuse(query: zenoh.Query, reason: str) -> None:
         return  # The client has ended, or the session is being closed.
     finally:
         query.drop()  # type: ignore[no-untyped-call]
+
+
+class Client(Receiver):
+    """Calls a service. Made by `Node.create_client`."""
+
+    def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, qos_profile: QoSProfile) -> None:
+        # The queue has no limit: there is at most one response per request, and a dropped one would be waited for in
+        # vain.
+        super().__init__(node.mailbox, None)
+        self.srv_type = srv_type
+        self.qos_profile = qos_profile
+        self._pending: dict[int, tuple[Future, Callable[[Any], Any]]] = {}
+        # A service keeps as many requests as its quality of service says, and drops the oldest of more. So the client
+        # lets no more be under way; but a request for the result of a goal is answered only when the goal ends.
+        self._most_under_way = None if srv_name.endswith(_PATIENT_SERVICE) else qos_profile.queue_length
+        self._under_way: dict[int, float] = {}
+        """Monotonic time [s] at which each request that has no answer yet was sent, oldest first."""
+        self._unsent: deque[tuple[Any, int, bytes]] = deque()
+        self._sequence = 0
+        self._lock = threading.Lock()
+        self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
+        # As in rmw_zenoh_cpp, every complete queryable of this key is asked, and Zenoh must not merge or drop replies.
+        self._querier: Any = self._endpoint.session.declare_querier(
+            self._endpoint.key,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=_ENDLESS_S if self.service_name.endswith(_PATIENT_SERVICE) else None,
+        )
+        self._endpoint.announce(self._querier)
+
+    @property
+    def service_name(self) -> str:
+        """Absolute name of the service."""
+        return self._endpoint.name
+
+    def service_is_ready(self) -> bool:
+        """Whether somebody offers the service."""
+        endpoint = self._endpoint
+        return endpoint.node.context.graph.count(EntityKind.SERVICE, endpoint.name, endpoint.type) > 0
+
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Wait until somebody offers the service, for at most ``timeout_sec``; return whether somebody does.
+
+        None or a negative time is no limit.
+        """
+        context = self._endpoint.node.context
+        return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
+
+    def call_async(self, request: Message, convert: Callable[[Any], Any] = lambda response: response) -> Future:
+        """Send a request; the future of the response stays pending if nobody answers.
+
+        The result of the future is what ``convert`` makes of the response, by default the response itself.
+        """
+        if not isinstance(request, self.srv_type.Request):
+            raise TypeError(f"{self.service_name}: expected {self.srv_type.TYPE}.Request, got {type(request).__name__}")
+        payload, future = serialize(request), Future()
+        with self._lock:
+            self._sequence += 1
+            sequence = self._sequence
+        # Another thread may destroy the client meanwhile.
+        if (querier := self._querier) is None:
+            raise InvalidHandle(f"{self.service_name}: the client was destroyed")
+        # The future is noted before the request is sent, because the thread that spins may get the response at once.
+        self._pending[sequence] = future, convert
+        self._unsent.append((querier, sequence, payload))
+        self._send_waiting()
+        return future
+
+    def _send(self, querier: Any, sequence: int, payload: bytes) -> None:
+        """Send a request."""
+        # Zenoh drops the handler after the last reply, which puts the number into the queue after all replies.
+        handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
+        attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
+        try:
+            querier.get(handler, payload=payload, encoding=self._endpoint.encoding, attachment=attachment)
+        except zenoh.ZError as error:
+            del self._pending[sequence]
+            raise self._endpoint.invalid(error) from error
+
+    def _send_waiting(self) -> None:
+        """Send the requests that wait, in their order, as far as the service keeps them."""
+        while True:
+            with self._lock:
+                if not self._unsent:
+                    return
+                now = time.monotonic()
+                if len(self._under_way) == self._most_under_way:
+                    oldest = next(iter(self._under_way))
+                    if now < self._under_way[oldest] + _LOST_S:
+                        return
+                    del self._under_way[oldest]
+                querier, sequence, payload = self._unsent.popleft()
+                self._under_way[sequence] = now
+            self._send(querier, sequence, payload)
+
+    def handle(self, item: zenoh.Reply | int) -> None:
+        """Decode a response and complete its future; a number means that its request gets no further response."""
+        if isinstance(item, int):
+            self._pending.pop(item, None)
+            with self._lock:
+                self._under_way.pop(item, None)
+            # Once the session is closed, nobody is left to answer.
+            with suppress(InvalidHandle):
+                self._send_waiting()
+            return
+        sample = item.ok
+        if sample is None:
+            self._endpoint.complain(f"the service answered with an error: {item.err and item.err.payload.to_bytes()!r}")
+            return
+        try:
+            attachment = unpack(sample.attachment.to_bytes() if sample.attachment is not None else b"")
+            response = deserialize(sample.payload.to_bytes(), self.srv_type.Response)
+        except ValueError as error:
+            self._endpoint.complain(error)
+            return
+        # Numbers of requests are mixed up, too, while a lost link is replaced (`Endpoint.check_key`).
+        if attachment.gid != self._endpoint.gid or attachment.sequence not in self._pending:
+            self._endpoint.complain("unexpected response; there may be more than one server of this name")
+            return
+        future, convert = self._pending.pop(attachment.sequence)
+        future.call_back_through(self.mailbox)
+        if not future.cancelled():
+            future.set_result(convert(response))
+
+    def destroy(self) -> None:
+        """Withdraw the client; pending futures stay pending. See `Node.destroy_client`."""
+        self._querier = None
+        self._endpoint.close()
+        self._pending.clear()
+        self._unsent.clear()
+        self.discard_all()

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from throwcollect.config.schema import Config
     from throwcollect.dataset.reader import Dataset, UnfinishedDatasetWarning, load
     from throwcollect.dataset.throw import Throw
-    from throwcollect.derive.selection import filter_trials as filter_dataset
-    from throwcollect.derive.selection import merge as merge_datasets
-    from throwcollect.derive.selection import sample as sample_dataset
+    from throwcollect.derive.derivation import filter_trials as filter_dataset
+    from throwcollect.derive.derivation import merge as merge_datasets
+    from throwcollect.derive.derivation import sample as sample_dataset
     from throwcollect.derive.split import split as split_dataset
     from throwcollect.derive.statistics import statistics as compute_statistics
     from throwcollect.errors import (
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from throwcollect.learning.fitting import fit
     from throwcollect.learning.model import Model, load_model
     from throwcollect.learning.score import Score
-    from throwcollect.replay.verification import verify_dataset
+    from throwcollect.replay.audit import verify_dataset
     from throwcollect.simulator import Simulator
 
 __all__ = [
@@ -88,16 +88,16 @@ _PLACES = {
     "WorkerError": "errors:WorkerError",
     "compute_statistics": "derive.statistics:statistics",
     "export_dataset": "export.export:export",
-    "filter_dataset": "derive.selection:filter_trials",
+    "filter_dataset": "derive.derivation:filter_trials",
     "fit": "learning.fitting:fit",
     "load": "dataset.reader:load",
     "load_config": "config.loader:load",
     "load_model": "learning.model:load_model",
-    "merge_datasets": "derive.selection:merge",
+    "merge_datasets": "derive.derivation:merge",
     "runs": "runs",
-    "sample_dataset": "derive.selection:sample",
+    "sample_dataset": "derive.derivation:sample",
     "split_dataset": "derive.split:split",
-    "verify_dataset": "replay.verification:verify_dataset",
+    "verify_dataset": "replay.audit:verify_dataset",
 }
 """Module and attribute of each name, or a module alone, for `__getattr__`; type checkers need the imports above."""
 

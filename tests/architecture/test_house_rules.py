@@ -17,7 +17,7 @@ LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
 LONGEST_TEST = 500
 """Most lines of a module of tests; longer modules had several subjects."""
-CEILING = 55438
+CEILING = 57200
 """Most lines of Python in `src`. Every commit that deletes lowers it; see CONTRIBUTING.md for what may be added."""
 
 
@@ -140,10 +140,10 @@ OF_THE_PROCESSOR = re.compile(
 HARMLESS = {
     "engines/as_described.py": {"np.sin", "np.cos", "np.linalg.norm", "np.linalg.eigvalsh", "@"},  # with tolerances
     "engines/bullet/scenery.py": {"@"},  # what is compared there
-    "engines/mesh.py": {"np.linalg.svd", "@"},  # whether a mesh is flat, and numbers of cells, which are integers
+    "engines/mesh.py": {"np.linalg.svd", "@"},  # whether a mesh is flat; whole numbers of cells
     "engines/mujoco/scenery.py": {"@"},  # what is compared there
     "robots/clear_postures.py": {"np.linalg.norm", "@"},  # bounds, compared with room to spare
-    "robots/derived.py": {"np.linalg.norm"},  # a reach that is only shown
+    "robots/derived.py": {"np.linalg.norm"},  # what is odd about a robot
     "robots/joint_model.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
 }

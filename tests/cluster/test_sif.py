@@ -15,7 +15,7 @@ from docker.client import DockerClient
 from tests.cluster.conftest import SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
-from throwcollect.cluster.sif import check_sif
+from throwcollect.cluster.submit import check_sif
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster

@@ -7,8 +7,7 @@ from docker.client import DockerClient
 from docker.errors import ImageNotFound
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.docker_engine import connect
-from throwcollect.runtimes.docker.image import default_tag, is_outdated
+from throwcollect.runtimes.docker.docker_engine import connect, default_tag, is_outdated
 
 UNAVAILABLE = Path(__file__).parents[2] / "build" / "engine-unavailable"
 

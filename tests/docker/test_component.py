@@ -16,7 +16,7 @@ from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Run
 from throwcollect.runs.run_record import Origin
 from throwcollect.runtimes.docker.container_options import RUN_LABEL
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.docker

@@ -13,7 +13,7 @@ from docker.errors import ContainerError
 
 import throwcollect
 from throwcollect.heartbeat import SILENT_S
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = pytest.mark.docker
 

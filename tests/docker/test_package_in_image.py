@@ -13,7 +13,7 @@ from docker.client import DockerClient
 
 from tests.e2e.collection import call_here, fingerprints
 from tests.e2e.plugins import PLUGINS, process_with_plugins
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = pytest.mark.docker
 PAGE = Path(__file__).parents[2] / "docs" / "containers.md"

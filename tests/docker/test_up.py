@@ -16,7 +16,7 @@ import pytest
 from tests.docker.collection import pause
 from tests.e2e.collection import FAST, Running, call, call_here, collect_here, fingerprints, start, write_config
 from throwcollect.runtimes.docker.container_options import KEY_LABEL
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 LABEL = "throwcollect.run"

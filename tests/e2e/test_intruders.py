@@ -47,8 +47,8 @@ os.setresuid({NOBODY}, {NOBODY}, {NOBODY})
 ATTEMPT = f"""
 import json, os, sys, time, zenoh
 from throwcollect.errors import ConfigError
-from throwcollect.ros.zenoh_errors import zenoh_errors
-from rclzenoh.health import REQUEST, attachment
+from throwcollect.ros.connection import zenoh_errors
+from throwcollect.ros.health_check import REQUEST, attachment
 from rclzenoh.session_config import environment_config
 {BECOME_NOBODY}
 heard = []
@@ -74,7 +74,7 @@ POSE = f"""
 import os, sys
 import concurrent.futures.process, concurrent.futures.thread, email.parser, mmap, multiprocessing.pool
 import pinocchio, pyarrow.parquet, scipy.stats
-import throwcollect.ros.nodes.coordinator.process, throwcollect.coordinator.resume, throwcollect.dataset.reader
+import throwcollect.ros.nodes.coordinator.node, throwcollect.coordinator.resume, throwcollect.dataset.reader
 import throwcollect.cli.node_commands, throwcollect.engines.bullet.bullet_engine
 import throwcollect.ros.nodes.simulation.process
 from throwcollect.cli.main import main

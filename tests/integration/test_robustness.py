@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from rclzenoh.attachment import Attachment
+from rclzenoh.endpoint import Attachment
 from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.keys import EntityKind, Token, data_key
 from tests.commands import Command

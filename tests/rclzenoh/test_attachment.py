@@ -1,7 +1,7 @@
 import pytest
 import zenoh.ext
 
-from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.endpoint import Attachment, unpack
 
 
 def test_an_attachment_is_laid_out_as_zenoh_serialises_its_parts():

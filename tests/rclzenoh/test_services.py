@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import zenoh
 
-from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.endpoint import Attachment, unpack
 from rclzenoh.interfaces import deserialize, get_service, serialize, type_hash
 from rclzenoh.keys import data_key
 from rclzenoh.qos import QoSProfile
@@ -131,7 +131,7 @@ def test_requests_that_were_lost_keep_others_back_for_a_while_only(rig, pair, mo
     client.call_async(SetBool.Request())
     rig.rest()
     assert len(asked) == 1
-    monkeypatch.setattr("rclzenoh.client._LOST_S", 0.0)
+    monkeypatch.setattr("rclzenoh.service._LOST_S", 0.0)
     client.call_async(SetBool.Request())
     assert rig.spin(lambda: len(asked) == 3)
 

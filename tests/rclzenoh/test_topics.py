@@ -9,8 +9,8 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from rclzenoh.attachment import Attachment, unpack
 from rclzenoh.context import Context
+from rclzenoh.endpoint import Attachment, unpack
 from rclzenoh.interfaces import get_message, serialize, type_hash
 from rclzenoh.keys import data_key
 from rclzenoh.session_config import client_config, router_config

@@ -14,7 +14,7 @@ from tests.docker.conftest import client
 from tests.docker.test_up import containers_of, engine
 from tests.e2e.collection import FAST, INPROCESS, collect, fingerprints, start, write_config
 from throwcollect.heartbeat import SILENT_S
-from throwcollect.runtimes.docker.image import RMW_LABEL, default_tag
+from throwcollect.runtimes.docker.docker_engine import RMW_LABEL, default_tag
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 __all__ = ["client", "engine"]

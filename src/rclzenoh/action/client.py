@@ -15,8 +15,8 @@ from rclzenoh.keys import EntityKind, dds_type
 from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.node_graph import NamesAndTypes, NodeGraph
 from rclzenoh.qos import QoSProfile, qos_profile_action_status_default
-from rclzenoh.subscription import Subscription
 from rclzenoh.task import Future
+from rclzenoh.topic import Subscription
 
 _TOPIC, _TYPE = "/_action/feedback", "_FeedbackMessage"
 

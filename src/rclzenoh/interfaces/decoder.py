@@ -10,14 +10,16 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from rclzenoh.interfaces.catalog import Field, structure
+from rclzenoh.interfaces.encoder import HEADER
 from rclzenoh.interfaces.layout import FunctionWriter
-from rclzenoh.interfaces.message import DTYPES, message_class
+from rclzenoh.interfaces.message import DTYPES, Message, message_class
 
+_M = TypeVar("_M", bound=Message)
 _STRINGS_OF_NOTHING = (b"\x00\x00\x00\x00", ())
 
 
@@ -37,6 +39,28 @@ def decoder(name: str) -> Callable[[bytes, bytearray], tuple[Any, int]]:
     exec("\n".join([*source, " return message, at"]), reader.namespace)  # noqa: S102 - as in `encoder`
     decode: Callable[[bytes, bytearray], tuple[Any, int]] = reader.namespace["decode"]
     return decode
+
+
+def deserialize(data: bytes, kind: type[_M]) -> _M:
+    """Message from its bytes: little-endian CDR with its encapsulation header.
+
+    The message shares no memory with ``data``, and its number sequences may be changed. Bytes after the message are
+    ignored: rmw_serialize gives as many bytes as the message might take, and programs publish all of them.
+    """
+    name = kind.TYPE
+    # Only the first two bytes of the header name the encoding. The others are options (DDSI-RTPS, serialized payload).
+    if data[:2] != HEADER[:2] or len(data) < len(HEADER):
+        raise ValueError(f"{name}: not little-endian CDR: begins with {bytes(data[:4]).hex(' ') or 'nothing'}")
+    size = len(data) - 4
+    body = bytearray(data[4:] + bytes(-size & 7))
+    try:
+        message: _M
+        message, end = decoder(name)(data, body)
+    except (struct.error, IndexError, ValueError) as error:
+        raise ValueError(f"{name}: malformed CDR of {len(data)} bytes: {error}") from error
+    if end > size:
+        raise ValueError(f"{name}: expected {end + 4} bytes of CDR, got {len(data)}")
+    return message
 
 
 def _read_strings(

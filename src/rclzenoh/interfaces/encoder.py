@@ -50,6 +50,16 @@ def encoder(name: str) -> Callable[[Message], bytearray]:
     return encode
 
 
+def serialize(message: Message) -> bytes:
+    """Little-endian CDR of a message, with the encapsulation header."""
+    try:
+        return bytes(encoder(message.TYPE)(message))
+    except (AttributeError, TypeError) as error:
+        raise TypeError(f"{message.TYPE} cannot be serialised: {error}") from error
+    except (struct.error, OverflowError, ValueError) as error:
+        raise ValueError(f"{message.TYPE} cannot be serialised: {error}") from error
+
+
 @lru_cache(maxsize=512)
 def _write_strings(values: tuple[str, ...]) -> bytes:
     """A sequence of strings without its count, from a position that is a multiple of four."""

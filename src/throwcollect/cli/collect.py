@@ -156,7 +156,7 @@ def resume(
 def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
     """Finish a dataset with what is whole; `runs` would need the libraries of the nodes."""
     from throwcollect.cli.dataset.info import print_collected
-    from throwcollect.coordinator.salvage import finish_without_simulating
+    from throwcollect.coordinator.resume import finish_without_simulating
     from throwcollect.dataset.configuration import reading_config
     from throwcollect.dataset.inspect import info
 

@@ -19,7 +19,6 @@ from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
     from throwcollect.learning.aiming import Aim
-    from throwcollect.learning.lists import Row
     from throwcollect.learning.model import Model
     from throwcollect.learning.score import Score
 
@@ -228,7 +227,6 @@ def adapt(
     json: JsonOption = False,
 ) -> None:
     """Correct a model by a few throws of another robot or simulation."""
-    from throwcollect.learning.adapting import FarThrowError
     from throwcollect.learning.lists import read_table
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
@@ -236,15 +234,12 @@ def adapt(
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
     rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))
-    try:
-        adapted = model.adapt(
-            [{key: row.numbers[key] for key in keys} for row in rows],
-            [[row.numbers[target] for target in model.targets] for row in rows],
-            method=None if method == "auto" else method,
-            scatter=scatter,
-        )
-    except FarThrowError as error:
-        raise error.locate_throw(rows[error.number].place) from None
+    adapted = model.adapt(
+        [dict(zip(keys, row[: len(keys)], strict=True)) for row in rows],
+        [row[len(keys) :] for row in rows],
+        method=None if method == "auto" else method,
+        scatter=scatter,
+    )
     adapted.save(output)
     entry = adapted.adaptation
     if entry is None:
@@ -283,11 +278,10 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
     return values
 
 
-def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Row]:
+def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[list[float]]:
     """Read the throws of a dataset that succeeded: the keys and the targets of each."""
     from throwcollect.config.values import column_of
     from throwcollect.dataset.reader import Dataset
-    from throwcollect.learning.lists import Row
 
     dataset = Dataset.open(directory)
     trained, config = model.trained_on, dataset.config
@@ -302,10 +296,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
         raise ConfigError(
             f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
         )
-    rows = throws.select([*map(column_of, names)]).rename_columns(names).to_pylist()
-    return [
-        Row(f"{directory}: trial {trial}", row) for trial, row in zip(throws["trial"].to_pylist(), rows, strict=True)
-    ]
+    return [list(row) for row in zip(*(throws[column_of(name)].to_pylist() for name in names), strict=True)]
 
 
 def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:

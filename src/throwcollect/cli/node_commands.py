@@ -59,7 +59,7 @@ def coordinator(
     ] = None,
 ) -> None:
     """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
-    from throwcollect.ros.nodes.coordinator.process import run
+    from throwcollect.ros.nodes.coordinator.node import run
 
     if config is None:
         run(directory)

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.cluster.site import site_path
+from throwcollect.config.cluster import ClusterConfig
+from throwcollect.config.document import Document
 from throwcollect.errors import ConfigError, WorkerError
 
 MARK = "throwcollect:"
@@ -194,3 +195,19 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
             )
         raise WorkerError(f"{program} refuses: {'; '.join(said) or f'exit code {done.returncode}'}")
     return done.stdout
+
+
+def site_path() -> Path:
+    """Name the path of the file, which need not exist."""
+    home = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(home) / "throwcollect" / "cluster.yaml"
+
+
+def with_site(cluster: ClusterConfig) -> ClusterConfig:
+    """Complete the section `cluster` of a configuration by the user's file; keys that the section sets itself win."""
+    path = site_path()
+    if not path.is_file():
+        return cluster
+    site = Document(path).validate(ClusterConfig)
+    own = {name: getattr(cluster, name) for name in cluster.model_fields_set}
+    return site.model_copy(update=own)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+import subprocess
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -12,8 +14,7 @@ from pathlib import Path
 from throwcollect.cluster import slurm
 from throwcollect.cluster.cluster_run import ClusterRun
 from throwcollect.cluster.script import BatchScripts
-from throwcollect.cluster.sif import SIF_COMMAND, check_sif
-from throwcollect.cluster.site import with_site
+from throwcollect.cluster.slurm import with_site
 from throwcollect.cluster.submission import (
     CLUSTER,
     Job,
@@ -30,15 +31,19 @@ from throwcollect.coordinator.prepare import describe_plan, prepare
 from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.creation import remove_plan
 from throwcollect.dataset.directory import PLAN
-from throwcollect.errors import ConfigError, Problem
+from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.files import unwritable, write_file
 from throwcollect.own_process import make_command
 from throwcollect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
+from throwcollect.runtimes.image_sources import SOURCES_LABEL, UNKNOWN, VERSION_LABEL, are_others
 from throwcollect.side_by_side import count_cores
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
+from throwcollect.version import __version__
 from throwcollect.wording import command, format_count
 
+_SIF_COMMAND = "make sif"
+"""Command that makes the SIF of this version, in a clone of the project."""
 _COLLECT, _JOIN, _LOGS = "collect.sh", "join.sh", "logs"
 
 
@@ -195,7 +200,7 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
         if not image.is_file():
             raise ConfigError(
                 [Problem(f"there is no image {image}", key="cluster.image")],
-                hint=f"{SIF_COMMAND}, in a clone of the project, makes one",
+                hint=f"{_SIF_COMMAND}, in a clone of the project, makes one",
             )
         # Many login nodes have no Apptainer, though the nodes of tasks have.
         if shutil.which("apptainer") is not None:
@@ -218,3 +223,26 @@ def _remove(directory: Path, *, made: bool, planned: bool) -> None:
     shutil.rmtree(directory / CLUSTER, ignore_errors=True)
     if planned:
         remove_plan(directory, made=made)
+
+
+def check_sif(sif: Path) -> None:
+    """Make sure that a SIF holds the throwcollect that is installed here, because another may collect other bytes.
+
+    A SIF without labels is accepted.
+    """
+    labels = _read_labels(sif)
+    hint = f"{_SIF_COMMAND}, in a clone of the project, makes one"
+    if (version := labels.get(VERSION_LABEL, UNKNOWN)) not in (UNKNOWN, __version__):
+        raise ConfigError(f"{sif}: holds throwcollect {version}, and this is {__version__}", hint=hint)
+    if are_others(labels.get(SOURCES_LABEL)):
+        raise ConfigError(f"{sif}: was made from other sources than these", hint=hint)
+
+
+def _read_labels(sif: Path) -> dict[str, str]:
+    answer = subprocess.run(
+        ["apptainer", "--nocolor", "inspect", "--json", sif], capture_output=True, text=True, check=False
+    )
+    if answer.returncode:
+        raise WorkerError(f"{sif}: its labels cannot be read", evidence=answer.stderr.strip() or None)
+    labels: dict[str, str] = json.loads(answer.stdout)["data"]["attributes"].get("labels") or {}
+    return labels

@@ -50,6 +50,7 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
 
 
 Joint = Annotated[str, AfterValidator(_require_joint), WithJsonSchema({"type": "string", "words": "joint"})]
+"""Any URDF may name other joints, so the JSON Schema lists none."""
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 LONGEST_NAME = 64
 NAME_WORDS = f"up to {LONGEST_NAME} lower-case letters, digits, - and _, first a letter or digit"

@@ -64,8 +64,8 @@ class RobotConfig(Section):
 class ToolPose(Section):
     """Pose of the hand, which holds the tool, in the flange; the spoon's handle lies along -z, and opens along +x."""
 
-    position_m: _Vector = [0.0, 0.0, 0.0]
-    """Origin."""
+    position_m: _Vector = [0.0, 0.0, -0.1]
+    """Origin; the spoon's handle begins `tool.mount_offset_m` from there, by default at the flange."""
     rpy_rad: _Vector = [3.141592653589793, 0.0, 0.0]
     """Rotations about the axes x, y, z of the flange, in this order; by default, the handle lies along +z of it."""
 

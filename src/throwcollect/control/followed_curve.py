@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.interpolation import Curve
-from throwcollect.control.sampling import Grid, first_index_at
+
+_BLOCK = 4096
+"""Points that are computed at once: enough for whole throws, but limited, as a trajectory may end in years."""
 
 
 class Motion:
@@ -77,7 +79,7 @@ class Motion:
         """Count the updates before the one in which `past_end` becomes true; negative if it is true already."""
         if self.past_end:
             return -1
-        return first_index_at(self.curve.end_ns - self._period_ns - self.clock_ns, self._step_ns) - 1
+        return _first_index_at(self.curve.end_ns - self._period_ns - self.clock_ns, self._step_ns) - 1
 
     def updates_until_late(self, tolerance_ns: int) -> int:
         """Count the updates before the one in which `since_end_ns` exceeds the tolerance; negative if it does so."""
@@ -90,8 +92,67 @@ class Motion:
     def _rebase(self, clock_ns: int) -> None:
         self._index = 0
         self._step_ns = round(self._period_ns * self._scaling)
-        self._desired = Grid(self.curve, clock_ns, self._step_ns)
+        self._desired = _Grid(self.curve, clock_ns, self._step_ns)
         # At full speed a command is the desired position of the next update, so that one grid serves both.
         full_speed = self._step_ns == self._period_ns
         self._ahead = 1 if full_speed else 0
-        self._commands = self._desired if full_speed else Grid(self.curve, clock_ns + self._period_ns, self._step_ns)
+        self._commands = self._desired if full_speed else _Grid(self.curve, clock_ns + self._period_ns, self._step_ns)
+
+
+class _Grid:
+    """A curve at times that are one step apart; from the curve's end on its last position is held.
+
+    Args:
+        curve: The curve that is sampled.
+        origin_ns: Time of point 0, since the trajectory's start [ns].
+        step_ns: Time from one point to the next [ns]; 0 stays at the origin.
+    """
+
+    def __init__(self, curve: Curve, origin_ns: int, step_ns: int) -> None:
+        self._curve = curve
+        self._origin_ns = origin_ns
+        self._step_ns = step_ns
+        self.end_index = _first_index_at(curve.end_ns - origin_ns, step_ns)
+        self._block_start = 0
+        self._block = np.empty((0, 0))
+        # A clock that stands still never gets to the end, so its last position is the position at the origin.
+        self._last = curve.state(curve.end_ns if step_ns else origin_ns)[0]
+
+    def time_ns(self, index: int) -> int:
+        """Compute the time of a point, since the trajectory's start [ns]."""
+        return self._origin_ns + index * self._step_ns
+
+    def position(self, index: int) -> NDArray[np.float64]:
+        """Compute the position at one point [rad], shape ``(n_joints,)``, read-only."""
+        position: NDArray[np.float64] = self.positions(index, 1)[0]
+        return position
+
+    def positions(self, first: int, count: int) -> NDArray[np.float64]:
+        """Compute positions at successive points [rad], shape ``(count, n_joints)``, read-only; `first` is an index."""
+        stop = first + count
+        moving_stop = min(stop, self.end_index if self._step_ns else first)
+        if first >= moving_stop:
+            return np.broadcast_to(self._last, (count, len(self._last)))
+        if not self._block_start <= first or moving_stop > self._block_start + len(self._block):
+            self._block_start = first
+            self._block = self._compute(first, max(moving_stop, min(first + _BLOCK, self.end_index)) - first)
+        moving = self._block[first - self._block_start : moving_stop - self._block_start]
+        if moving_stop == stop:
+            return moving
+        positions = np.vstack((moving, np.broadcast_to(self._last, (stop - moving_stop, len(self._last)))))
+        positions.setflags(write=False)
+        return positions
+
+    def _compute(self, first: int, count: int) -> NDArray[np.float64]:
+        times_ns = self._origin_ns + np.arange(first, first + count, dtype=np.int64) * self._step_ns
+        positions = self._curve.positions(times_ns)
+        positions.setflags(write=False)
+        return positions
+
+
+def _first_index_at(distance_ns: int, step_ns: int) -> int:
+    """Find the index of the first point that is at least this far from the origin; `sys.maxsize` if there is none."""
+    if distance_ns <= 0:
+        return 0
+    # This rounds up in whole numbers, because a float cannot tell single nanoseconds of a year.
+    return -(-distance_ns // step_ns) if step_ns else sys.maxsize

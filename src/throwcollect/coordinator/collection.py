@@ -13,10 +13,8 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from throwcollect.coordinator.acceptance import Acceptance
-from throwcollect.coordinator.leases import Leases
+from throwcollect.coordinator.leases import Leases, Prefix
 from throwcollect.coordinator.lookahead import Lookahead
-from throwcollect.coordinator.prefix import Prefix
 from throwcollect.coordinator.prepare import count_first, feasibility_check
 from throwcollect.coordinator.progress import Progress, TrialRate
 from throwcollect.coordinator.replay_check import ReplayCheck
@@ -27,7 +25,8 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.sweep.plan import Check, refusal
 from throwcollect.tasks.result import Result
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import task_of, trajectory_of
+from throwcollect.trial.conditions import Settings, conditions_from_json
 from throwcollect.wording import command, format_count
 
 _SYNC_EVERY_S = 1.0
@@ -65,7 +64,7 @@ class TrialCollection:
         self._leases = Leases(checked, retries=self._config.run.retries)
         self._names: dict[str, str] = {}
         self._took_part: set[str] = set()
-        self._acceptance = Acceptance(self._config)
+        self._settings = Settings(self._config)
         task = task_of(self._config)
         self._columns, self._outcome_names = task.columns, task.outcomes
         self._lookahead = Lookahead()
@@ -210,8 +209,9 @@ class TrialCollection:
             return False
         try:
             result = self._columns.from_json(self._outcome_names, episode.result)
-            plan = self.writer.plan
-            reason = self._acceptance.find_difference(episode.conditions, plan, plan.trial(trial))
+            config = self.writer.plan.config_of(self.writer.plan.trial(trial))
+            expected = self._settings.conditions_of(config, trajectory_of(config).digest)
+            reason = conditions_from_json(episode.conditions).explain(expected)
         except DatasetError as error:
             reason = error.message
         if reason is not None:

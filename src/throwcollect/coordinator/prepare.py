@@ -63,14 +63,9 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
 
 
 def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
-    if (count := count_before(config)) >= _ANNOUNCED_TRIALS:
+    if (count := config.trials or 0) >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: draws {count} trials")
     return draw_points(config, directory=directory)
-
-
-def count_before(config: Config) -> int:
-    """Count the trials before they are drawn; 0 if their number is not known yet."""
-    return config.trials or 0
 
 
 def count_first(config: Config, trials: int) -> int:
@@ -219,8 +214,8 @@ def prepare(
     """
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
-    check_room(directory, count_before(config))
-    onlooker.update_plan(0, count_before(config))
+    check_room(directory, config.trials or 0)
+    onlooker.update_plan(0, config.trials or 0)
     points = _draw_points(config, sweep_directory, onlooker)
     check_room(directory, len(points.values))
     plan = _check_trials(config, points, processes=processes, onlooker=onlooker)

@@ -14,7 +14,7 @@ from throwcollect.dataset.throws_table import Row
 from throwcollect.errors import DatasetError
 from throwcollect.side_by_side import Workers
 from throwcollect.sweep.plan import Plan
-from throwcollect.trial.choice import choose_trials
+from throwcollect.sweep.trials import choose_trials
 from throwcollect.wording import format_count
 
 if TYPE_CHECKING:

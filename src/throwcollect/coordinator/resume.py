@@ -1,8 +1,10 @@
-"""Prepares the configuration and the plan of a dataset that an earlier collection has left, for the next one."""
+"""Prepares a dataset that an earlier collection has left for the next one, or finishes it with what is whole of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import math
+from collections.abc import Callable, Collection, Mapping
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,26 +17,32 @@ from throwcollect.config.values import differences
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.prepare import (
     check_room,
-    count_before,
     draw_plan,
     make_self_contained,
     prepare,
     read_listed_points,
 )
-from throwcollect.dataset.carried_robot import config_text, write_config
+from throwcollect.dataset.carried_robot import carry_robot, config_text, find_files, write_config
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import METADATA, PLAN, SOURCES, TRIALS, config_path
+from throwcollect.dataset.directory import METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS, config_path
+from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import entry_of, entry_of_file, is_begun
+from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws, read_throws_table
 from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, remove, write_file
+from throwcollect.robots.description import is_available
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.result import LOST
+from throwcollect.tasks.result import LOST, REFUSED, Result
 
 _NO_EPISODE = "no whole episode of it was left"
 
@@ -74,6 +82,10 @@ def resume(
         stored = _read_stored_config(directory)
         if stored is not None:
             refuse_changes(directory, stored, given)
+            # The files may be damaged; those of the given configuration are the same.
+            carry_robot(given, directory)
+        if find_files(given) is not None:
+            _ = given.robot.find().directory
         damaged = _find_damaged(directory, onlooker)
         old = None if PLAN in damaged else _read_stored_plan(directory, stored, given)
         # The list may be read and written below, and a link in its place could lead to any file of the user.
@@ -124,7 +136,7 @@ def _make_plan(
         # The digest of the plan also depends on the order of keys, which may have been changed in the file.
         lost_list = own_list and (TRIALS in damaged or not _has_own_list(directory, old))
         return replace(old, config=old.config.run_as(config)), old.trials.points if lost_list else None
-    check_room(directory, count_before(given))
+    check_room(directory, given.trials or 0)
     drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
     plan = _extend(directory, old, replace(drawn, config=config))
     return plan, read_listed_points(given, directory=sweep_directory)
@@ -266,3 +278,59 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected="a list with further rows below, or a sampler that goes on where it ended: sobol, uniform",
         )
     return new
+
+
+def finish_without_simulating(
+    config: Config, directory: Path, *, sweep_directory: Path, onlooker: Onlooker = SILENT
+) -> None:
+    """Finish a dataset with the episodes that are whole, and give all other trials up as lost; else as `resume`.
+
+    An episode that the table of throws has keeps its result there, so neither the robot nor an engine is needed. A
+    finished dataset of which nothing is missing or damaged stays as it is.
+    """
+    plan = resume(config, directory, sweep_directory=sweep_directory, onlooker=onlooker)
+    if (directory / METADATA).exists():
+        onlooker.say(f"{directory}: is finished, and no file of it is missing or damaged")
+        return
+    table, provenance = ThrowsTable.of(plan), read_provenance(directory)
+    rows: Mapping[int, Row] = {}
+    with suppress(DatasetError):
+        rows = RowsByTrial(read_throws_table(directory / THROWS, plan))
+
+    def judge(config: Config, episode: Episode) -> Result:
+        row = rows.get(episode.header.trial)
+        return table.result(row) if row and row["digest"] == episode.digest else judge_episode(config, episode)
+
+    there: list[int] = []
+    wanted = math.inf if plan.config.until is None else plan.config.until.wanted
+
+    def keep(trial: int, result: Result) -> bool:
+        """Note an episode; with `until`, drop those that follow the last trial that is wanted."""
+        nonlocal wanted
+        if wanted <= 0:
+            return False
+        there.append(trial)
+        wanted -= result.outcome.value == plan.config.task.success
+        return True
+
+    with closing(DatasetWriter.open(directory, channels=_read_channels(directory, plan))) as writer:
+        writer.recover(keep, judge=judge)
+        if plan.config.until is not None:
+            # Where the dataset ends without the missing trials is not known, so it ends with the last known one.
+            last = max([*there, *([] if wanted <= 0 else rows)], default=plan.trials.first)
+            for trial in writer.list_missing():
+                if (row := rows.get(trial)) and row["outcome"] == REFUSED:
+                    writer.refuse(trial, row["reason"])
+            writer.end_with(last)
+        for trial in writer.list_missing():
+            row = rows.get(trial)
+            writer.append_lost(trial, row["reason"] if row and row["outcome"] == LOST else _NO_EPISODE)
+        writer.finish(provenance=provenance)
+
+
+def _read_channels(directory: Path, plan: Plan) -> Channels | None:
+    """Read what is recorded where the robot is not installed, from the first recording that describes it; else None."""
+    for path in sorted(directory.glob(f"*{SHARD_SUFFIX}*")) if not is_available(plan.config) else ():
+        with suppress(DatasetError), open_mcap(path) as contents:
+            return Channels(plan.config, contents.read_robot_description())
+    return None

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import shutil
 import tempfile
+import zipfile
 from pathlib import Path
 
 from throwcollect.config.loader import dump_yaml
@@ -36,21 +39,47 @@ def _place_robot(config: Config, directory: Path) -> Config:
 
 def carry_robot(config: Config, directory: Path) -> Config:
     """Copy the files of a robot into the directory of a dataset; return the configuration that names them there."""
-    robot = config.robot
-    if not isinstance(robot, DescribedRobotConfig):
-        return config
-    source, target = Path(robot.urdf).parent, directory / ROBOT
-    if source != Path(ROBOT) and source.resolve() != target.resolve():
-        scratch = Path(tempfile.mkdtemp(prefix=f".{ROBOT}-", dir=directory))
-        try:
+    if (source := find_files(config)) is not None:
+        copy_robot(source, directory)
+    return _place_robot(config, directory / ROBOT)
+
+
+def copy_robot(source: Path, directory: Path) -> None:
+    """Copy the files of a robot into the directory of a dataset, unless they are there."""
+    target = directory / ROBOT
+    if source == Path(ROBOT) or source.resolve() == target.resolve():
+        return
+    scratch = Path(tempfile.mkdtemp(prefix=f".{ROBOT}-", dir=directory))
+    try:
+        for path in list_files(source):
+            shutil.copyfile(path, scratch / path.name)
+        shutil.rmtree(target, ignore_errors=True)
+        scratch.chmod(0o755)
+        scratch.rename(target)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def find_files(config: Config) -> Path | None:
+    """Find the directory with the files of a robot; None if it is installed."""
+    return Path(config.robot.urdf).parent if isinstance(config.robot, DescribedRobotConfig) else None
+
+
+def pack_robot(config: Config) -> str:
+    """Write the files of a robot as a text, a zip archive in base64; it is empty if the robot is installed."""
+    packed = io.BytesIO()
+    if (source := find_files(config)) is not None:
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for path in list_files(source):
-                shutil.copyfile(path, scratch / path.name)
-            shutil.rmtree(target, ignore_errors=True)
-            scratch.chmod(0o755)
-            scratch.rename(target)
-        finally:
-            shutil.rmtree(scratch, ignore_errors=True)
-    return _place_robot(config, target)
+                archive.write(path, path.name)
+    return base64.b64encode(packed.getvalue()).decode()
+
+
+def unpack_robot(text: str, directory: Path) -> None:
+    """Write the files of `pack_robot` into the directory of a dataset."""
+    if text:
+        with zipfile.ZipFile(io.BytesIO(base64.b64decode(text))) as archive:
+            archive.extractall(directory / ROBOT)
 
 
 def list_carried(directory: Path) -> list[str]:

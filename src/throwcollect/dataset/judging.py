@@ -9,21 +9,15 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of, trajectory_of
 
 
-def judge_episode(config: Config, episode: Episode, trajectory: JointTrajectory | None = None) -> Result:
-    """Say how a trial with this configuration ended, from its episode.
-
-    The trajectory is the one that its controllers were sent; it is computed here if it is None.
-    """
+def judge_episode(config: Config, episode: Episode) -> Result:
+    """Say how a trial with this configuration ended, from its episode."""
     samples = episode.samples(robot_of(config).joints)
     if (np.diff(samples.stamps_ns) <= 0).any():
         raise DatasetError("chunk: the stamps do not increase")
-    if trajectory is None:
-        trajectory = trajectory_of(config)
     with explain_failure("tasks", config.task.name, f"judge trial {episode.header.trial}"):
-        result: Result = task_of(config).judge(samples, episode.header, trajectory)
+        result: Result = task_of(config).judge(samples, episode.header, trajectory_of(config))
     return result

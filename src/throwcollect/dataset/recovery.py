@@ -27,8 +27,7 @@ from throwcollect.dataset.directory import (
 )
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import RecordGroup
-from throwcollect.dataset.mcap_reader import map_file
-from throwcollect.dataset.scan import scan_file
+from throwcollect.dataset.mcap_reader import map_file, scan_file
 from throwcollect.dataset.shard import FinishedShard, OpenShard, rewrite
 from throwcollect.dataset.throws_table import EpisodePlace
 from throwcollect.episode.channels import Channels
@@ -85,12 +84,8 @@ class LeftOfShard:
         return LeftOfShard(final, begun, None)
 
 
-@dataclass(frozen=True)
-class LeftShard:
-    """A shard of which something may be left: its final path and its trials."""
-
-    path: Path
-    plan: Plan
+LeftShard = tuple[Path, Plan]
+"""A shard of which something may be left: its final path and its trials."""
 
 
 def remove_unfinished(directory: Path) -> None:
@@ -107,7 +102,7 @@ def find_left(
     Yields:
         What is left of each, in order.
     """
-    if sum(len(part.plan.trials) for part in parts) < _MANY_EPISODES:
+    if sum(len(plan.trials) for _, plan in parts) < _MANY_EPISODES:
         processes = 1
     return work_side_by_side(
         parts, _look_with, (channels, judge), processes=processes, doing="looks through recordings", fork=True
@@ -116,13 +111,14 @@ def find_left(
 
 def _look_with(channels: Channels, judge: Judge) -> Callable[[LeftShard], LeftOfShard]:
     def look(part: LeftShard) -> LeftOfShard:
-        final = find_episodes(part.path, part.plan, channels, judge=judge)
+        path, plan = part
+        final = find_episodes(path, plan, channels, judge=judge)
         # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
-        if final and final.keys() == set(part.plan.trials.numbers_to_run):
-            finished = _check_finished(part.path, channels, final)
+        if final and final.keys() == set(plan.trials.numbers_to_run):
+            finished = _check_finished(path, channels, final)
             if finished is not None:
                 return LeftOfShard(final, {}, finished)
-        begun = find_episodes(path_of_part(part.path), part.plan, channels, judge=judge)
+        begun = find_episodes(path_of_part(path), plan, channels, judge=judge)
         return LeftOfShard(final, begun, None)
 
     return look

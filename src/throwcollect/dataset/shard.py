@@ -8,7 +8,7 @@ file ``<name>_00000.mcap``, and the other vanishes.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -57,20 +57,30 @@ def write_in_order(
 
     The runs lie in another file; `read`, called with an offset and a length, returns bytes of it.
     """
-    sha256 = RunningHash()
+    trials, places = zip(*sorted(runs.items(), key=itemgetter(0)), strict=True)
+    whole = (replace(run, data=read(offset, run.length)) for offset, run in places)
+    recording, offsets = write_runs(write, channels, whole, name=name)
+    return FinishedShard(recording, dict(zip(trials, offsets, strict=True)))
+
+
+def write_runs(
+    write: Callable[[bytes], None], channels: Channels, runs: Iterable[RecordGroup], *, name: str
+) -> tuple[Recording, list[int]]:
+    """Write a finished file of some runs, at least one; return also where each begins [bytes]."""
+    sha256, file, offsets = RunningHash(), None, []
 
     def put(data: bytes) -> None:
         write(data)
         sha256.update(data)
 
-    _, first = runs[min(runs)]
-    file = McapFile(put, channels, start_ns=first.start_ns)
-    offsets = {}
-    for trial, (offset, run) in sorted(runs.items(), key=itemgetter(0)):
-        offsets[trial] = file.size
-        file.append(replace(run, data=read(offset, run.length)))
+    for run in runs:
+        file = file or McapFile(put, channels, start_ns=run.start_ns)
+        offsets.append(file.size)
+        file.append(run)
+    if file is None:
+        raise ValueError(name)
     summary = file.finish(name)
-    return FinishedShard((summary, FileEntry(name, file.size, sha256.hexdigest())), offsets)
+    return (summary, FileEntry(name, file.size, sha256.hexdigest())), offsets
 
 
 def rewrite(contents: McapContents, channels: Channels, runs: Runs, *, name: str) -> tuple[FinishedShard, int | None]:

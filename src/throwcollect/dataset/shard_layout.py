@@ -48,7 +48,7 @@ class ShardLayout:
         """Describe a shard for `find_left`, without a look into its files."""
         members, first = self.members(number), self.plan.trials.first
         trials = self.plan.trials[members.start - first : members.stop - first]
-        return LeftShard(self.path(number), Plan(self.plan.config, trials))
+        return self.path(number), Plan(self.plan.config, trials)
 
     @property
     def _trials_per_shard(self) -> int:

@@ -18,8 +18,7 @@ from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import RecordGroup
-from throwcollect.dataset.mcap_reader import McapContents, StoredEpisode, map_file
-from throwcollect.dataset.scan import scan
+from throwcollect.dataset.mcap_reader import McapContents, StoredEpisode, map_file, scan
 from throwcollect.dataset.shard import rewrite
 from throwcollect.dataset.throws_table import EpisodePlace, Row, ThrowsTable
 from throwcollect.episode.channels import Channels

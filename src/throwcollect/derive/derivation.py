@@ -4,30 +4,34 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 
+from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.values import column_of
+from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.directory import CARD, SOURCES, shard_of
-from throwcollect.dataset.manifest import FileEntry, RunningHash
-from throwcollect.dataset.mcap_file import McapFile, episode_run
+from throwcollect.dataset.mcap_file import episode_run
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.shard import Recording
+from throwcollect.dataset.selection import find_rows
+from throwcollect.dataset.shard import write_runs
 from throwcollect.dataset.summary_files import write_description
 from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, make_field
 from throwcollect.derive.joined_plan import join_plans
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import new_directory, replacing, write_all, write_file
+from throwcollect.files import StrPath, new_directory, replacing, write_all, write_file
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.parquet_file import encode_table
@@ -95,13 +99,16 @@ def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
     _check_copies(copies, plan)
     channels = _read_channels(sources)
     create(directory, plan, listed=plan.trials.points)
+    carry_robot(sources[0].config, directory)
     table, rows = ThrowsTable.of(plan), [RowsByTrial(source.throws) for source in sources]
     tables, recordings = [], []
     progress = log_progress(copies, len(copies), "trial", "written")
     for name, members in groupby(progress, key=lambda copy: shard_of(plan, copy.number)):
         held = list(members)
         episodes = (_read(sources[copy.source], rows[copy.source][copy.trial]) for copy in held)
-        recording, offsets = _write_shard(directory / name, episodes, channels)
+        with replacing(directory / name) as descriptor:
+            write = partial(write_all, descriptor)
+            recording, offsets = write_runs(write, channels, map(episode_run, episodes), name=name)
         recordings.append(recording)
         tables.append(
             table.table(
@@ -151,25 +158,6 @@ def _read(source: Dataset, row: Row) -> Episode:
         return episode
 
 
-def _write_shard(path: Path, episodes: Iterable[Episode], channels: Channels) -> tuple[Recording, list[int]]:
-    """Write a recording of some episodes, at least one; returns also where each begins [bytes]."""
-    sha256, file, offsets = RunningHash(), None, []
-    with replacing(path) as descriptor:
-
-        def put(data: bytes) -> None:
-            write_all(descriptor, data)
-            sha256.update(data)
-
-        for episode in episodes:
-            file = file or McapFile(put, channels, start_ns=episode.chunk.start_ns)
-            offsets.append(file.size)
-            file.append(episode_run(episode))
-        if file is None:
-            raise ValueError(path)
-        summary = file.finish(path.name)
-    return (summary, FileEntry(path.name, file.size, sha256.hexdigest())), offsets
-
-
 def _make_row(plan: Plan, number: int, row: Row) -> Row:
     """Make the row of a copy: keys that its source does not sweep, but the new plan does, are columns here, too."""
     trial = plan.trial(number)
@@ -211,3 +199,53 @@ _SOURCES = pa.schema(
         make_field("source_trial", pa.int64(), "Number of the trial there."),
     ]
 )
+
+
+def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
+    """Put the trials of several datasets, at least one, into a new one.
+
+    Datasets of one plan, such as the parts of a split, keep the numbers of their trials. Those of other plans follow.
+
+    Raises:
+        ConfigError: If there is no dataset, they differ in keys that cannot be swept or have a trial in common, or the
+            directory cannot be used.
+        DatasetError: If a dataset is damaged, or the new one cannot be written.
+    """
+    if not directories:
+        raise refuse_argument("directories", "got none", expected="at least one dataset")
+    sources = [Dataset.open(directory) for directory in directories]
+    return derive(sources, Path(output), offered=sum(map(len, sources)))
+
+
+def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
+    """Take the trials that fulfil a condition on columns of the table of throws; see `dataset.selection`.
+
+    Raises:
+        ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
+        DatasetError: If the dataset is damaged, or the new one cannot be written.
+    """
+    dataset = Dataset.open(directory)
+    chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where").fill_null(False)))
+    if not len(chosen.recorded):
+        raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
+    return derive([chosen], Path(output), offered=len(dataset))
+
+
+def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
+    """Take `count` trials at random, all equally likely and none twice; they stay in their order.
+
+    With the same seed, a smaller sample is a part of a larger one. The seed must not be negative.
+
+    Raises:
+        ConfigError: If the dataset has fewer episodes, a number is wrong, or the directory cannot be used.
+        DatasetError: If the dataset is damaged, or the new one cannot be written.
+    """
+    check_bounds("seed", seed, least=0)
+    dataset = Dataset.open(directory)
+    candidates = dataset.recorded
+    if not 1 <= count <= len(candidates):
+        bounds = f"from 1 to {len(candidates)}, the number of episodes of {directory}"
+        raise refuse_argument("count", f"should be {bounds}, got {count}")
+    places = np.sort(np.random.default_rng(seed).permutation(len(candidates))[:count])
+    chosen = replace(candidates, throws=candidates.throws.take(places))
+    return derive([chosen], Path(output), offered=len(dataset))

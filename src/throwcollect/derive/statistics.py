@@ -123,22 +123,23 @@ def _summarise_columns(throws: pa.Table) -> Iterator[tuple[str, ColumnStatistics
             continue
         numbers = throws[field.name].drop_null().to_numpy().astype(np.float64)
         numbers = numbers[np.isfinite(numbers)]
-        yield field.name, _summarise_column(numbers, nulls=len(throws) - len(numbers))
-
-
-def _summarise_column(numbers: NDArray[np.float64], *, nulls: int) -> ColumnStatistics:
-    if not len(numbers):
-        return ColumnStatistics(0, nulls, None, None, None, None, {})
-    quantiles = np.quantile(numbers, QUANTILES).tolist()
-    return ColumnStatistics(
-        count=len(numbers),
-        nulls=nulls,
-        min=float(numbers.min()),
-        max=float(numbers.max()),
-        mean=float(numbers.mean()),
-        std=float(numbers.std()),
-        quantiles={f"q{round(100 * at):02d}": value for at, value in zip(QUANTILES, quantiles, strict=True)},
-    )
+        nulls = len(throws) - len(numbers)
+        if not len(numbers):
+            yield field.name, ColumnStatistics(0, nulls, None, None, None, None, {})
+            continue
+        quantiles = np.quantile(numbers, QUANTILES).tolist()
+        yield (
+            field.name,
+            ColumnStatistics(
+                count=len(numbers),
+                nulls=nulls,
+                min=float(numbers.min()),
+                max=float(numbers.max()),
+                mean=float(numbers.mean()),
+                std=float(numbers.std()),
+                quantiles={f"q{round(100 * at):02d}": value for at, value in zip(QUANTILES, quantiles, strict=True)},
+            ),
+        )
 
 
 def _stack_signals(samples: Samples) -> NDArray[np.float64]:

@@ -75,7 +75,7 @@ def write(source: ExportSource, directory: Path) -> None:
         data = file.create_group("data")
         data.attrs["total"] = sum(map(source.count_samples, source.throws))
         data.attrs["env_args"] = json.dumps({"env_name": config.name, "type": _GYM, "env_kwargs": {}})
-        file.attrs["config"] = config.model_dump_json()
+        file.attrs["config"] = config.model_copy(update={"robot": config.robot.without_place()}).model_dump_json()
         succeeded = []
         for throw in source.read(source.throws):
             name = f"demo_{throw.throw.trial}"

@@ -229,7 +229,8 @@ def _describe_episode(
         "dataset_to_index": first + length,
     }
     for name, array in frames.items():
-        row |= {f"stats/{name}/{key}": values for key, values in summarise_episode(array).items()}
+        exact = np.quantile(array, list(QUANTILES.values()), axis=0)
+        row |= {f"stats/{name}/{key}": values for key, values in _list_statistics(Moments.of(array), exact).items()}
     return row
 
 
@@ -297,11 +298,6 @@ def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
     return pa.table({"task_index": [*tasks.values()], "task": [*tasks]}).replace_schema_metadata(
         {"pandas": json.dumps(pandas)}
     )
-
-
-def summarise_episode(frames: Frames) -> Statistics:
-    """Compute the statistics of one episode, with exact quantiles."""
-    return _list_statistics(Moments.of(frames), np.quantile(frames, list(QUANTILES.values()), axis=0))
 
 
 def summarise_all(moments: Moments, portions: Iterable[Frames]) -> Statistics:

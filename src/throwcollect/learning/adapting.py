@@ -44,24 +44,6 @@ _CLEARLY = 3.0
 """Adapting helps if the sum of squared misses falls by more than the square of this many standard deviations."""
 
 
-class FarThrowError(ConfigError):
-    """A throw is so far from all throws that a map was learned from that it must be a mistake.
-
-    Args:
-        number: Which of the throws, counted from 0.
-        problem: The value that is too far away, and its name.
-    """
-
-    def __init__(self, number: int, problem: str, *, expected: str, hint: str | None = None) -> None:
-        self.number = number
-        self.problem = problem
-        super().__init__(f"throw {number}: {problem}", expected=expected, hint=hint)
-
-    def locate_throw(self, place: str) -> ConfigError:
-        """Make the same error with the place of the throw, for a caller that has read it from a file."""
-        return ConfigError(f"{place}: {self.problem}", expected=self.expected, hint=self.hint)
-
-
 class Method(str, Enum):
     """How a world is assumed to differ from the world of the map."""
 
@@ -194,9 +176,8 @@ def refuse_far_inputs(learned: LearnedMap, role: KeyRole, inputs: Array) -> None
     for number, column in np.argwhere(np.abs(inputs) > _FAR).tolist():
         axis = learned.axes_of(role)[column]
         value = learned.unscale(role, inputs)[number, column]
-        raise FarThrowError(
-            number,
-            f"{axis.key} is {value:g}",
+        raise ConfigError(
+            f"throw {number}: {axis.key} is {value:g}",
             expected=f"about {axis.minimum:g} to {axis.maximum:g}, the range that the model was learned from",
         )
 
@@ -213,9 +194,8 @@ def refuse_far_places(learned: LearnedMap, places: Array) -> None:
     ranges = ", ".join(f"{least:.3g} to {most:.3g}" for least, most in zip(low.tolist(), high.tolist(), strict=True))
     for number in np.flatnonzero(away > max(_LEAST_WIDTH, float(np.linalg.norm(high - low)))).tolist():
         ends = zip(learned.targets, places[number].tolist(), strict=True)
-        raise FarThrowError(
-            number,
-            ", ".join(f"{target} is {end:g}" for target, end in ends),
+        raise ConfigError(
+            f"throw {number}: {', '.join(f'{target} is {end:g}' for target, end in ends)}",
             expected=f"about {ranges}, where the throws ended that the model was learned from",
             hint=_suggest_checks(learned.targets),
         )

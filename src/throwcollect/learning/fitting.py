@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from throwcollect.arguments import read_word, refuse_argument
-from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of, leaves
+from throwcollect.dataset.carried_robot import config_text, find_files
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
 from throwcollect.errors import ConfigError, DatasetError
@@ -92,7 +92,8 @@ def fit(
         ),
         adaptation=None,
         points=_tabulate(throws, learned),
-        config=dump_yaml(config),
+        config=config_text(config),
+        robot=find_files(config),
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.config.task_config import TaskConfig
@@ -16,21 +15,8 @@ from throwcollect.sweep.csv_file import read_csv
 from throwcollect.wording import join_names
 
 
-@dataclass(frozen=True)
-class Row:
-    """Numbers that belong together.
-
-    Attributes:
-        place: Where they were read, such as ``targets.csv:3``.
-        numbers: The numbers by name.
-    """
-
-    place: str
-    numbers: dict[str, float]
-
-
-def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | None = None) -> list[Row]:
-    """Read some columns of a CSV file with a header line.
+def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | None = None) -> list[list[float]]:
+    """Read some columns of a CSV file with a header line; a row has a number for each name.
 
     Args:
         path: The file.
@@ -44,8 +30,8 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
     _, values, lines = read_csv(path, choose)
     if not lines:
         raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
-    rows = zip(lines, values.tolist(), strict=True)
-    return [Row(f"{path}:{line}", dict(zip(names, row, strict=True))) for line, row in rows]
+    rows: list[list[float]] = values.tolist()
+    return rows
 
 
 def _find_columns(header: Sequence[str], names: Sequence[str], aliases: dict[str, str], place: str) -> list[str]:
@@ -68,8 +54,7 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
         task: Declares the names that columns of targets have in such lists.
     """
     aliases = {column.of: column.name for column in task.target_columns if column.of in names}
-    rows = read_table(path, names, aliases=aliases)
-    return [[row.numbers[name] for name in names] for row in rows]
+    return read_table(path, names, aliases=aliases)
 
 
 def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:

@@ -1,22 +1,35 @@
-"""Simulates throws of a dataset again, in several processes, and finds the differences."""
+"""Verifies a finished dataset, and simulates its throws again, by their own engine or by another one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
+from throwcollect.arguments import check_bounds
+from throwcollect.config.values import column_of, with_values
+from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.provenance import find_versions, read_provenance
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throws_table import ThrowsTable
+from throwcollect.dataset.verify import verify
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.errors import DatasetError
-from throwcollect.extras import require, require_engine
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.extras import MissingExtraError, require, require_engine
+from throwcollect.files import StrPath
+from throwcollect.members import names_of
 from throwcollect.progress_log import log_progress
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
-from throwcollect.trial.choice import choose_trials
+from throwcollect.sweep.trials import choose_trials
+from throwcollect.wording import join_names, suggest
+
+SAMPLE = 10
+"""Number of throws that are simulated again by default."""
 
 _Found = TypeVar("_Found")
 
@@ -35,7 +48,11 @@ class Comparison:
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
-    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice."""
+    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice.
+
+    Raises:
+        DatasetError: If no trial has one.
+    """
     trials: list[int] = dataset.recorded.throws["trial"].to_pylist()
     if not trials:
         raise DatasetError(f"{dataset.directory}: no trial has an episode")
@@ -107,3 +124,156 @@ def _find_differences(stored: Episode, again: Episode) -> Iterator[str]:
             largest = np.abs(before.astype(np.float64) - now).max()
             time_s = (one.stamps_ns[rows[0]] - one.stamps_ns[0]) / 1e9
             yield f"{column.name}: from {time_s:.3f} s on, by up to {largest:.3g}"
+
+
+def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: int = 1) -> list[Finding]:
+    """Check a finished dataset: files against the manifest, rows against plan and episodes, flights against physics.
+
+    Some throws, chosen by the seed of the dataset, are simulated again and compared bit for bit. Checks that take the
+    robot's model are left out without the extra ``collect``; `dataset.verify.find_unchecked` names them.
+
+    Args:
+        directory: Its directory.
+        replay: How many throws to simulate again; None for 10 if that can give the same bits here (`count_replayed`).
+        processes: How many processes may check the recordings of a large dataset.
+
+    Returns:
+        The problems, file by file; empty if there are none.
+
+    Raises:
+        ConfigError: If a number is out of its range.
+        DatasetError: If the directory holds no finished dataset.
+        MissingExtraError: If throws are to be simulated, and the extra ``collect`` is not installed.
+        WorkerError: If the physics engine does not start.
+    """
+    check_bounds("processes", processes, least=1)
+    directory = Path(directory)
+    if replay is not None:
+        check_bounds("replay", replay, least=0)
+    findings = verify(directory, processes=processes)
+    try:
+        dataset = Dataset.open(directory)
+        if count := count_replayed(dataset, replay):
+            findings += _find_different_throws(dataset, count)
+    except ConfigError:
+        # The files of the robot may be damaged.
+        if not findings:
+            raise
+    except DatasetError as error:
+        if not findings:
+            findings.append(Finding("", "", f"cannot be replayed: {error.message}"))
+    return findings
+
+
+def count_replayed(dataset: Dataset, replay: int | None) -> int:
+    """Count the throws that `verify_dataset` simulates again.
+
+    Without a wish, throws are simulated again only where engine and libraries have the versions by which the dataset
+    was collected, as others may give other bits.
+    """
+    if replay is None:
+        provenance = read_provenance(dataset.directory)
+        try:
+            require_simulating(dataset.config.sim.engine)
+        except MissingExtraError:
+            return 0
+        replay = SAMPLE if provenance is not None and provenance.libraries == find_versions() else 0
+    return min(replay, len(dataset.recorded))
+
+
+def _find_different_throws(dataset: Dataset, count: int) -> Iterator[Finding]:
+    """Find throws that do not come out of the simulation as they are stored."""
+    shards = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["shard"].to_pylist(), strict=True))
+    for comparison in replay_throws(dataset.directory, select_trials(dataset, sample=count)):
+        if comparison.differences:
+            problem = f"comes out differently: {'; '.join(comparison.differences)}"
+            yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How a throw by another engine differs from the stored one.
+
+    Attributes:
+        stored: Its outcome in the dataset.
+        again: Its outcome by the other engine.
+        values: The other engine's value minus the stored one, in the unit of the column, for each column of the table
+            of throws in which both throws have a number.
+    """
+
+    trial: int
+    stored: str
+    again: str
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """How much a column differs in the throws in which it could be compared, in its unit.
+
+    The mean is that of differences with their signs; median and largest are those of absolute differences.
+    """
+
+    column: str
+    throws: int
+    mean: float
+    rms: float
+    median: float
+    largest: float
+
+
+def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
+    """Simulate stored throws of a dataset with another engine; deviations come in the given order.
+
+    Raises:
+        ConfigError: If there is no such engine, or the throws are by it themselves.
+    """
+    own = Dataset.open(directory).config.sim.engine
+    others = [name for name in names_of("engines") if name != own]
+    if engine == own:
+        problem = f"--engine {engine}: the throws of {directory} are by {own} themselves"
+        raise ConfigError(problem, expected=join_names(others, "or"))
+    if engine not in others:
+        raise ConfigError(f"--engine {engine}: there is no such engine{suggest(engine, others)}")
+    return simulate_side_by_side(engine, trials, _begin_other, (directory, engine))
+
+
+def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:
+    """Sum up how much each column differs, in the order of the table."""
+    found = []
+    for column in dict.fromkeys(column for each in deviations for column in each.values):
+        values = np.array([each.values[column] for each in deviations if column in each.values])
+        sizes = np.abs(values)
+        rms = float(np.sqrt(np.mean(values**2)))
+        found.append(
+            Distribution(column, len(values), float(values.mean()), rms, float(np.median(sizes)), float(sizes.max()))
+        )
+    return found
+
+
+def _begin_other(directory: Path, engine: str) -> Callable[[int], Deviation]:
+    """Open dataset and simulation in a process, which keeps both from one trial to the next."""
+    from throwcollect.sim.simulator import Simulator
+
+    dataset = Dataset.open(directory)
+    plan, own = dataset.plan, dataset.config
+    config = own.model_copy(update={"sim": own.sim.model_copy(update={"engine": engine})})
+    table = ThrowsTable(plan.keys, config, plan.trials.target_names)
+    simulator = Simulator(config)
+
+    def simulate(number: int) -> Deviation:
+        """Simulate a trial, and compare its row with the stored one."""
+        trial = plan.trial(number)
+        result = judge_episode(with_values(config, trial.values), simulator.run(trial))
+        stored, again = dataset.select([number])[0].row, table.row(trial, result, None)
+        # Columns of text, and numbers that only one of the two rows has, cannot be compared.
+        compared = [
+            column
+            for column in again
+            if column not in ("trial", *map(column_of, trial.values), *trial.target)
+            and all(isinstance(row.get(column), int | float) for row in (stored, again))
+        ]
+        values = {column: float(again[column]) - float(stored[column]) for column in compared}
+        return Deviation(number, stored["outcome"], again["outcome"], values)
+
+    return simulate

@@ -1,12 +1,16 @@
-"""The sections of a report that a dataset of any task has, and the whole report."""
+"""The sections of a report that a dataset of any task has, and the whole report, as one page of HTML."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import plotly.graph_objects as go
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from plotly.offline import get_plotlyjs
 
 from throwcollect.dataset.directory import CONFIG, FORMAT, JOURNAL, PROVENANCE
 from throwcollect.dataset.inspect import summary
@@ -14,7 +18,9 @@ from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
-from throwcollect.files import read_text
+from throwcollect.errors import ConfigError
+from throwcollect.extras import require
+from throwcollect.files import read_text, write_file
 from throwcollect.members import explain_failure, load_part
 from throwcollect.report import figures
 from throwcollect.report.contents import (
@@ -38,12 +44,12 @@ from throwcollect.report.measured import (
     read_parameters,
     summarise_peaks,
 )
-from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.targets import show_targets
+from throwcollect.report.targets import show_model, show_targets
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest
 from throwcollect.tasks.task import task_of
+from throwcollect.version import __version__
 from throwcollect.wording import blank_numbers
 
 _EXAMPLES = 5
@@ -272,3 +278,37 @@ def _show_provenance(facts: dict[str, str], config: str) -> ReportSection:
     text = Markup("<code>throwcollect dataset verify</code> checks the recordings against the digest of the dataset.")
     table = Table(tuple((name, _CODE.format(value)) for name, value in facts.items()))
     return ReportSection("provenance", "Provenance", "Where it comes from", text, (table, Listing(CONFIG, config)))
+
+
+def write_report(directory: Path, page: Path, *, model: Path | None = None) -> None:
+    """Write a report on a dataset, and on a model that was learned from it, into an HTML file that is new."""
+    require("jinja2", "plotly")
+    if page.exists():
+        raise ConfigError(
+            f"{page}: exists", expected="a file that is new", hint="choose another --output, or remove it"
+        )
+    write_file(page, render_page(report_dataset(Dataset.open(directory), model=model)).encode())
+
+
+def render_page(report: Report) -> str:
+    """HTML of a report; equal reports give equal pages."""
+    # All texts of a dataset are escaped; only `Markup` is HTML.
+    templates = Environment(
+        loader=PackageLoader("throwcollect.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    # Apart from numbers, texts and dictionaries, plotly leaves only sequences in a figure.
+    templates.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False, "default": list}
+    templates.filters |= {"specify": _specify, "in_words": in_words, "share": format_share}
+    page = templates.get_template("page.html")
+    return page.render(report=report, version=__version__, plotly=get_plotlyjs())
+
+
+def _specify(figure: go.Figure) -> dict[str, Any]:
+    """A figure as plotly's JavaScript reads it, without a theme: that of the page follows the reader's settings."""
+    specification: dict[str, Any] = figure.to_dict()
+    specification["layout"].pop("template", None)
+    return specification

@@ -82,6 +82,6 @@ def _check_directory(directory: Path, sha256: str | None) -> Path:
     if found != sha256:
         raise ConfigError(
             f"{directory}: the files of the robot are not those of robot.sha256",
-            hint="import the robot again: throwcollect robot import",
+            hint="import the robot again, or restore a dataset by throwcollect up CONFIG --resume DIR",
         )
     return directory

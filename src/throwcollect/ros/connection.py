@@ -1,14 +1,16 @@
-"""The way into the ROS graph of one run, as a value, so that a program may have several at once."""
+"""The way into the ROS graph of one run, as a value, so that a program may have several at once, and its errors."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
+from rclzenoh.exceptions import ConfigurationError, NoRouterError, UnreadableKeyError
 from rclzenoh.session_config import DOMAIN_VARIABLE, OVERRIDE_VARIABLE, PROTECTED, Key, client_override
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, UnreachableError
 from throwcollect.ros.middleware import Middleware
-from throwcollect.run_key import KEY_VARIABLE, RunKey
+from throwcollect.run_key import KEY_VARIABLE, RunKey, unreadable_key
 
 _EMBEDDED = Middleware()
 
@@ -54,3 +56,22 @@ class Connection:
 def session_key(endpoint: str, key: RunKey) -> Key | None:
     """The key of a run as a Zenoh session takes it; None if the router at the endpoint lets anybody in."""
     return Key(key.private_key, key.certificate) if endpoint.startswith(PROTECTED) else None
+
+
+@contextmanager
+def zenoh_errors() -> Iterator[None]:
+    """Raise errors about a session as errors of throwcollect."""
+    try:
+        yield
+    # This error is handled before `ConfigurationError`, because it is derived from that.
+    except UnreadableKeyError as error:
+        raise unreadable_key(error.path, error.reason) from error
+    except ConfigurationError as error:
+        raise ConfigError(error.message, expected=error.expected) from error
+    except NoRouterError as error:
+        raise UnreachableError(
+            error.message,
+            evidence=error.reason,
+            hint="start a router: python -m throwcollect.ros.router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "
+            f"or name another one in {OVERRIDE_VARIABLE}",
+        ) from error

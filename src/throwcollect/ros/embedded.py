@@ -7,9 +7,8 @@ from rclzenoh import api
 from rclzenoh.api import *  # noqa: F403
 from rclzenoh.context import Context
 from rclzenoh.session_config import client_config, is_protected
-from throwcollect.ros.connection import Connection, session_key
+from throwcollect.ros.connection import Connection, session_key, zenoh_errors
 from throwcollect.ros.middleware import EMBEDDED_RMW
-from throwcollect.ros.zenoh_errors import zenoh_errors
 
 
 def init(*, context: Context | None = None, connection: Connection | None = None) -> None:

@@ -51,10 +51,9 @@ from rclzenoh.session_config import (
     is_protected,
 )
 from throwcollect.errors import ThrowcollectError, WorkerError
-from throwcollect.ros.connection import Connection, session_key
+from throwcollect.ros.connection import Connection, session_key, zenoh_errors
 from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile, write_temporarily
 from throwcollect.ros.middleware import RMW_VARIABLE, Middleware
-from throwcollect.ros.zenoh_errors import zenoh_errors
 
 _looks = itertools.count()
 

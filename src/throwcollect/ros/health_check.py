@@ -1,19 +1,27 @@
-"""Asks a node for a sign of life, from wherever its router can be reached; containers look at a `heartbeat` instead."""
+"""Asks a node for a sign of life, from wherever its router can be reached; containers look at a `heartbeat` instead.
+
+A request goes to a service that every node offers. The loop that does the node's work answers it, so a node that is
+stuck does not answer, even if its process looks alive. The request is put together here without a client node, because
+that would have to load all interfaces, and would be announced to everybody in the ROS graph.
+"""
 
 from __future__ import annotations
 
 import os
 import socket
+import struct
+import time
 
 import zenoh
 
-from rclzenoh.health import node_answers
+from rclzenoh.endpoint import GID_LENGTH, Attachment
+from rclzenoh.keys import data_key
 from rclzenoh.session_config import OPEN, connect_endpoint, domain_of_environment, environment_config
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import is_beating
+from throwcollect.ros.connection import zenoh_errors
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
-from throwcollect.ros.zenoh_errors import zenoh_errors
 
 NODE_VARIABLE = "THROWCOLLECT_NODE"
 """Name of the environment variable that names the node of a container."""
@@ -21,6 +29,10 @@ NODE_VARIABLE = "THROWCOLLECT_NODE"
 TIMEOUT_S = 3.0
 """Time to open the session, and again to get the answer."""
 
+REQUEST = b"\0\1\0\0" + struct.pack("<I", 0)
+"""CDR of ``rcl_interfaces/srv/GetParameters_Request`` that asks for no parameter."""
+_ANY_HASH = "*"
+"""Stands for any type hash; computing the right one would need all interfaces to be loaded."""
 _ROUTER, _COORDINATOR = "router", "coordinator"
 
 
@@ -69,3 +81,24 @@ def _check_discovery_server(endpoint: str) -> None:
             connection.recv(1)
     except OSError as error:
         raise ThrowcollectError(f"{_ROUTER}: no session with the router at {endpoint}: {error}") from error
+
+
+def node_answers(session: zenoh.Session, node: str, *, domain_id: int, timeout_s: float) -> bool:
+    """Ask a node for a sign of life, and wait ``timeout_s`` for it.
+
+    The node is given by its full name without the first slash; ``**/`` in front of a name stands for any namespace.
+    """
+    replies = session.get(
+        data_key(domain_id, f"{node}/get_parameters", "rcl_interfaces/srv/GetParameters", _ANY_HASH),
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        timeout=timeout_s,
+        payload=REQUEST,
+        attachment=attachment(),
+    )
+    return any(reply.ok is not None for reply in replies)
+
+
+def attachment() -> bytes:
+    """Attachment that a client puts on its first request."""
+    return Attachment(1, time.time_ns(), os.urandom(GID_LENGTH)).pack()

@@ -28,11 +28,10 @@ from rclzenoh.session_config import OPEN, PROTECTED, in_words, router_config
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import die_with_parent, stop_signals
-from throwcollect.ros.connection import session_key
+from throwcollect.ros.connection import session_key, zenoh_errors
 from throwcollect.ros.fast_dds import server_profile, write_temporarily
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
-from throwcollect.ros.zenoh_errors import zenoh_errors
 from throwcollect.ros_installation import HOW_TO_INSTALL
 from throwcollect.run_key import RunKey
 
@@ -60,21 +59,11 @@ def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[
         session.close()  # type: ignore[no-untyped-call]
 
 
-@contextmanager
-def _discovery_server(listen: str) -> Iterator[str]:
-    """Run a discovery server of Fast DDS; yields the endpoint that nodes use. Port 0 takes a free one."""
-    address, _, port = listen.rpartition(":")
-    endpoint = f"{address}:{_find_free_port(address)}" if port == "0" else listen
-    with discovery_server(endpoint):
-        yield endpoint
-
-
 def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
-    address, _, port = listen.rpartition(":")
-    attempts_left = _PORT_ATTEMPTS if port == "0" else 1
+    attempts_left = _PORT_ATTEMPTS if listen.endswith(":0") else 1
     while True:
         attempts_left -= 1
-        endpoint = f"{address}:{_find_free_port(address)}" if port == "0" else listen
+        endpoint = _choose_port(listen)
         with zenoh_errors():
             config = router_config(endpoint, session_key(endpoint, key) if key is not None else None)
         if endpoint.startswith(PROTECTED) and key is None:
@@ -94,13 +83,17 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
                 ) from error
 
 
-def _find_free_port(address: str) -> int:
+def _choose_port(listen: str) -> str:
+    """Take a free port in the place of port 0 of an endpoint."""
+    address, _, port = listen.rpartition(":")
+    if port != "0":
+        return listen
     host = address.partition("/")[2].strip("[]")
     try:
         family = socket.getaddrinfo(host, None)[0][0]
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.bind((host, 0))
-            return int(probe.getsockname()[1])
+            return f"{address}:{probe.getsockname()[1]}"
     except OSError as error:
         raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
 
@@ -127,7 +120,7 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
         signal.signal(number, lambda received, _frame: stop.put(received))
     # Nodes of an open run on Fast DDS find each other by multicast; the router of Zenoh only shows that the run lives.
     by_server = Middleware.of_process().is_fast_dds and not listen.startswith(OPEN)
-    with _discovery_server(listen) if by_server else router(listen, key) as endpoint:
+    with discovery_server(listen) if by_server else router(listen, key) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
         heartbeat = Heartbeat()
         # If a signal comes just before a wait, Python runs its handler only after the wait, so waits are short.
@@ -153,11 +146,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def discovery_server(endpoint: str) -> Iterator[None]:
-    """Run a discovery server as a child process; the block begins when it listens, such as at ``udp/127.0.0.1:7447``.
+def discovery_server(listen: str) -> Iterator[str]:
+    """Run a discovery server of Fast DDS as a child process; yields the endpoint that nodes use.
 
-    Meanwhile, this process accepts TCP connections at the same port, by which others find out that the server runs.
+    Port 0 takes a free one. The block begins when the server listens. Meanwhile, this process accepts TCP connections
+    at the same port, by which others find out that the server runs.
     """
+    endpoint = _choose_port(listen)
     command = [_find_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
     with (
         _accept_connections(endpoint),
@@ -173,7 +168,7 @@ def discovery_server(endpoint: str) -> Iterator[None]:
     ):
         try:
             _wait_until_it_runs(process, output, endpoint)
-            yield
+            yield endpoint
         finally:
             process.send_signal(signal.SIGINT)
             try:

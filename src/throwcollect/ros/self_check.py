@@ -59,7 +59,12 @@ def check_answers(node: ros.Node, executor: ros.Executor) -> None:
         while not any(answer.done() for answer in answers):
             now = time.monotonic()
             if now > deadline:
-                raise _silent(node)
+                middleware = Middleware.of_process()
+                backend = "the embedded backend" if middleware.backend == "embedded" else f"rclpy with {middleware.rmw}"
+                raise WorkerError(
+                    f"{node.get_fully_qualified_name()} does not answer itself within {_ANSWER_S:g} s, over {backend}",
+                    hint="throwcollect doctor shows what is installed; --set run.ros=embedded needs none of it",
+                )
             # A request that is sent before client and service have found each other is lost, so it is repeated.
             if now >= asked_at + _AGAIN_S:
                 asked_at = now
@@ -67,12 +72,3 @@ def check_answers(node: ros.Node, executor: ros.Executor) -> None:
             ros.spin_some(executor, timeout_sec=_LOOK_S)
     finally:
         node.destroy_client(client)
-
-
-def _silent(node: ros.Node) -> WorkerError:
-    middleware = Middleware.of_process()
-    backend = "the embedded backend" if middleware.backend == "embedded" else f"rclpy with {middleware.rmw}"
-    return WorkerError(
-        f"{node.get_fully_qualified_name()} does not answer itself within {_ANSWER_S:g} s, over {backend}",
-        hint="throwcollect doctor shows what is installed; --set run.ros=embedded needs none of it",
-    )

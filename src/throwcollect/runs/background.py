@@ -39,10 +39,9 @@ from throwcollect.runs.preparation import MANY_TRIALS, RunRequest, prepare_run, 
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.run_record import Kind, Origin, Planning, RunFailure, RunRecord
-from throwcollect.runs.runtime_choice import choose
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
-from throwcollect.runtimes.registry import get_runtime
+from throwcollect.runtimes.registry import choose, get_runtime
 from throwcollect.side_by_side import count_cores
 
 _WRITE_PLANNING_S = 1.0

@@ -6,11 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.loader import dump_yaml, load_locating_errors
+from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import SweepConfig
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.resume import is_complete
+from throwcollect.dataset.carried_robot import carry_robot, config_text
+from throwcollect.dataset.directory import ROBOT
 from throwcollect.dataset.manifest import is_begun
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, Problem
@@ -110,7 +112,9 @@ def _write(each: Round, config: Config, before: Sequence[Path], *, count: int, n
         target = config.sweep.target
         sweep = SweepConfig(sampler="list", file=each.list.name, target=target, feasibility=config.sweep.feasibility)
         changes |= {"sweep": sweep, "trials": None}
-    write_file(each.config, dump_yaml(config.model_copy(update=changes)).encode())
+    if not (each.config.parent / ROBOT).exists():
+        carry_robot(config, each.config.parent)
+    write_file(each.config, config_text(config.model_copy(update=changes)).encode())
 
 
 def _collect(each: Round, processes: int, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:

@@ -23,9 +23,9 @@ from throwcollect.extras import (
     install_command,
     is_installed,
 )
-from throwcollect.members import explain_failure, load_member, names_of
+from throwcollect.members import explain_failure, names_of
+from throwcollect.robots.described import find_robot
 from throwcollect.robots.joint_model import joint_model
-from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, uses_rclpy
 from throwcollect.runtimes.registry import get_runtime
@@ -85,7 +85,7 @@ def _check_robot(name: str) -> Check:
     check = "robot" if is_own else f"robot {name}"
     try:
         with explain_failure("robots", name, "describe itself"):
-            robot: Robot = load_member("robots", name)
+            robot = find_robot(name)
             joint_model(robot)
             package = f" of example-robot-data {version('example-robot-data')}" if is_own else ""
             return Check(check, "ok", f"{robot.title}{package}, {robot.urdf_path}")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from throwcollect.files import open_log
 from throwcollect.runtimes.runtime import NodeState, RunEvent
@@ -63,16 +63,9 @@ class EventLog:
         self._path = logs / EVENTS
         self._run = run
 
-    def run_event(
-        self,
-        event: RunEvent,
-        *,
-        reason: str | None = None,
-        simulations: int | None = None,
-        exit_code: int | None = None,
-    ) -> None:
-        """Append an event of the run."""
-        self._append([Event(_now(), self._run, event, reason=reason, simulations=simulations, exit_code=exit_code)])
+    def run_event(self, event: RunEvent, **details: Any) -> None:
+        """Append an event of the run, with fields of `Event` as details."""
+        self._append([Event(_now(), self._run, event, **details)])
 
     def node_events(self, before: Sequence[NodeState], after: Sequence[NodeState]) -> None:
         """Append an event for each difference between two lists of states of the nodes."""

@@ -14,6 +14,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.carried_robot import unpack_robot
 from throwcollect.errors import UnreachableError, WorkerError
 from throwcollect.files import write_file
 from throwcollect.ros.connection import Connection
@@ -54,7 +55,9 @@ def join_run(
         key = RunKey(scratch / "key")
         key.create(bytes.fromhex(token.secret))
         connection = Connection(token.endpoint, key, token.domain_id)
-        write_file(scratch / "config.yaml", _read_configuration(connection, token).encode())
+        text, files = _read_configuration(connection, token)
+        write_file(scratch / "config.yaml", text.encode())
+        unpack_robot(files, scratch)
         config = load(scratch / "config.yaml")
         onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
         place = Place(token.run, scratch, None, scratch / "logs", simulations, Middleware(), key)
@@ -107,8 +110,8 @@ class _Reports:
         return time.monotonic() > self._last_at + (_OVER_S if self.finished else _SILENT_S)
 
 
-def _read_configuration(connection: Connection, token: JoinToken) -> str:
-    """Ask the launcher of the run for the configuration."""
+def _read_configuration(connection: Connection, token: JoinToken) -> tuple[str, str]:
+    """Ask the launcher of the run for the configuration, and for the files of its robot."""
     if not answers(connection.endpoint, patience_s=_ANSWER_S):
         raise WorkerError(
             f"run {token.run}: no router answers at {connection.endpoint}",
@@ -116,7 +119,7 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
         )
     connection.middleware.joining.settle()
     from throwcollect.ros.srv import GetParameters
-    from throwcollect.runtimes.node_collection import CONFIGURATION
+    from throwcollect.runtimes.node_collection import CONFIGURATION, ROBOT_FILES
     from throwcollect.runtimes.run_listener import take_part
 
     with ExitStack() as leave:
@@ -132,9 +135,9 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
         if not client.wait_for_service(_ANSWER_S):
             raise WorkerError(f"run {token.run}: its launcher cannot be found at {connection.endpoint}")
         # A request that is sent before the service is found is lost.
-        future = client.call_async(GetParameters.Request(names=[CONFIGURATION]))
+        future = client.call_async(GetParameters.Request(names=[CONFIGURATION, ROBOT_FILES]))
         executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
         if not future.done():
             raise WorkerError(f"run {token.run}: its launcher does not answer at {connection.endpoint}")
-        text: str = future.result().values[0].string_value
-        return text
+        text, files = (value.string_value for value in future.result().values)
+        return text, files

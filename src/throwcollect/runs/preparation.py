@@ -18,12 +18,12 @@ from throwcollect.dataset.configuration import read_config, reading_config
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import busy_error, find_left_in
-from throwcollect.runs.runtime_choice import RuntimeChoice, choose
-from throwcollect.runtimes.ports import reserve_port
+from throwcollect.runtimes.registry import RuntimeChoice, choose
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def resume(
     with reading_config(directory, file, overrides) as read:
         sweep_directory = directory if file is None else file.parent
         if not simulate:
-            from throwcollect.coordinator.salvage import finish_without_simulating
+            from throwcollect.coordinator.resume import finish_without_simulating
 
             finish_without_simulating(read, directory, sweep_directory=sweep_directory, onlooker=onlooker)
             return None

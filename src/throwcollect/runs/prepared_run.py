@@ -13,11 +13,10 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError
 from throwcollect.interruption import count_interruptions
-from throwcollect.ros.router_endpoint import split_address
+from throwcollect.ros.router_endpoint import format_endpoint, reach_from_elsewhere, split_address
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.run_record import RunRecord, Summary
 from throwcollect.runs.token import JoinToken
-from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere
 from throwcollect.runtimes.runtime import Place
 
 

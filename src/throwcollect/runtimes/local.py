@@ -17,6 +17,7 @@ from throwcollect.files import open_log
 from throwcollect.interruption import die_with_parent
 from throwcollect.own_process import make_command
 from throwcollect.ros.connection import Connection
+from throwcollect.ros.router_endpoint import format_endpoint, reach_from_here, reserve_port
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import (
     ROUTER,
@@ -27,7 +28,6 @@ from throwcollect.runtimes.nodes import (
     node_environment,
     protocol_of,
 )
-from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port
 from throwcollect.runtimes.runtime import Place, Runtime, Session
 
 if TYPE_CHECKING:

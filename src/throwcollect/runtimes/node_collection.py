@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable
 
 from throwcollect import ros
-from throwcollect.config.loader import dump_yaml
 from throwcollect.coordinator.progress import Progress
+from throwcollect.dataset.carried_robot import config_text, pack_robot
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, LossError, WorkerError
 from throwcollect.ros import IntegerRange
@@ -37,6 +37,8 @@ SIMULATIONS = "simulations"
 """Name of the launcher's parameter."""
 CONFIGURATION = "configuration"
 """Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
+ROBOT_FILES = "robot_files"
+"""Name of the launcher's parameter that holds the files of a robot that is not installed, see `pack_robot`."""
 MOST_SIMULATIONS = 256
 
 _POLL_S = 0.05
@@ -178,8 +180,10 @@ class NodeCollection:
 
     def _offer(self, node: ros.Node) -> None:
         """Declare the launcher's parameters: the number of simulations, and the configuration for other machines."""
-        node.declare_parameter(CONFIGURATION, dump_yaml(self._host.config), ros.ParameterDescriptor(read_only=True))
-        most = 1 if self._host.config.run.root_namespace else MOST_SIMULATIONS
+        config = self._host.config
+        for name, text in ((CONFIGURATION, config_text(config)), (ROBOT_FILES, pack_robot(config))):
+            node.declare_parameter(name, text, ros.ParameterDescriptor(read_only=True))
+        most = 1 if config.run.root_namespace else MOST_SIMULATIONS
         offer_scaling(node, self._simulations, self._request_simulations, most=most)
 
     def _request_simulations(self, simulations: int) -> None:

@@ -206,9 +206,4 @@ def protocol_of(run: RunConfig, middleware: Middleware) -> str:
 
 def node_environment(connection: Connection) -> Mapping[str, str]:
     """Environment variables of a node that joins a run over this connection."""
-    return {**connection.environment(), **library_environment(connection.middleware)}
-
-
-def library_environment(middleware: Middleware) -> Mapping[str, str]:
-    """Environment variables that have to be set before a node imports its libraries."""
-    return {**middleware.environment(), **SERIAL_LIBRARIES}
+    return {**connection.environment(), **SERIAL_LIBRARIES}

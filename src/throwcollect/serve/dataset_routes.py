@@ -131,7 +131,7 @@ def _find_file(directory: Path, path: str) -> Path:
 
 def _report(directory: Path, name: str) -> FileResponse:
     """Write the report on a dataset into a file that vanishes when it was sent."""
-    from throwcollect.report.page import write_report
+    from throwcollect.report.sections import write_report
 
     scratch = tempfile.TemporaryDirectory(prefix="throwcollect-report-")
     page = Path(scratch.name) / f"{name}.html"

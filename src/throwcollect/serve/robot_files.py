@@ -11,17 +11,21 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from throwcollect.config.loader import load
-from throwcollect.dataset.directory import config_path
+from throwcollect.dataset.directory import ROBOT, config_path
 from throwcollect.errors import ConfigError, MemberError, NotFoundError
 from throwcollect.members import is_own, load_member, usable_names
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.robots.description import full_description
+from throwcollect.robots.imported import list_files
 from throwcollect.robots.robot import Robot
 from throwcollect.runs.component_container import DESCRIPTION
-from throwcollect.runs.records import Run
+from throwcollect.runs.records import Records, Run
 
 _MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
 """URL of a mesh in a description: its package, and its path in that package."""
+_KINDS = ".stl", ".dae", ".obj"
+_carried: dict[str, Path] = {}
+"""Files of robots that datasets of runs carry, by name."""
 
 
 def description_of(run: Run) -> str:
@@ -86,7 +90,29 @@ def find_mesh(package: str, path: str) -> Path:
             file = (root / path).resolve(strict=True)
             if file.is_relative_to(root.resolve()) and file.is_file():
                 return file
+    if root is None and (found := _find_carried(path)) is not None:
+        return found
     raise NotFoundError(f"no mesh package://{package}/{path}")
+
+
+def _find_carried(*names: str) -> Path | None:
+    """Find a mesh that a dataset of a run carries; it does not matter which one, as names are made of contents."""
+    for is_known in (True, False):
+        if not is_known:
+            _look_for_carried()
+        if found := [file for name in names if (file := _carried.get(name)) is not None and file.is_file()]:
+            return found[0]
+    return None
+
+
+def _look_for_carried() -> None:
+    for run in Records().all():
+        with suppress(OSError):
+            directory = (run.place.directory / ROBOT).resolve(strict=True)
+            for file in list_files(directory):
+                # A link may lead out of the directory.
+                if file.resolve().parent == directory:
+                    _carried[file.name] = file
 
 
 @dataclass(frozen=True)
@@ -119,6 +145,9 @@ def find_mesh_by_content(sha256: str) -> Path:
         for _, _, file in _find_files(text):
             if _digest(file, file.stat().st_mtime_ns) == sha256:
                 return file
+    carried = _find_carried(*(f"{sha256[:16]}{kind}" for kind in _KINDS))
+    if carried is not None and _digest(carried, carried.stat().st_mtime_ns) == sha256:
+        return carried
     raise NotFoundError(f"no mesh with the SHA-256 {sha256}")
 
 
@@ -136,7 +165,7 @@ def _digest(file: Path, _changed_ns: int) -> str:
 
 @lru_cache(maxsize=1)
 def _find_packages() -> Mapping[str, Path]:
-    """Directories of the packages that the descriptions of all robots name, by their names."""
+    """Directories of the packages that the descriptions of installed robots name, by their names."""
     return {
         package: robot.directory / package for text, robot in _read_descriptions() for package, _ in _MESH.findall(text)
     }
@@ -144,10 +173,12 @@ def _find_packages() -> Mapping[str, Path]:
 
 @lru_cache(maxsize=1)
 def _read_descriptions() -> Sequence[tuple[str, Robot]]:
-    """Read the descriptions of all robots that can be loaded; robots of other packages may lack theirs."""
+    """Read the installed descriptions that need no import; robots of other packages may lack theirs."""
     descriptions = []
     for name in usable_names("robots"):
-        robot: Robot = load_member("robots", name)
+        robot = load_member("robots", name)
+        if not isinstance(robot, Robot):
+            continue
         try:
             descriptions.append((read_urdf_text(robot.urdf_path), robot))
         except (ConfigError, MemberError):

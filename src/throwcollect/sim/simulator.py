@@ -15,20 +15,19 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.control import GoalResult, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples, find_infinite_columns
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sim.limb_controller import LimbController
-from throwcollect.sim.present_trial import PresentTrial, TrialSetup
+from throwcollect.sim.present_trial import PresentTrial, TrialSetup, trial_goals
 from throwcollect.sim.world import World
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.task import task_of, trajectory_of
-from throwcollect.trial.conditions import Conditions, Settings, build_of
-from throwcollect.trial.goals import trial_goals
+from throwcollect.trial.conditions import Settings
 from throwcollect.units import NS_PER_S
 
 STRETCH_S = 0.5
@@ -178,12 +177,7 @@ class Simulator:
         if motion is not None:
             # A trial that a client sets up later starts from the configuration, and not from the values of this trial.
             self.trial.set_up_nothing()
-        conditions = Conditions(
-            build=build_of(config),
-            settings=self._settings.digest,
-            values=self._settings.find_replaced(config),
-            trajectory=motion.digest if motion else "",
-        )
+        conditions = self._settings.conditions_of(config, motion.digest if motion else "")
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
         result = self._judge(config, motion, table.samples, header) if motion else ""

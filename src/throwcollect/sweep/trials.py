@@ -151,3 +151,11 @@ class Trials(Sequence[Trial]):
         digest = self.digests[row].tobytes().hex()
         target = {} if self.targets is None else self.targets.row(row)
         return Trial(number, values, int(self.seeds[row]), digest, self._refused.get(number), target)
+
+
+def choose_trials(trials: Sequence[int], *, count: int, seed: int) -> list[int]:
+    """Choose at most `count` of the trials, by the root seed of the collection, and keep their order."""
+    if count >= len(trials):
+        return list(trials)
+    picked = np.random.default_rng(seed).choice(len(trials), size=count, replace=False)
+    return [trials[index] for index in sorted(picked.tolist())]

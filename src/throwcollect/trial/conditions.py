@@ -20,6 +20,8 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves, sweepable_keys
 from throwcollect.errors import DatasetError
 
+_MOST_TOLD = 3
+"""Largest number of differences that the reason for refusing one episode names."""
 _EFFECTS_IN_DIGEST = (Effect.PHYSICS, Effect.ENCODING)
 
 
@@ -55,6 +57,12 @@ class Conditions:
                 yield f"{key} was {_describe(used)}, not {_describe(planned)}"
         if self.trajectory != expected.trajectory:
             yield "its controllers were given another trajectory"
+
+    def explain(self, expected: Conditions) -> str | None:
+        """Say why an episode under these conditions is not the one that was asked for; None if it is."""
+        differences = list(self.differences(expected))
+        more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""
+        return "; ".join(differences[:_MOST_TOLD]) + more or None
 
 
 def build_of(config: Config) -> str:
@@ -93,6 +101,10 @@ class Settings:
         heeded["task.end"] = sorted(config.task.end)
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+    def conditions_of(self, trial: Config, trajectory: str) -> Conditions:
+        """Make the conditions of an episode: of its trial's configuration, and of the digest of its trajectory."""
+        return Conditions(build_of(trial), self.digest, self.find_replaced(trial), trajectory)
 
     def find_replaced(self, trial: Config) -> dict[str, float]:
         """Find the values of a trial's configuration that replace values of the collection's, by dotted key."""

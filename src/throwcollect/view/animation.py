@@ -20,7 +20,6 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.urdf import PACKAGE
 from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
 from throwcollect.view.viewer_directory import choose_throws
 
@@ -93,12 +92,11 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
     (_, samples), landing = throw.read_samples(), throw.events.landing
     robot, joints = draw_robot_of(config), robot_of(config).joints
-    urdf = robot.urdf.replace(PACKAGE, f"{robot.share}/")
     times_s = samples.seconds_since(samples.stamps_ns[0])
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
     released_s = throw.row.get("release_time_s")
     released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
-    with Renderer(urdf, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA) as renderer:
+    with Renderer(robot.urdf_with_files, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA) as renderer:
         points = [samples.ball_position]
         for number in shown:
             _place(renderer, joints, samples, number)

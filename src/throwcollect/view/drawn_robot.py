@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,7 +36,7 @@ class DrawnShape:
         rotation_xyzw: Unit quaternion, shape to frame.
         size: Edge lengths of a box, or of the box around a sphere or a cylinder along z [m]; scale of a mesh.
         kind: ``box``, ``cylinder``, ``sphere`` or ``mesh``.
-        mesh: Path of the mesh's file, relative to the directory that holds its package; empty if it is none.
+        mesh: Path or URL of the mesh's file in the description; empty if it is none.
         rgba: Its colour.
     """
 
@@ -53,29 +54,38 @@ class DrawnRobot:
     """The robot as viewers draw it.
 
     Attributes:
-        urdf: URDF text without collision shapes; meshes are ``package://`` URLs.
+        urdf: URDF text without collision shapes.
         shapes: The shapes in it.
-        share: Directory that the paths of meshes are relative to.
+        locate: Finds the file of a mesh by its path or URL (see `Robot.locate`).
     """
 
     urdf: str
     shapes: tuple[DrawnShape, ...]
-    share: Path
+    locate: Callable[[str], Path]
 
     @property
-    def meshes(self) -> list[str]:
-        """Paths of the mesh files, each once."""
-        return sorted({shape.mesh for shape in self.shapes if shape.mesh})
+    def meshes(self) -> dict[str, Path]:
+        """The mesh files, by their paths or URLs."""
+        return {mesh: self.locate(mesh) for mesh in sorted({shape.mesh for shape in self.shapes if shape.mesh})}
+
+    @property
+    def urdf_with_files(self) -> str:
+        """The same URDF text with paths of files in place of URLs."""
+        robot = ElementTree.fromstring(self.urdf)  # noqa: S314 - it was written here
+        for mesh in robot.iter("mesh"):
+            mesh.set("filename", str(self.locate(mesh.attrib["filename"])))
+        return ElementTree.tostring(robot, encoding="unicode")
 
     def copy_package(self, directory: Path) -> None:
-        """Put the meshes into a directory, with a ``package.xml`` by which viewers find them."""
-        for mesh in self.meshes:
+        """Put the meshes of packages into a directory, with a ``package.xml`` by which viewers find them."""
+        meshes = {url.removeprefix(PACKAGE): file for url, file in self.meshes.items() if url.startswith(PACKAGE)}
+        for mesh, file in meshes.items():
             target = directory / mesh
             target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(self.share / mesh, target)
-        for package in sorted({mesh.split("/", 1)[0] for mesh in self.meshes}):
+            shutil.copyfile(file, target)
+        for package in sorted({mesh.split("/", 1)[0] for mesh in meshes}):
             path = Path(package, "package.xml")
-            source = self.share / path
+            source = self.locate(f"{PACKAGE}{path}")
             text = source.read_text(encoding="utf-8") if source.exists() else "<package><name></name></package>\n"
             # URLs of meshes contain the name of the directory, but Foxglove looks for the name in `package.xml`.
             renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
@@ -84,10 +94,10 @@ class DrawnRobot:
 
 def draw_robot_of(config: Config) -> DrawnRobot:
     """Read the robot with its tool as viewers draw it."""
-    return read_drawn_robot(full_description(config), tool_of(config).link, robot_of(config).directory)
+    return read_drawn_robot(full_description(config), tool_of(config).link, robot_of(config).locate)
 
 
-def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
+def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path]) -> DrawnRobot:
     """Read a URDF text as viewers draw it; the link of the tool has a colour of its own."""
     try:
         robot = parse_xml(description, "robot description")
@@ -106,7 +116,7 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
         )
     except (ConfigError, KeyError, ValueError) as error:
         raise DatasetError(f"robot description: cannot be drawn: {error}") from error
-    return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes, share)
+    return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes, locate)
 
 
 def ball_urdf(ball: BallConfig) -> str:
@@ -138,7 +148,7 @@ def _read_shape(link: ElementTree.Element, visual: ElementTree.Element, colors: 
     shape, material = read_visual(link, visual), visual.find("material")
     mesh, size = "", shape.size
     if shape.kind == "mesh":
-        mesh = visual.find("geometry/mesh").attrib["filename"].removeprefix(PACKAGE)  # type: ignore[union-attr]
+        mesh = visual.find("geometry/mesh").attrib["filename"]  # type: ignore[union-attr]
     elif shape.kind == "capsule":
         raise ValueError(f"link {link.get('name')} has a capsule")
     elif shape.kind != "box":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,7 @@ class ShownThrow:
     path: NDArray[np.float64]
 
 
-def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns: int) -> Any:
+def shape_markers(name: str, shapes: Sequence[DrawnShape], locate: Callable[[str], Path], stamp_ns: int) -> Any:
     """A visualization_msgs/MarkerArray with shapes of the robot in the frames of their links.
 
     Meshes are ``data:`` URLs, so that viewers need no files.
@@ -57,12 +57,12 @@ def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns
     Args:
         name: Namespace of the markers.
         shapes: The shapes.
-        share: Directory that the paths of meshes are relative to.
+        locate: Finds the file of a mesh.
         stamp_ns: Stamp of the markers [ns].
     """
     array, marker = (get_message(f"visualization_msgs/msg/{kind}") for kind in ("MarkerArray", "Marker"))
     kinds = {"mesh": marker.MESH_RESOURCE, "box": marker.CUBE, "cylinder": marker.CYLINDER, "sphere": marker.SPHERE}
-    meshes = {mesh: _make_data_url(share / mesh) for mesh in {shape.mesh for shape in shapes if shape.mesh}}
+    meshes = {mesh: _make_data_url(locate(mesh)) for mesh in {shape.mesh for shape in shapes if shape.mesh}}
     markers = []
     for number, shape in enumerate(shapes):
         drawn = _make_marker(name, kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)

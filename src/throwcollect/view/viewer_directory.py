@@ -77,7 +77,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
         (beside / LAYOUT).write_bytes(layout(tuple(config.task.end)))
         robot.copy_package(beside)
-        mesh_bytes = sum((beside / mesh).stat().st_size for mesh in robot.meshes)
+        mesh_bytes = sum(file.stat().st_size for file in robot.meshes.values())
         recording_bytes = path.stat().st_size
     return View(
         recording=output / RECORDING,

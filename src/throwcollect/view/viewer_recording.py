@@ -129,7 +129,7 @@ class ViewRecording:
             # The robot's meshes are large, and the same in all trials, so they are written only once.
             parts["robot"] = [shape for shape in robot.shapes if shape.link != tool]
         for name, shapes in parts.items():
-            self._put(f"/view/{name}", start, shape_markers(name, shapes, robot.share, start))
+            self._put(f"/view/{name}", start, shape_markers(name, shapes, robot.locate, start))
         self._looks = looks
 
     def _put(self, topic: str, stamp_ns: int, message: Message) -> None:

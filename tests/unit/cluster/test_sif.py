@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.cluster.sif import check_sif
+from throwcollect.cluster.submit import check_sif
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL, digest_sources
 from throwcollect.version import __version__

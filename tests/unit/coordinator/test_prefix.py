@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from throwcollect.coordinator.prefix import Prefix
+from throwcollect.coordinator.leases import Prefix
 
 
 def find_end(outcomes: list[bool], wanted: int) -> int:

@@ -17,7 +17,7 @@ from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.side_by_side import Workers
 from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.plan import Plan
-from throwcollect.trial.choice import choose_trials
+from throwcollect.sweep.trials import choose_trials
 
 PLAN: Plan = make_plan(
     Config.model_validate(

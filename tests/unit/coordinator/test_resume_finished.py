@@ -13,8 +13,7 @@ from tests.unit.coordinator.listener import Listener
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.damage import find_stored, flip, replace_text
 
-from throwcollect.coordinator.resume import has_all_trials, resume
-from throwcollect.coordinator.salvage import finish_without_simulating
+from throwcollect.coordinator.resume import finish_without_simulating, has_all_trials, resume
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.verify import verify
@@ -201,7 +200,7 @@ def test_finishing_without_simulating_takes_results_from_the_table(
     trials: Trials, dataset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (dataset / SHARD).unlink()
-    monkeypatch.setattr("throwcollect.coordinator.salvage.judge_episode", lambda *_: pytest.fail("is judged again"))
+    monkeypatch.setattr("throwcollect.coordinator.resume.judge_episode", lambda *_: pytest.fail("is judged again"))
     assert trials.finish(dataset).keys() == {2, 3}
 
 

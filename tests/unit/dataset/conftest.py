@@ -17,8 +17,8 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.quintic_curve import sample_quintic

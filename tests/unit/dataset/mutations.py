@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 from hypothesis import strategies as st
 
 from throwcollect.config.loader import load
-from throwcollect.coordinator.salvage import finish_without_simulating
+from throwcollect.coordinator.resume import finish_without_simulating
 from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text, read_named_manifest
+from throwcollect.dataset.mcap_reader import scan_file
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.scan import scan_file
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import ThrowcollectError
 

@@ -9,7 +9,7 @@ import pytest
 from tests.unit.dataset.damage import SHARD, find_stored, flip
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.selection import merge
+from throwcollect.derive.derivation import merge
 from throwcollect.derive.statistics import statistics
 from throwcollect.errors import DatasetError
 from throwcollect.export.export import export

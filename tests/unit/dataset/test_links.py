@@ -16,7 +16,7 @@ from tests.unit.dataset.mutations import SETTINGS, finish
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.selection import filter_trials
+from throwcollect.derive.derivation import filter_trials
 from throwcollect.errors import ThrowcollectError
 
 BEGUN = "quick_00001.mcap.part"

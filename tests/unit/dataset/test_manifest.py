@@ -25,7 +25,7 @@ from throwcollect.dataset.manifest import (
 )
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.verify import find_damage, verify
-from throwcollect.derive.selection import filter_trials
+from throwcollect.derive.derivation import filter_trials
 from throwcollect.errors import DatasetError
 
 MANIFEST = "datapackage.json"

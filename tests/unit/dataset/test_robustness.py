@@ -23,9 +23,8 @@ from tests.unit.dataset.mutations import SETTINGS, Mutation, any_mutation, mutat
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.bag import from_yaml
-from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.mcap_reader import open_mcap, scan_file
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.scan import scan_file
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import verify
 from throwcollect.episode.chunk import Chunk

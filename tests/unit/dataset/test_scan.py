@@ -12,8 +12,7 @@ import pytest
 import zstandard
 
 from throwcollect.dataset.mcap_file import MAGIC
-from throwcollect.dataset.mcap_reader import StoredEpisode, open_mcap
-from throwcollect.dataset.scan import scan_file
+from throwcollect.dataset.mcap_reader import StoredEpisode, open_mcap, scan_file
 from throwcollect.episode.chunk import Chunk
 from throwcollect.errors import DatasetError
 

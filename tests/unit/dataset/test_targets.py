@@ -25,7 +25,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.selection import filter_trials, merge
+from throwcollect.derive.derivation import filter_trials, merge
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError
 from throwcollect.export.throw_source import ExportSource

@@ -1,3 +1,5 @@
+"""Filtering, sampling and merging datasets."""
+
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +17,7 @@ from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.inspect import digest
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.derive.selection import filter_trials, merge, sample
+from throwcollect.derive.derivation import filter_trials, merge, sample
 from throwcollect.derive.statistics import statistics
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError

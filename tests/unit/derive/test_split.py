@@ -9,7 +9,7 @@ from tests.unit.dataset.conftest import Collection, create_and_open
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.derive.selection import merge
+from throwcollect.derive.derivation import merge
 from throwcollect.derive.split import SQUARES, _find_cells, assign, split
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError

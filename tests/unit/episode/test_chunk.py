@@ -16,9 +16,8 @@ from mcap.records import Message, MessageIndex
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
-from throwcollect.episode.message_table import MessageTable
+from throwcollect.episode.message_table import ChunkEncoder, MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.topics import Recording
 from throwcollect.errors import DatasetError

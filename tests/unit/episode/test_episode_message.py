@@ -15,7 +15,6 @@ from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import (
     Episode,
     TrialRefusal,
@@ -24,6 +23,7 @@ from throwcollect.episode.episode_message import (
     pack,
     unpack,
 )
+from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description

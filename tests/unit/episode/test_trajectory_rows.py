@@ -7,7 +7,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk_encoder import ChunkEncoder
+from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.trajectory_rows import STAMPS, column_shapes, to_nanoseconds, trajectory_rows, view_as_bytes
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description

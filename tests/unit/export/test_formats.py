@@ -22,7 +22,7 @@ from throwcollect.coordinator.prepare import prepare as prepare_plan
 from throwcollect.coordinator.resume import prepare_or_resume
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.selection import sample
+from throwcollect.derive.derivation import sample
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.export.export import export
 from throwcollect.export.throw_source import unit_of

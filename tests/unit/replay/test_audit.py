@@ -7,8 +7,8 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
 from throwcollect.replay.audit import compare

@@ -10,7 +10,7 @@ import pytest
 from throwcollect import progress_log
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
-from throwcollect.replay.other_engine import Deviation, Distribution, distributions, simulate_with
+from throwcollect.replay.audit import Deviation, Distribution, distributions, simulate_with
 from throwcollect.simulator import Simulator
 
 

@@ -10,7 +10,7 @@ from throwcollect import ConfigError, DatasetError, fit
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model import load_model
 from throwcollect.learning.score import Adapted, Errors, MissStatistics, Score, ThrowAtTarget, Trained
-from throwcollect.report.model_section import show_model
+from throwcollect.report.targets import show_model
 
 
 @pytest.fixture(scope="module")

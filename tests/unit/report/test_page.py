@@ -23,8 +23,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError
 from throwcollect.report.contents import Panel, ReportSection, Table
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.page import render_page, write_report
-from throwcollect.report.sections import Report, report_dataset
+from throwcollect.report.sections import Report, render_page, report_dataset, write_report
 
 SECTIONS = [
     "landing",

@@ -20,9 +20,8 @@ from throwcollect.members import load_member
 from throwcollect.robots.derived import Postures
 from throwcollect.robots.described import find_robot
 from throwcollect.robots.description import full_description
-from throwcollect.robots.description_files import find_urdf
 from throwcollect.robots.imported import hash_files
-from throwcollect.robots.importing import import_robot
+from throwcollect.robots.importing import find_urdf, import_robot
 from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot

@@ -10,9 +10,12 @@ from contextlib import suppress
 import pytest
 
 import throwcollect.ros.health_check as health
+from rclzenoh.endpoint import unpack
+from rclzenoh.interfaces import serialize
+from rclzenoh.interfaces.srv import GetParameters
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.errors import ThrowcollectError
-from throwcollect.ros.health_check import check
+from throwcollect.ros.health_check import REQUEST, attachment, check, node_answers
 
 
 @pytest.fixture
@@ -87,3 +90,16 @@ def test_a_health_check_of_a_stuck_router_fails(environment, monkeypatch, impati
                 check("router")
         finally:
             router.kill()
+
+
+def test_the_health_request_equals_that_of_a_client_node():
+    assert serialize(GetParameters.Request()) == REQUEST
+    received = unpack(attachment())
+    assert received.sequence == 1
+    assert attachment() != attachment()
+
+
+def test_a_node_that_nobody_spins_does_not_answer(rig):
+    node = rig.node("stuck")
+    session, domain = node.context.session, node.context.get_domain_id()
+    assert not node_answers(session, "stuck", domain_id=domain, timeout_s=0.2)

@@ -14,11 +14,11 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import split_address
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes import local
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.runtime import Place
 
 LAUNCHER = """

@@ -8,8 +8,13 @@ import pytest
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import ConfigError
-from throwcollect.ros.router_endpoint import split_address
-from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere, reach_from_here, reserve_port
+from throwcollect.ros.router_endpoint import (
+    format_endpoint,
+    reach_from_elsewhere,
+    reach_from_here,
+    reserve_port,
+    split_address,
+)
 
 
 @pytest.mark.parametrize(

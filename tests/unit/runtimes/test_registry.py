@@ -18,8 +18,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
 from throwcollect.members import names_of
 from throwcollect.ros.middleware import Middleware
-from throwcollect.runs.runtime_choice import choose
-from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
+from throwcollect.runtimes.registry import AUTOMATIC, choose, get_runtime
 from throwcollect.runtimes.runtime import Host, Place, Runtime
 
 

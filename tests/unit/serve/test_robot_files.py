@@ -40,6 +40,6 @@ def _broken_robots(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.mark.usefixtures("_broken_robots")
 def test_meshes_of_a_robot_are_found_although_others_are_broken() -> None:
     assert set(members.find_broken("robots")) == {"broken"}
-    assert members.usable_names("robots") == ("talos", "without_files")
+    assert members.usable_names("robots") == (*members._OWN["robots"], "without_files")
     package, path = re.findall(r"package://([^/\"]+)/([^\"]+)", TALOS.urdf_path.read_text())[0]
     assert robot_files.find_mesh(package, path) == (TALOS.directory / package / path).resolve()

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shutil
 from pathlib import Path
 
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served
 
+from throwcollect.config.loader import load
+from throwcollect.dataset.carried_robot import write_config
 from throwcollect.robots.talos import TALOS
 
 URL = "/api/v1/instances"
@@ -68,3 +71,42 @@ def test_meshes_come_only_from_packages_of_robots(served: Served) -> None:
         "%2fetc/passwd",
     ):
         assert client.get(f"{base}/{path}").status_code == 404, path
+
+
+def test_a_robot_is_drawn_from_the_dataset_that_carries_it(
+    client: TestClient, remember: Remember, state: Path, tmp_path: Path
+) -> None:
+    directory = tmp_path / "datasets" / "a"
+    directory.mkdir(parents=True)
+    (tmp_path / "panda.yaml").write_text(
+        "trials: 3\nrobot: {name: panda}\ntask: {start: {panda_joint4: -2.0}, end: {panda_joint4: -1.0}}\n"
+    )
+    write_config(directory, load(tmp_path / "panda.yaml"))
+    shutil.rmtree(state / "robots")
+    remember("a", lives=False)
+    urls = set(re.findall(r'package://[^"]+', client.get(f"{URL}/a/urdf").text))
+    found = {url: client.get(f"/api/v1/meshes/{url.removeprefix('package://')}") for url in urls}
+    assert len(urls) > 10
+    assert {each.status_code for each in found.values()} == {200}
+    meshes = client.get(f"{URL}/a/meshes").json()
+    assert {each["url"] for each in meshes} == urls
+    for each in meshes:
+        content = client.get(f"/api/v1/meshes/{each['sha256']}").content
+        assert (content, hashlib.sha256(content).hexdigest()) == (found[each["url"]].content, each["sha256"])
+
+
+def test_nothing_outside_of_the_directory_of_a_carried_robot_is_served(
+    client: TestClient, remember: Remember, tmp_path: Path
+) -> None:
+    robot = tmp_path / "datasets" / "a" / "robot"
+    robot.mkdir(parents=True)
+    (tmp_path / "secret").write_text("secret")
+    own, linked = f"{16 * '0'}.stl", f"{16 * '1'}.stl"
+    (robot / own).write_text("own")
+    (robot / linked).symlink_to(tmp_path / "secret")
+    remember("a", lives=False)
+    assert client.get(f"/api/v1/meshes/any/{own}").text == "own"
+    secret = hashlib.sha256(b"secret").hexdigest()
+    (robot / f"{secret[:16]}.stl").symlink_to(tmp_path / "secret")
+    for name in (f"any/{linked}", "any/..%2fconfig.yaml", f"any/{tmp_path}/secret", secret):
+        assert client.get(f"/api/v1/meshes/{name}").status_code == 404, name

@@ -1,12 +1,15 @@
 from dataclasses import replace
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.build import build_digest
 from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
 from throwcollect.config.values import sweepable_keys, values_by_key, with_values
 from throwcollect.errors import DatasetError
+from throwcollect.sim.simulator import Simulator
+from throwcollect.tasks.task import trajectory_of
 from throwcollect.trial import conditions
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 
@@ -93,6 +96,19 @@ def test_find_replaced_names_each_physics_key_that_a_trial_changes() -> None:
     trial = with_values(CONFIG, {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8, "task.duration_s": 1.3})
     assert {"ball.mass_kg", "task.start.arm_right_4_joint"} <= set(physics)
     assert settings.find_replaced(trial) == {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8}
+
+
+def test_the_conditions_of_a_simulated_episode_are_those_of_its_trial_alone() -> None:
+    drawn = {"trials": 2, "sweep": {"sampler": "uniform", "parameters": {"ball.mass_kg": {"min": 0.03, "max": 0.06}}}}
+    plan = make_plan(Config.model_validate(drawn))
+    simulator, settings = Simulator(plan.config), Settings(plan.config)
+    episode = simulator.run(plan.trials[1])
+    simulator.close()
+    configs = [plan.config_of(trial) for trial in plan.trials]
+    expected = [settings.conditions_of(config, trajectory_of(config).digest) for config in configs]
+    found = conditions_from_json(episode.conditions)
+    assert found.explain(expected[1]) is None
+    assert "ball.mass_kg was " in (found.explain(expected[0]) or "")
 
 
 def test_the_digest_of_a_build_is_the_same_when_it_is_computed_anew() -> None:

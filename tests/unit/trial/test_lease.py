@@ -4,7 +4,7 @@ import pytest
 
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import Signer
-from throwcollect.trial.choice import choose_trials
+from throwcollect.sweep.trials import choose_trials
 from throwcollect.trial.lease import Lease, leases_from_json, leases_to_json
 
 SIGNER = Signer(b"key of the run")

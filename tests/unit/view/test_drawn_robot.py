@@ -23,11 +23,11 @@ def snowman(tmp_path: Path) -> DrawnRobot:
     mesh = tmp_path / "share" / "snow" / "meshes" / "nose.stl"
     mesh.parent.mkdir(parents=True)
     mesh.write_bytes(b"solid nose")
-    return read_drawn_robot(URDF, "nose", tmp_path / "share")
+    return read_drawn_robot(URDF, "nose", lambda url: tmp_path / "share" / url.removeprefix("package://"))
 
 
 def test_a_sphere_is_drawn_with_its_diameter(snowman: DrawnRobot) -> None:
-    head, nose = shape_markers("robot", snowman.shapes, snowman.share, 0).markers
+    head, nose = shape_markers("robot", snowman.shapes, snowman.locate, 0).markers
     assert (head.type, head.scale.x, head.scale.y, head.scale.z) == (head.SPHERE, 0.2, 0.2, 0.2)
     assert (nose.type, nose.mesh_resource) == (nose.MESH_RESOURCE, "data:model/stl;base64,c29saWQgbm9zZQ==")
 
@@ -46,7 +46,7 @@ def test_each_shape_has_its_own_colour(tmp_path: Path) -> None:
     blue = named.replace('""', '"blue"')
     parts = [red, green, blue, '<material name="blue"/>', "", red]
     links = "".join(f'<link name="{number}">{shape.format(part)}</link>' for number, part in enumerate(parts))
-    drawn = read_drawn_robot(f'<robot name="r">{links}</robot>', "5", tmp_path)
+    drawn = read_drawn_robot(f'<robot name="r">{links}</robot>', "5", Path)
     colours = [part.rgba for part in drawn.shapes]
     assert colours[:4] == [(1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1), (0, 0, 1, 1)]
     # A part without a colour is grey, and the tool has one of its own, whatever its description says.

@@ -28,7 +28,7 @@ def merge_datasets(
     json: JsonOption = False,
 ) -> None:
     """Put the trials of several datasets into one."""
-    from throwcollect.derive.selection import merge
+    from throwcollect.derive.derivation import merge
 
     _show(output, merge(directories, output), json=json)
 
@@ -40,7 +40,7 @@ def filter_dataset(
     json: JsonOption = False,
 ) -> None:
     """Take the trials that fulfil a condition on columns of throws.parquet."""
-    from throwcollect.derive.selection import filter_trials
+    from throwcollect.derive.derivation import filter_trials
 
     _show(output, filter_trials(directory, output, where=where), json=json)
 
@@ -53,7 +53,7 @@ def sample_dataset(
     json: JsonOption = False,
 ) -> None:
     """Take trials at random; they stay in their order."""
-    from throwcollect.derive.selection import sample
+    from throwcollect.derive.derivation import sample
 
     _show(output, sample(directory, output, count=count, seed=seed), json=json)
 

@@ -58,7 +58,7 @@ def verify_dataset(
     """Check a dataset against itself and against physics; exit code 4 if anything is wrong."""
     from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.verify import find_unchecked
-    from throwcollect.replay.verification import verify_dataset as verify
+    from throwcollect.replay.audit import verify_dataset as verify
 
     findings = verify(directory, replay=replay, processes=count_cores())
     if findings:
@@ -73,7 +73,7 @@ def verify_dataset(
 
 def _describe_replay(dataset: Dataset, replay: int | None) -> str:
     """Say how many throws were simulated again in a dataset in which nothing is wrong, and how to simulate more."""
-    from throwcollect.replay.verification import count_replayed
+    from throwcollect.replay.audit import count_replayed
 
     count, recorded = count_replayed(dataset, replay), len(dataset.recorded)
     text = f"replayed: {count} of {format_count(recorded, 'throw')}"

@@ -67,7 +67,7 @@ def replay_dataset(
 
 def _compare_engines(directory: Path, engine: str, trials: Sequence[int], *, json: bool) -> None:
     """Simulate throws with another engine, and print by how much the results differ."""
-    from throwcollect.replay.other_engine import distributions, simulate_with
+    from throwcollect.replay.audit import distributions, simulate_with
 
     deviations = list(simulate_with(directory, engine, trials))
     found = distributions(deviations)

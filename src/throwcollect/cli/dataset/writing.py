@@ -54,7 +54,7 @@ def report_dataset(
     json: JsonOption = False,
 ) -> None:
     """Write a page that shows what a dataset holds."""
-    from throwcollect.report.page import write_report
+    from throwcollect.report.sections import write_report
 
     resolved = directory.resolve()
     page = output or resolved.with_name(f"{resolved.name}.html")

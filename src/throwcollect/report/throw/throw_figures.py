@@ -199,8 +199,11 @@ def _draw_paths(throws: Sequence[Throw], axis: int) -> go.Figure:
     return figure.update_layout(height=480, legend=LEGEND_ABOVE)
 
 
-def draw_joint(joint: Joint, commanded: NDArray[np.float64], release: BallEvent | None) -> go.Figure:
-    """Draw commanded [rad] and measured position of one joint."""
+def draw_joint(
+    joint: Joint, commanded: NDArray[np.float64], release: BallEvent | None, scale: tuple[float, str]
+) -> go.Figure:
+    """Draw commanded and measured position of one joint; the scale is a factor on these and the unit it leads to."""
+    factor, unit = scale
     figure = go.Figure()
     for values, name, line in (
         (joint.position, "measured", {"color": "#56B4E9", "width": 4}),
@@ -208,23 +211,22 @@ def draw_joint(joint: Joint, commanded: NDArray[np.float64], release: BallEvent 
     ):
         figure.add_scatter(
             x=single_precision(joint.time_s),
-            y=single_precision(np.degrees(values)),
+            y=single_precision(factor * values),
             mode="lines",
             name=name,
             line=line,
-            hovertemplate=f"%{{x:.3f}} s, %{{y:.2f}}°<extra>{name}</extra>",
+            hovertemplate=f"%{{x:.3f}} s, %{{y:.2f}}{unit}<extra>{name}</extra>",
         )
     if release is not None:
         figure.add_vline(x=release.time_s, line=MOMENT_LINE, name="release")
     figure.update_xaxes(title="time [s]")
-    figure.update_yaxes(
-        title="position [°]", range=_choose_span(np.degrees(np.concatenate([commanded, joint.position])))
-    )
+    positions = factor * np.concatenate([commanded, joint.position])
+    figure.update_yaxes(title=f"position [{unit.strip()}]", range=_choose_span(positions))
     return figure.update_layout(height=230, showlegend=False)
 
 
 def _choose_span(positions: NDArray[np.float64]) -> list[float]:
-    """Choose the range of positions to show [°]: at least 6°, so that a joint at rest looks at rest."""
+    """Choose the range of positions to show [°; mm]: at least 6, so that a joint at rest looks at rest."""
     finite = positions[np.isfinite(positions)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     room = max(0.05 * (high - low), 3.0 - (high - low) / 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -145,16 +146,18 @@ def _show_examples(dataset: Dataset, throws: Sequence[Throw], *, height_m: float
     note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
     note += "; the vertical line is the release." if release is not None else "."
     commanded = dict(zip(trajectory.joints, sample_positions(trajectory, middle.joints.time_s).T, strict=True))
-    errors = {name: np.degrees(np.abs(middle.joints[name].position - goal).max()) for name, goal in commanded.items()}
+    sliding = robot_of(dataset.config).sliding
+    scales = {name: (1000.0, " mm") if name in sliding else (math.degrees(1), "°") for name in commanded}
+    errors = {name: np.abs(middle.joints[name].position - goal).max() for name, goal in commanded.items()}
     joints = tuple(
         Panel(
             key=name,
             title=name,
-            figure=throw_figures.draw_joint(middle.joints[name], goal, release),
-            text=f"Largest tracking error: {errors[name]:.2g}°.",
+            figure=throw_figures.draw_joint(middle.joints[name], goal, release, scale),
+            text=f"Largest tracking error: {scale[0] * errors[name]:.2g}{scale[1]}.",
             small=True,
         )
-        for name, goal in commanded.items()
+        for (name, goal), scale in zip(commanded.items(), scales.values(), strict=True)
     )
     return ReportSection("throws", "Throws", title, text, (views, note, joints))
 

@@ -13,6 +13,7 @@ from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.config.host_paths import DEVICES, is_allowed_device, refusal
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
+from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runtimes.docker.address import engine_address
 from throwcollect.runtimes.docker.container_options import (
     RUN_LABEL,
@@ -21,10 +22,8 @@ from throwcollect.runtimes.docker.container_options import (
     mount_source,
     section_of,
 )
-from throwcollect.runtimes.docker.docker_engine import engine_errors
-from throwcollect.runtimes.docker.image import BUILD_COMMAND, default_tag
+from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
-from throwcollect.runtimes.ports import reserve_port
 from throwcollect.state_directory import state_directory
 
 _NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}

@@ -17,10 +17,10 @@ from throwcollect.dataset.directory import DIRECTORY_VARIABLE
 from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import LOOPBACK
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeSpec, is_simulation, node_environment, protocol_of
-from throwcollect.runtimes.ports import LOOPBACK
 from throwcollect.version import __version__
 
 RUN_LABEL = "throwcollect.run"

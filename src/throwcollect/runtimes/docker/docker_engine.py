@@ -1,4 +1,4 @@
-"""Connects to a Docker engine, and translates its errors."""
+"""Connects to a Docker engine, translates its errors, and asks it for the image of containers."""
 
 from __future__ import annotations
 
@@ -6,17 +6,24 @@ import json
 import os
 import socket
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
 from docker.client import DockerClient
-from docker.errors import APIError, DockerException
+from docker.errors import APIError, DockerException, ImageNotFound
 from requests.exceptions import Timeout
 from urllib3.exceptions import HTTPError
 from urllib3.exceptions import TimeoutError as PoolTimeoutError
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.address import engine_address, no_answer
+from throwcollect.runtimes.image_sources import SOURCES_LABEL, are_others
+from throwcollect.version import __version__
+
+RMW_LABEL = "throwcollect.rmw"
+"""Label with the middleware of the genuine rclpy in an image; missing if the image has no rclpy."""
+BUILD_COMMAND = "make image"
+"""Command that builds the image of this version, in a clone of the project."""
 
 # The client raises any of the last three if a connection breaks in the middle of an answer or of a stream.
 ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
@@ -93,3 +100,45 @@ def engine_errors(what: str, *, hint: str | None = None) -> Iterator[None]:
         yield
     except ENGINE_ERRORS as error:
         raise WorkerError(f"{what}: {in_words(error)}", hint=hint) from error
+
+
+def default_tag() -> str:
+    """Tag of the image of this version."""
+    return f"throwcollect:{__version__}"
+
+
+def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> None:
+    """Make sure that the engine has an image: any other than the default one is pulled if it is missing."""
+    if is_there(client, tag):
+        return
+    if tag == default_tag():
+        raise WorkerError(f"the image {tag} is not here; {BUILD_COMMAND}, in a clone of the project, builds it")
+    say(f"image {tag} is not here; pulling it")
+    with engine_errors(f"the image {tag} is not here and cannot be pulled", hint="docker load brings one from a file"):
+        client.images.pull(tag)
+
+
+def is_outdated(client: DockerClient, tag: str) -> bool:
+    """Whether an image of the engine was made from other sources than those of this package's clone."""
+    return are_others(_read_label(client, tag, SOURCES_LABEL))
+
+
+def rmw_of(client: DockerClient, tag: str) -> str | None:
+    """Middleware of the genuine rclpy in an image of the engine; None if the image has no rclpy."""
+    return _read_label(client, tag, RMW_LABEL)
+
+
+def is_there(client: DockerClient, image: str) -> bool:
+    """Whether the engine has an image."""
+    with engine_errors(f"the engine does not say whether it has the image {image}"):
+        try:
+            client.images.get(image)
+        except ImageNotFound:
+            return False
+        return True
+
+
+def _read_label(client: DockerClient, tag: str, name: str) -> str | None:
+    with engine_errors(f"the engine does not say what the image {tag} holds"):
+        label = client.images.get(tag).labels.get(name)
+    return label if isinstance(label, str) else None

@@ -17,6 +17,7 @@ from docker.types import IPAMConfig, IPAMPool
 from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.ros.router_endpoint import LOOPBACK, format_endpoint
 from throwcollect.runtimes.docker import watch
 from throwcollect.runtimes.docker.checks import check
 from throwcollect.runtimes.docker.container_options import (
@@ -36,7 +37,6 @@ from throwcollect.runtimes.docker.volume import dataset_info, place_directory, p
 from throwcollect.runtimes.docker.watch import ContainerState, EngineClock, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
-from throwcollect.runtimes.ports import LOOPBACK, format_endpoint
 from throwcollect.runtimes.runtime import Place, Session
 from throwcollect.wording import command
 

@@ -49,41 +49,40 @@ class DockerRuntime(Runtime):
         """Get the image, and find out the middleware of containers; see `Runtime.prepare`."""
         if is_installed("docker"):
             check_socket()
+        from throwcollect.runtimes.docker import docker_engine as docker
         from throwcollect.runtimes.docker.container_options import image
-        from throwcollect.runtimes.docker.docker_engine import PATIENCE_S, connect
-        from throwcollect.runtimes.docker.image import BUILD_COMMAND, ensure, is_outdated, rmw_of
 
-        name = image(config)
-        with closing(connect(timeout_s=PATIENCE_S if config.run.runtime == "docker" else _PROBE_S)) as client:
+        name, patience_s = image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
+        with closing(docker.connect(timeout_s=patience_s)) as client:
             _refuse_other_machine()
-            ensure(client, name, say=say)
-            if is_outdated(client, name):
+            docker.ensure(client, name, say=say)
+            if docker.is_outdated(client, name):
                 finding = f"the image {name} was made from other sources than these"
                 # It may collect other bytes, so it is used only if the user has named it.
                 if config.containers.image is None:
-                    raise WorkerError(f"{finding}; {BUILD_COMMAND} builds it anew")
+                    raise WorkerError(f"{finding}; {docker.BUILD_COMMAND} builds it anew")
                 warn(f"{finding}; it is used, as containers.image names it")
-            return _choose_middleware(rmw_of(client, name), name, config, middleware)
+            return _choose_middleware(docker.rmw_of(client, name), name, config, middleware)
 
     def check(self) -> Check:
         """Whether an engine answers, and has the image of these sources."""
-        from throwcollect.runtimes.docker.docker_engine import connect, engine_errors
-        from throwcollect.runtimes.docker.image import BUILD_COMMAND, default_tag, is_outdated, is_there
+        from throwcollect.runtimes.docker import docker_engine as docker
 
+        tag = docker.default_tag()
         try:
-            with closing(connect(timeout_s=_PROBE_S)) as client, engine_errors("the Docker engine fails"):
+            with closing(docker.connect(timeout_s=_PROBE_S)) as client, docker.engine_errors("the Docker engine fails"):
                 _refuse_other_machine()
                 engine = client.version()["Version"]
                 found = f"Docker {engine} answers at {engine_address()}"
-                if not is_there(client, default_tag()):
-                    lacking = f"the image {default_tag()} is not there yet; {BUILD_COMMAND}, in a clone, builds it"
+                if not docker.is_there(client, tag):
+                    lacking = f"the image {tag} is not there yet; {docker.BUILD_COMMAND}, in a clone, builds it"
                     return Check("docker", "note", f"{found}; {lacking}")
-                if is_outdated(client, default_tag()):
-                    old = f"the image {default_tag()} was made from other sources than these"
-                    return Check("docker", "note", f"{found}; {old}; {BUILD_COMMAND} builds it anew")
+                if docker.is_outdated(client, tag):
+                    old = f"the image {tag} was made from other sources than these"
+                    return Check("docker", "note", f"{found}; {old}; {docker.BUILD_COMMAND} builds it anew")
         except WorkerError as error:
             return Check("docker", "note", f"{error.message}; runs use processes")
-        return Check("docker", "ok", f"{found}, with the image {default_tag()}")
+        return Check("docker", "ok", f"{found}, with the image {tag}")
 
     def find_held(self) -> list[HeldRun]:
         """See `Runtime.find_held`; none if there is no client, or the engine does not answer quickly."""

@@ -288,12 +288,10 @@ function drawChosen(pen, [x, y]) {
 
 function drawRobot(pen, style, at, scale) {
   const [x, y] = at(0, 0);
-  pen.fillStyle = style.getPropertyValue("--muted");
-  pen.beginPath();
-  pen.ellipse(x, y, 0.25 * scale, 0.13 * scale, 0, 0, 7);
-  pen.fill();
-  pen.beginPath();
-  pen.arc(x, y, 0.1 * scale, 0, 7);
-  pen.fillStyle = style.color;
-  pen.fill();
+  for (const [radius, color] of [[0.16, style.getPropertyValue("--muted")], [0.08, style.color]]) {
+    pen.fillStyle = color;
+    pen.beginPath();
+    pen.arc(x, y, radius * scale, 0, 7);
+    pen.fill();
+  }
 }

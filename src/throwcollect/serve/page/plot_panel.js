@@ -6,6 +6,7 @@ import { EDGE_PX, placeApart } from "./places.js";
 import { seriesOf } from "./throws.js";
 
 const UNITS = { position: "rad", velocity: "rad/s", effort: "Nm", ball: "m" };
+const SLIDING_UNITS = { position: "m", velocity: "m/s", effort: "N" };
 const HEIGHT_PX = 120;
 const SPAN_S = 10;
 const NUMBERS_MS = 500;
@@ -32,7 +33,7 @@ export class PlotPanel {
    */
   constructor(choice, follows, closed) {
     this.choice = choice;
-    const title = `${choice.field === "ball" ? `ball ${choice.name}` : `${choice.name} ${choice.field}`} [${UNITS[choice.field]}]`;
+    const title = `${choice.field === "ball" ? `ball ${choice.name}` : `${choice.name} ${choice.field}`} [${(choice.slides ? SLIDING_UNITS : UNITS)[choice.field]}]`;
     const button = (text, label, act) => makeButton(text, act, { title: label, "aria-label": `${label}: ${title}` });
     this.now = make("output", { className: "now" });
     this.title = title;

@@ -97,7 +97,8 @@ export class Plots {
   }
 
   #put(choice, follows) {
-    const panel = new PlotPanel(choice, follows, () => {
+    const slides = this.view.stations.get(choice.simulation)?.robot?.slides(choice.name);
+    const panel = new PlotPanel({ ...choice, slides }, follows, () => {
       this.panels.splice(this.panels.indexOf(panel), 1);
       get("add-plot").focus();
     });

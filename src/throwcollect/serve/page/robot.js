@@ -151,7 +151,15 @@ export class Robot {
     return this.#robot.joints[joint]?.children.find((child) => child.isURDFLink)?.urdfName;
   }
 
-  /** @param {Iterable<[string, number]>} positions of joints [rad]; others stay where they are */
+  /**
+   * @param {string} joint
+   * @returns {boolean} whether its positions are in m
+   */
+  slides(joint) {
+    return this.#robot.joints[joint]?.jointType === "prismatic";
+  }
+
+  /** @param {Iterable<[string, number]>} positions of joints [rad or m]; others stay where they are */
   move(positions) {
     for (const [joint, position] of positions) {
       this.#positions.set(joint, position);

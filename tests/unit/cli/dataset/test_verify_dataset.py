@@ -36,14 +36,14 @@ def replays(monkeypatch: pytest.MonkeyPatch, differing: set[int]) -> list[int]:
         trials.extend(wanted)
         yield from (Comparison(trial, "aa", "bb", ("effort: otherwise",) * (trial in differing)) for trial in wanted)
 
-    monkeypatch.setattr("throwcollect.replay.verification.replay_throws", replay)
+    monkeypatch.setattr("throwcollect.replay.audit.replay_throws", replay)
     return trials
 
 
 def test_verify_replays_the_same_sample_each_time_and_names_the_command_that_replays_all(
     source: Path, replays: list[int], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("throwcollect.replay.verification.SAMPLE", 2)
+    monkeypatch.setattr("throwcollect.replay.audit.SAMPLE", 2)
     for _ in range(2):
         verify_dataset(source, replay=None, json=False)
     assert len(replays) == 4

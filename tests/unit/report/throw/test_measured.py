@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.selection import filter_trials
+from throwcollect.derive.derivation import filter_trials
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.throw.measured import choose_examples, measure_residuals, read_landings
 from throwcollect.report.throw.throw_sections import report_throws

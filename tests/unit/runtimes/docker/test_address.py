@@ -16,7 +16,7 @@ from throwcollect.runtimes.docker.docker_engine import connect
 CHOOSES = """
 import sys
 from throwcollect.config.schema import Config
-from throwcollect.runs.runtime_choice import choose
+from throwcollect.runtimes.registry import choose
 
 choose(Config(), say=print, warn=print)
 print(sorted({"docker", "requests", "urllib3"} & sys.modules.keys()))

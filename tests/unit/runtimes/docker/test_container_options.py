@@ -10,7 +10,7 @@ from rclzenoh.session_config import client_override
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.docker.container_options import RunPlace, image, mount_source, node_options, publishes_port
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import NodeRole, NodeSpec
 
 DIRECTORY = RunPlace("throws-1a2b", "/home/me/data set")

@@ -9,7 +9,7 @@ import pytest
 from docker.errors import APIError, ImageNotFound
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.image import default_tag, ensure, is_outdated
+from throwcollect.runtimes.docker.docker_engine import default_tag, ensure, is_outdated
 from throwcollect.runtimes.image_sources import SOURCES_LABEL, digest_sources
 
 

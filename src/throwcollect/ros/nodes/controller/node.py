@@ -10,8 +10,7 @@ from throwcollect.control import REPEATED, ControllerState
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, pass_on_log
 from throwcollect.ros.msg import ControllerState as ControllerDescription
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
-from throwcollect.ros.nodes.controller.action import ControllerAction
-from throwcollect.ros.nodes.controller.messages import nanoseconds, read_trajectory, state_message
+from throwcollect.ros.nodes.controller.action import ControllerAction, nanoseconds, read_trajectory, state_message
 from throwcollect.ros.nodes.controller.parameters import COMMAND_INTERFACES, ControllerParameterServer, state_interfaces
 from throwcollect.ros.nodes.own_time import make_own_time
 from throwcollect.ros.srv import ListControllers, QueryTrajectoryState

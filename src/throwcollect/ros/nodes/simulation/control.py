@@ -2,14 +2,39 @@
 
 from __future__ import annotations
 
-from throwcollect.errors import ConfigError, RequestError
+import math
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+from throwcollect.engines.engine import BodyState
+from throwcollect.errors import ConfigError, MemberError, RequestError
 from throwcollect.ros import Node
+from throwcollect.ros.msg import EntityFilters, EntityState, Result
 from throwcollect.ros.msg import SimulatorFeatures as Features
-from throwcollect.ros.nodes.simulation.answers import offer
-from throwcollect.ros.nodes.simulation.entities import EntityServices
-from throwcollect.ros.srv import GetSimulationState, GetSimulatorFeatures, ResetSimulation, SetSimulationState
+from throwcollect.ros.srv import (
+    GetEntities,
+    GetEntitiesStates,
+    GetEntityState,
+    GetSimulationState,
+    GetSimulatorFeatures,
+    ResetSimulation,
+    SetEntityState,
+    SetSimulationState,
+)
 from throwcollect.sim.live import LiveSimulator, StateCode
+from throwcollect.units import NS_PER_S
 from throwcollect.version import __version__
+
+Fill = Callable[[Any, Any], None]
+"""Function of a request and a response that fills the response."""
+
+_BALL = "ball"
+_WORLD_FRAME = "world"
+_LARGEST_COORDINATE_M = 1e3
+_LARGEST_SPEED = 1e3
+"""Largest speed that a client may give the ball [m/s, rad/s]: at a higher one, its place would soon be no number."""
+
+_NORM_TOLERANCE = 1e-3
 
 _FEATURES = (
     "ENTITY_STATE_GETTING",
@@ -75,3 +100,123 @@ class SimulationControl:
             raise RequestError("RESULT_FEATURE_UNSUPPORTED", message, expected=expected)
         else:
             self._simulation.reset(time=bool(scope & _TIME), state=bool(scope & _STATE))
+
+
+class EntityServices:
+    """Offers the services under relative names, so that they stand in the simulation's namespace."""
+
+    def __init__(self, node: Node, simulation: LiveSimulator) -> None:
+        self._simulation = simulation
+        self._robot = simulation.config.robot.name
+        offer(node, GetEntities, "get_entities", self._list)
+        offer(node, GetEntitiesStates, "get_entities_states", self._list_states)
+        offer(node, GetEntityState, "get_entity_state", self._get_state)
+        offer(node, SetEntityState, "set_entity_state", self._set_state)
+
+    def _list(self, request: GetEntities.Request, response: GetEntities.Response) -> None:
+        response.entities = self._select(request.filters)
+
+    def _list_states(self, request: GetEntitiesStates.Request, response: GetEntitiesStates.Response) -> None:
+        response.entities = self._select(request.filters)
+        response.states = [self._read_state(name) for name in response.entities]
+
+    def _get_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
+        response.state = self._read_state(request.entity)
+
+    def _set_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:
+        self._simulation.trial.require_free()
+        self._require(request.entity)
+        if request.entity != _BALL:
+            raise RequestError("RESULT_OPERATION_FAILED", f"{request.entity} is fixed to the world")
+        if (frame := request.state.header.frame_id) not in ("", _WORLD_FRAME):
+            raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=_WORLD_FRAME)
+        self._simulation.world.ball = _to_body_state(request.state)
+
+    def _select(self, filters: EntityFilters) -> list[str]:
+        if filters != EntityFilters():
+            message = f"entities cannot be filtered: there are {_BALL} and {self._robot} alone"
+            raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
+        return [_BALL, self._robot]
+
+    def _read_state(self, name: str) -> EntityState:
+        self._require(name)
+        world = self._simulation.world
+        return _to_message(world.ball if name == _BALL else world.robot_base, self._simulation.now_ns)
+
+    def _require(self, name: str) -> None:
+        if name not in (_BALL, self._robot):
+            raise RequestError("RESULT_NOT_FOUND", f"no entity {name!r:.80}; known: {_BALL}, {self._robot}")
+
+
+def _to_body_state(message: EntityState) -> BodyState:
+    """Read and check a state in the frame of the world."""
+    position, turn = message.pose.position, message.pose.orientation
+    linear, angular = message.twist.linear, message.twist.angular
+    state = BodyState(
+        (position.x, position.y, position.z),
+        (turn.x, turn.y, turn.z, turn.w),
+        (linear.x, linear.y, linear.z),
+        (angular.x, angular.y, angular.z),
+    )
+    # Each condition is written as `not ... <=`, so that it rejects NaN, too, for which no comparison holds.
+    norm = math.hypot(*state.orientation_xyzw)
+    if not abs(norm - 1.0) <= _NORM_TOLERANCE:
+        text = f"orientation {state.orientation_xyzw}: a quaternion of norm {norm:g}"
+        raise RequestError("INVALID_POSE", text, expected="norm 1")
+    if not all(abs(value) <= _LARGEST_COORDINATE_M for value in state.position):
+        expected = f"within {_LARGEST_COORDINATE_M:g} m of the world's origin"
+        raise RequestError("INVALID_POSE", f"position {state.position} m", expected=expected)
+    speeds = (*state.linear_velocity, *state.angular_velocity)
+    if not all(abs(speed) <= _LARGEST_SPEED for speed in speeds):
+        expected = f"numbers up to {_LARGEST_SPEED:g} m/s and rad/s"
+        raise RequestError("RESULT_OPERATION_FAILED", f"twist {speeds}", expected=expected)
+    return state
+
+
+def _to_message(state: BodyState, now_ns: int) -> EntityState:
+    """Make the message of a state in world at a time; accelerations are not measured."""
+    message = EntityState()
+    message.header.frame_id = _WORLD_FRAME
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, NS_PER_S)
+    position, orientation = message.pose.position, message.pose.orientation
+    position.x, position.y, position.z = state.position
+    orientation.x, orientation.y, orientation.z, orientation.w = state.orientation_xyzw
+    linear, angular = message.twist.linear, message.twist.angular
+    linear.x, linear.y, linear.z = state.linear_velocity
+    angular.x, angular.y, angular.z = state.angular_velocity
+    return message
+
+
+def offer(node: Node, service: Any, name: str, fill: Fill) -> None:
+    """Offer a service of a node: `fill` fills the response, or raises an error, with which the service answers."""
+
+    def answer(request: Any, response: Any) -> Any:
+        response.result.result = Result.RESULT_OK
+        try:
+            fill(request, response)
+        except RequestError as error:
+            return refusal(service.Response, error)
+        except (ConfigError, MemberError) as error:
+            return refusal(service.Response, RequestError("RESULT_OPERATION_FAILED", str(error)))
+        return response
+
+    node.create_service(service, name, answer)
+
+
+class _WithResult(Protocol):
+    result: Result
+
+
+_R = TypeVar("_R", bound=_WithResult)
+
+
+def refusal(response_type: type[_R], error: RequestError) -> _R:
+    """Make a response, or any other message with a ``result``, that gives the reason of an error.
+
+    If the type of the message and all services have a result code of the same name, the code of the type is taken.
+    """
+    constants = response_type if hasattr(response_type, error.reason) else Result
+    response = response_type()
+    response.result.result = getattr(constants, error.reason)
+    response.result.error_message = str(error)
+    return response

@@ -8,7 +8,7 @@ from throwcollect.errors import RequestError
 from throwcollect.ros import ActionServer, CancelResponse, Future, Node
 from throwcollect.ros.action import SimulateSteps
 from throwcollect.ros.msg import Result
-from throwcollect.ros.nodes.simulation.answers import refusal
+from throwcollect.ros.nodes.simulation.control import refusal
 from throwcollect.ros.srv import StepSimulation
 from throwcollect.sim.live import LiveSimulator, StepRequest
 

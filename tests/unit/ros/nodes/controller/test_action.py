@@ -10,8 +10,7 @@ from rclzenoh.interfaces import deserialize, serialize
 from throwcollect.config.schema import Config
 from throwcollect.ros import GoalResponse
 from throwcollect.ros.nodes.controller import action as controller_action
-from throwcollect.ros.nodes.controller.action import ControllerAction
-from throwcollect.ros.nodes.controller.messages import feedback_message, read_trajectory
+from throwcollect.ros.nodes.controller.action import ControllerAction, feedback_message, read_trajectory
 from throwcollect.sim.live import LiveSimulator
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.errors import ConfigError, MemberError, RequestError
 from throwcollect.ros.msg import Result
-from throwcollect.ros.nodes.simulation.answers import offer
+from throwcollect.ros.nodes.simulation.control import offer
 from throwcollect.ros.srv import ResetSimulation
 
 

@@ -1,3 +1,5 @@
+"""The choice of the runtime of a run, and of its middleware."""
+
 from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import Mock
@@ -9,10 +11,10 @@ from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.middleware import Middleware
-from throwcollect.runs import runtime_choice
+from throwcollect.runtimes import registry
 from throwcollect.runtimes.docker import docker_engine as docker_engine
-from throwcollect.runtimes.docker import image as docker_image
-from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.docker import docker_engine as docker_image
+from throwcollect.runtimes.docker.docker_engine import default_tag
 
 
 @pytest.fixture
@@ -22,7 +24,7 @@ def choose() -> Callable[..., tuple[str, list[str]]]:
     def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
         said: list[str] = []
         config = Config(run=RunConfig(runtime=runtime), containers=ContainersConfig(image=image))
-        chosen = runtime_choice.choose(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
+        chosen = registry.choose(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
         assert chosen.middleware == Middleware()
         return chosen.name, said
 
@@ -127,9 +129,9 @@ def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
-    monkeypatch.setattr(runtime_choice, "choose_middleware", lambda _: launcher)
+    monkeypatch.setattr(registry, "choose_middleware", lambda _: launcher)
     said: list[str] = []
-    found = runtime_choice.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
+    found = registry.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
     assert found.middleware == expected
     assert ("on genuine rclpy" in said[0]) == (expected.backend == "rclpy")
 
@@ -146,9 +148,9 @@ def test_requested_rclpy_that_containers_cannot_have_is_an_error(
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
-    monkeypatch.setattr(runtime_choice, "choose_middleware", lambda _: FAST_DDS)
+    monkeypatch.setattr(registry, "choose_middleware", lambda _: FAST_DDS)
     with pytest.raises(ConfigError, match=problem) as caught:
-        runtime_choice.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)
+        registry.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)
     assert "run.ros" in str(caught.value)
 
 

@@ -1,3 +1,5 @@
+"""The goals of a trial."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -5,8 +7,8 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
+from throwcollect.sim.present_trial import trial_goals
 from throwcollect.tasks.task import task_of
-from throwcollect.trial.goals import trial_goals
 
 CONFIG = Config()
 ARM = "arm_right_controller"
