@@ -28,6 +28,7 @@ _LEAST_THICKNESS = 1e-6
 """Least extent of a solid in its thinnest direction, as a share of its extent in the longest."""
 
 _HEADER, _RECORD = 84, 50
+_METRES = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)")
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 
@@ -141,11 +142,13 @@ def _find_index(number: int, vertices: int) -> int:
 
 
 def _read_collada(path: Path) -> Triangles:
-    """Read COLLADA with its units and its upward axis, as viewers of ROS do."""
+    """Read COLLADA with its unit, and without its upward axis, as viewers of ROS do."""
     model = pinocchio.coal.MeshLoader(pinocchio.coal.BV_OBB).load(str(path), np.ones(3))
     triangles = (model.tri_indices(index) for index in range(model.num_tris))
     numbers = [[triangle[corner] for corner in range(3)] for triangle in triangles]
-    corners: Triangles = np.asarray(model.vertices(), np.float32)[numbers]
+    # The library leaves out the transformation of the root, and with it the unit.
+    unit = _METRES.search(path.read_bytes())
+    corners: Triangles = np.asarray(model.vertices(), np.float32)[numbers] * np.float32(unit[1] if unit else 1)
     return corners
 
 

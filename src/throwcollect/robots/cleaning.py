@@ -86,8 +86,8 @@ class Cleaning:
             # A package is a directory of its name, mostly one of those that the URDF lies in.
             places += [above / package for above in self._path.resolve().parents]
             places += [above for above in self._path.resolve().parents if above.name == package]
+            places += list_shares(package)
             # The meshes of an imported robot lie in the directory of its URDF.
-            places += [*list_shares(package), self._path.parent]
             found = next((place / rest for place in places if (place / rest).is_file()), self._path.parent / rest)
             missing = f"not found; robot.packages says where the directory of {package} is"
         else:
