@@ -1,5 +1,4 @@
 import os
-import re
 import subprocess
 import sys
 from importlib.metadata import EntryPoint, EntryPoints
@@ -102,9 +101,7 @@ def test_an_unknown_robot_is_an_error_without_complaints_about_joints(tmp_path: 
     path.write_text(ARM.replace("planar_arm", "planar_hand"))
     done = with_plugins("config", str(path))
     assert done.returncode == 2
-    told = re.search(r"robot\.name: should be (.*), got 'planar_hand'; did you mean 'planar_arm'\?", done.stderr)
-    assert told is not None, done.stderr
-    assert set(re.findall(r"'(\w+)'", told[1])) == {*names_of("robots"), "planar_arm"}
+    assert "robot.name: no robot 'planar_hand' is installed; did you mean 'planar_arm'?" in done.stderr
     assert "joint" not in done.stderr
 
 

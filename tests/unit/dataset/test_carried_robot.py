@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from tests.e2e.collection import FAST, call_here, collect_here
 from tests.e2e.collection import write_config as write_user_config
-from throwcollect.derive.selection import filter_trials, merge
 
 from throwcollect import Simulator, fit, load_model, verify_dataset
 from throwcollect.config.loader import load
 from throwcollect.dataset.carried_robot import carry_robot, pack_robot, unpack_robot
 from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.derivation import filter_trials, merge
 from throwcollect.export.export import export
 from throwcollect.robots.imported import hash_files
 from throwcollect.state_directory import STATE_VARIABLE
