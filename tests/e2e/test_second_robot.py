@@ -159,6 +159,6 @@ def test_a_damaged_dataset_of_the_second_robot_can_be_mended(say: Say, arm: Path
 def test_reading_a_dataset_without_the_package_of_its_robot_is_an_error(arm: Path) -> None:
     done = call_here("dataset", "info", arm)
     assert done.returncode == 2
-    sentence = "robot.name: should be 'talos', got 'planar_arm'"
+    sentence = "robot.name: no robot 'planar_arm' is installed"
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
