@@ -55,8 +55,7 @@ def elsewhere(tmp_path: Path) -> Iterator[Path]:
         yield tmp_path / "elsewhere"
 
 
-@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
-@pytest.mark.parametrize("robot", TEXTS)
+@pytest.mark.parametrize(("robot", "engine"), [("panda", "bullet"), ("kinova", "mujoco")])
 def test_a_dataset_of_an_arm_is_the_same_after_a_kill_and_from_its_own_files(
     robot: str, engine: str, tmp_path: Path, elsewhere: Path
 ) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from throwcollect.cli.options import JsonOption
-from throwcollect.cli.printing import print_json
+from throwcollect.cli.printing import print_result
 from throwcollect.errors import ConfigError
 from throwcollect.wording import command
 
@@ -66,29 +66,20 @@ def check(
     """Say what is odd about a robot: limits, masses, inertias, meshes, its posture at rest, its reach."""
     section = read_robot(robot, flange, settings)
     found = _list_oddities(section)
-    if json:
-        print_json(found)
-        return
-    typer.echo("\n".join(found) if found else f"{section.name}: nothing is odd")
+    print_result(found, "\n".join(found) if found else f"{section.name}: nothing is odd", json=json)
 
 
 @app.command("list")
 def list_(json: JsonOption = False) -> None:
     """List the robots that are installed."""
-    from throwcollect.members import usable_names
-    from throwcollect.robots.described import find_robot
+    from throwcollect.members import load_member, usable_names
 
-    found = {name: find_robot(name) for name in usable_names("robots")}
-    if json:
-        print_json(
-            {
-                name: {"controllers": {key: list(each) for key, each in robot.controllers.items()}}
-                for name, robot in found.items()
-            }
-        )
-        return
-    for name, robot in found.items():
-        typer.echo(f"{name:<12} {len(robot.joints)} joints: {', '.join(robot.controllers)}")
+    found = {name: load_member("robots", name).controllers for name in usable_names("robots")}
+    text = "\n".join(
+        f"{name:<12} {sum(map(len, controllers.values()))} joints: {', '.join(controllers)}"
+        for name, controllers in found.items()
+    )
+    print_result({name: dict(controllers) for name, controllers in found.items()}, text, json=json)
 
 
 def read_robot(robot: str, flange: str | None = None, settings: list[str] | None = None) -> RobotConfig:

@@ -13,6 +13,7 @@ from typing import Literal
 
 from throwcollect import ros_installation
 from throwcollect.build import build_digest
+from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import (
     ENGINE_PACKAGES,
@@ -23,8 +24,8 @@ from throwcollect.extras import (
     install_command,
     is_installed,
 )
-from throwcollect.members import explain_failure, names_of
-from throwcollect.robots.described import find_robot
+from throwcollect.members import explain_failure, load_member, names_of
+from throwcollect.robots.importing import find_urdf
 from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, uses_rclpy
@@ -85,7 +86,10 @@ def _check_robot(name: str) -> Check:
     check = "robot" if is_own else f"robot {name}"
     try:
         with explain_failure("robots", name, "describe itself"):
-            robot = find_robot(name)
+            robot = load_member("robots", name)
+            if isinstance(robot, DescribedRobotConfig):
+                # Importing all of them would take seconds.
+                return Check(check, "ok", f"{name}, {find_urdf(robot.urdf)}")
             joint_model(robot)
             package = f" of example-robot-data {version('example-robot-data')}" if is_own else ""
             return Check(check, "ok", f"{robot.title}{package}, {robot.urdf_path}")
