@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from operator import index
 from pathlib import Path
 
@@ -81,16 +81,19 @@ def list_signals(
     Arrays of joints have the units of joints that turn in their names; components that are `sliding` have their own.
     """
     every = f"{len(joints)} joints"
-    signals = (
+    return (
         Signal("time_s", "Time since the start of the trial.", pattern="time_s"),
-        _describe_joints("joint_position_rad", "Measured joint positions.", joints, every),
-        _describe_joints("joint_velocity_radps", "Measured joint velocities.", joints, every),
-        _describe_joints("joint_effort_nm", "Torques of the motors; 0 for locked joints.", joints, every),
+        _describe_joints("joint_position_rad", "Measured joint positions.", joints, sliding, every),
+        _describe_joints("joint_velocity_radps", "Measured joint velocities.", joints, sliding, every),
+        _describe_joints("joint_effort_nm", "Torques of the motors; 0 for locked joints.", joints, sliding, every),
         _describe_joints(
-            "command_position_rad", "Commanded positions, on the trajectory that controllers were sent.", moving
+            "command_position_rad",
+            "Commanded positions, on the trajectory that controllers were sent.",
+            moving,
+            sliding,
         ),
-        _describe_joints("command_velocity_radps", "Commanded velocities.", moving),
-        _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving),
+        _describe_joints("command_velocity_radps", "Commanded velocities.", moving, sliding),
+        _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving, sliding),
         _describe_ball("ball_position_m", "Ball centre in world.", "ball_position", "xyz"),
         _describe_ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "ball_orientation_xyzw", "xyzw"),
         _describe_ball("ball_velocity_mps", "Velocity of the ball in world.", "ball_velocity", "xyz"),
@@ -99,17 +102,15 @@ def list_signals(
         ),
         *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
     )
-    slide = tuple(f"{joint}_" for joint in sliding)
-
-    def name(component: str) -> str:
-        return name_sliding(component) if component.startswith(slide) else component
-
-    return tuple(replace(each, components=tuple(map(name, each.components))) for each in signals)
 
 
-def _describe_joints(name: str, description: str, joints: Sequence[str], each: str = "moving joints") -> Signal:
+def _describe_joints(
+    name: str, description: str, joints: Sequence[str], sliding: Collection[str], each: str = "moving joints"
+) -> Signal:
     ending = name.removeprefix("joint_")
-    return Signal(name, description, tuple(f"{joint}_{ending}" for joint in joints), each, f"<joint>_{ending}")
+    names = {joint: f"{joint}_{ending}" for joint in joints}
+    components = tuple(name_sliding(own) if joint in sliding else own for joint, own in names.items())
+    return Signal(name, description, components, each, f"<joint>_{ending}")
 
 
 def _describe_ball(name: str, description: str, column: str, axes: str) -> Signal:
