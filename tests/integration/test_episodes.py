@@ -8,6 +8,7 @@ import pytest
 import zenoh
 from zenoh.ext import declare_advanced_subscriber
 
+from rclzenoh.endpoint import unpack as unpack_attachment
 from rclzenoh.interfaces import type_hash
 from tests.integration.robot import ALL, ARM, CONFIG, Robot, goal, signer, swing
 from throwcollect.episode.episode_message import unpack
@@ -52,7 +53,7 @@ def test_a_genuine_subscriber_misses_no_episode(endpoint: str, robot: Robot) -> 
     headers = [unpack(message, signer()).header for message in heard]
     assert [header.trial for header in headers] == list(range(TRIALS))
     assert [header.start_ns for header in headers] == [CONFIG.trial_start_ns(number) for number in range(TRIALS)]
-    attachments = [endpoint.unpack(sample.attachment.to_bytes()) for sample in samples]
+    attachments = [unpack_attachment(sample.attachment.to_bytes()) for sample in samples]
     first = attachments[0].sequence
     assert [each.sequence for each in attachments] == list(range(first, first + TRIALS))
     assert len({each.gid for each in attachments}) == 1
