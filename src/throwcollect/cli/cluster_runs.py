@@ -12,11 +12,12 @@ from typing import Any
 import typer
 
 from throwcollect.cli.dataset.info import print_collected
+from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, find_queued, follow
 from throwcollect.dataset.inspect import info
-from throwcollect.errors import ConfigError, Interrupted
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.interruption import count_interruptions
 from throwcollect.runtimes.node_logs import Tail
 from throwcollect.wording import command, format_count
@@ -86,8 +87,15 @@ def end(run: ClusterRun) -> None:
 
 
 def list_queued() -> list[tuple[ClusterRun, SlicesLook]]:
-    """List the runs in the queue, and how each is."""
-    return [(run, run.look()) for run in map(ClusterRun.open, find_queued())]
+    """List the runs in the queue, and how each is; print the error of one whose directory is gone, for example."""
+    found = []
+    for directory in find_queued():
+        try:
+            run = ClusterRun.open(directory)
+            found.append((run, run.look()))
+        except ThrowcollectError as error:
+            tell(f"throwcollect: {error}")
+    return found
 
 
 def make_row(run: ClusterRun, look: SlicesLook) -> tuple[str, ...]:
