@@ -63,7 +63,7 @@ def import_(
 def check(
     robot: RobotArgument, flange: FlangeOption = None, settings: KeysOption = None, json: JsonOption = False
 ) -> None:
-    """Say what is odd about a robot: limits, masses, inertias, meshes, its posture at rest, its reach."""
+    """List what is odd about a robot: limits, masses, inertias, meshes, its posture at rest, its reach."""
     section = read_robot(robot, flange, settings)
     found = _list_oddities(section)
     print_result(found, "\n".join(found) if found else f"{section.name}: nothing is odd", json=json)
@@ -90,10 +90,10 @@ def read_robot(robot: str, flange: str | None = None, settings: list[str] | None
     from throwcollect.wording import suggest
 
     path, keys = Path(robot), [f"robot.{each}" for each in settings or ()]
-    if path.is_dir() or path.suffix in (".yaml", ".yml"):
-        return read_robot_section(path / SECTION if path.is_dir() else path, keys)
     if robot in names_of("robots"):
         return read_robot_section(None, [f"robot.name={robot}", *keys])
+    if path.is_dir() or path.suffix in (".yaml", ".yml"):
+        return read_robot_section(path / SECTION if path.is_dir() else path, keys)
     if not flange and path.is_file():
         raise ConfigError(f"{robot}: a URDF needs the link that holds the tool", hint="name it: --flange LINK")
     if not flange:

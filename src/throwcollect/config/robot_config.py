@@ -62,7 +62,7 @@ class RobotConfig(Section):
 
 
 class ToolPose(Section):
-    """Pose of the hand, which holds the tool, in the flange; the spoon's handle lies along -z, and opens along +x."""
+    """Pose of the hand, which holds the tool, in the flange: the handle lies along -z, and the cup opens along +x."""
 
     position_m: _Vector = [0.0, 0.0, -0.1]
     """Origin; the spoon's handle begins `tool.mount_offset_m` from there, by default at the flange."""

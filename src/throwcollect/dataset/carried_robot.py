@@ -1,4 +1,4 @@
-"""The robot in the directory of a dataset: files of its description, which lie there wherever they came from."""
+"""Copies the files of a described robot into the directory of a dataset, which then needs no other files."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from throwcollect.robots.imported import SRDF, URDF, list_files
 
 
 def write_config(directory: Path, config: Config) -> None:
-    """Write the configuration of a dataset, a model or an export, and the files of its robot beside it."""
+    """Write the configuration of a dataset, and the files of its robot in a directory next to it."""
     carry_robot(config, directory)
     write_file(directory / CONFIG, config_text(config).encode())
 
 
 def config_text(config: Config) -> str:
-    """Write the text of a configuration as it lies in a dataset, beside the files of its robot."""
+    """Write the text of a configuration as a dataset has it, which carries the files of its robot."""
     return dump_yaml(_place_robot(config, Path(ROBOT)))
 
 

@@ -100,6 +100,8 @@ class BodyJoint:
         damping: Viscous friction [Nms/rad or Ns/m].
         friction: Dry friction [Nm or N], which motors overcome.
         mimics: Name of the joint that it follows; empty if it follows none.
+        mimic_factor: Position of this joint over that of the joint that it follows.
+        mimic_offset: Position of this joint while the one that it follows is at 0 [rad or m].
     """
 
     name: str
@@ -112,6 +114,8 @@ class BodyJoint:
     damping: float = 0.0
     friction: float = 0.0
     mimics: str = ""
+    mimic_factor: float = 1.0
+    mimic_offset: float = 0.0
 
     @property
     def moves(self) -> bool:

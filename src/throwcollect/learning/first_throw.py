@@ -43,9 +43,11 @@ _MARGIN_RAD = 0.05
 _WIDEST_RAD, _NARROWEST_RAD = 0.2, 0.05
 _SLOWER = 1.3
 _GRID = 6, 4
+"""Trials along each range, by which the share that lands is estimated."""
 _LEAST_SHARE = 0.94
 _SEED = 1
 _PATIENCE_S = 50.0
+"""Time after which the search goes on with what has landed."""
 _ENOUGH = 12
 """Throws that land, after which the fastest ones are looked at more closely."""
 

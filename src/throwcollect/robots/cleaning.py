@@ -198,16 +198,12 @@ class Cleaning:
         return replace(bare, placement=move_joint(joint, self._find_position(joint)))
 
     def _find_position(self, joint: BodyJoint) -> float:
-        """Find the position of a joint without a controller: as given, or as the joint that it mimics; else about 0."""
+        """Find the position of a joint without a controller: as given, or by the joint that it mimics; else near 0."""
         if joint.name in self._section.fixed:
             return self._section.fixed[joint.name]
-        if joint.mimics in self.urdf.joints and joint.mimics != joint.name:
-            mimic = self._source.find(f"joint[@name='{joint.name}']/mimic")
-            factor, offset = (
-                float((mimic.get(key) if mimic is not None else None) or default)
-                for key, default in (("multiplier", 1), ("offset", 0))
-            )
-            return factor * self._section.fixed.get(joint.mimics, 0.0) + offset
+        if (followed := self.urdf.joints.get(joint.mimics)) is not None:
+            # A joint that mimics one that mimics another would need a chain; no description has that.
+            return joint.mimic_factor * self._find_position(replace(followed, mimics="")) + joint.mimic_offset
         lower, upper, *_ = joint.limits or (0.0, 0.0)
         return min(max(0.0, lower), upper)
 

@@ -45,7 +45,6 @@ class Postures:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self._robot = robot
         self.model = joint_model(robot)
         self.joints = list(self.model.names)[1:]
         self._data = self.model.createData()
@@ -57,6 +56,10 @@ class Postures:
         self.carrying = [joint - 1 for joint in self.model.supports[self.model.frames[self.hand].parentJoint] if joint]
         self.tool = pose_of(robot.tool_pose)
         self.allowed: set[tuple[str, str]] = set()
+        # While a robot is imported, it has no SRDF, and no posture at rest.
+        self._rest = None
+        if robot.srdf_path.is_file():
+            self._rest = np.array([robot.rest_posture[joint] for joint in self.joints])
         self._random = np.random.default_rng(_SEED)
 
     def draw(self) -> NDArray[np.float64]:
@@ -67,11 +70,11 @@ class Postures:
         lower = np.maximum(self.model.lowerPositionLimit, -math.pi)
         upper = np.minimum(self.model.upperPositionLimit, math.pi)
         posture = lower + (upper - lower) * self._random.random(self.model.nq)
-        if self._robot.srdf_path.is_file():
-            rest = np.array([self._robot.rest_posture[joint] for joint in self.joints])
-            rest[self.carrying] = posture[self.carrying]
-            posture = rest
-        return np.asarray(posture)
+        if self._rest is None:
+            return np.asarray(posture)
+        drawn = self._rest.copy()
+        drawn[self.carrying] = posture[self.carrying]
+        return drawn
 
     def find_overlaps(self, posture: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Find the pairs of shapes that overlap in a posture."""

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from throwcollect.config.robot_config import DescribedRobotConfig, RobotConfig
 from throwcollect.members import load_member
 from throwcollect.robots.imported import make_robot
 from throwcollect.robots.importing import import_robot
 from throwcollect.robots.robot import Robot
-
-if TYPE_CHECKING:
-    from throwcollect.config.schema import Config
 
 
 def find_robot(of: RobotConfig | str) -> Robot:
@@ -41,9 +36,3 @@ def complete(of: RobotConfig | str) -> RobotConfig:
         own = {name: getattr(section, name) for name in section.model_fields_set - {"name"}}
         section = member.model_copy(update=own)
     return section if section.sha256 is not None else import_robot(section)
-
-
-def complete_robot(config: Config) -> Config:
-    """Complete the robot of a configuration (see `complete`)."""
-    robot = complete(config.robot)
-    return config if robot is config.robot else config.model_copy(update={"robot": robot})

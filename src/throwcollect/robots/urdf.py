@@ -239,7 +239,10 @@ class _Reader:
                 )
                 if damping < 0 or friction < 0:
                     self._fail(f"joint {name}: damping and friction should not be below 0")
-        mimic = joint.find("mimic")
+        mimic, factor, offset = joint.find("mimic"), 1.0, 0.0
+        if mimic is not None:
+            (factor,) = self._read_numbers(mimic, "multiplier", 1, of=joint, default=[1.0])
+            (offset,) = self._read_numbers(mimic, "offset", 1, of=joint, default=[0.0])
         return BodyJoint(
             name=name,
             kind=kind,
@@ -251,6 +254,8 @@ class _Reader:
             damping=damping,
             friction=friction,
             mimics="" if mimic is None else mimic.get("joint", ""),
+            mimic_factor=factor,
+            mimic_offset=offset,
         )
 
     def _read_limits(self, joint: ElementTree.Element, kind: str) -> tuple[float, float, float, float] | None:

@@ -195,7 +195,7 @@ def test_an_import_that_was_changed_afterwards_is_rejected(tmp_path: Path) -> No
         urdf.write_text(text)
 
 
-@pytest.mark.parametrize(("fixed", "grip", "follow"), [({}, 0.01, 0.003), ({"grip": 0.04}, 0.04, -0.077)])
+@pytest.mark.parametrize(("fixed", "grip", "follow"), [({}, 0.01, -0.017), ({"grip": 0.04}, 0.04, -0.077)])
 def test_joints_without_a_controller_are_fixed_where_they_are_given_or_mimic(
     fixed: dict[str, float], grip: float, follow: float, tmp_path: Path
 ) -> None:

@@ -115,6 +115,11 @@ def test_a_flat_body_has_the_largest_moment_that_there_can_be(tmp_path: Path) ->
             'name="hand_joint" type="continuous"><mimic joint="elbow_joint"/>',
             r"no controller of the arm: hand_joint \(mimics elbow_joint\)",
         ),
+        (
+            'name="hand_joint" type="fixed">',
+            'name="hand_joint" type="fixed"><mimic joint="elbow_joint" multiplier="x"/>',
+            "joint hand_joint: multiplier of <mimic> should be a finite number, is 'x'",
+        ),
     ],
 )
 def test_a_joint_that_cannot_be_commanded_is_refused_with_its_kind(
