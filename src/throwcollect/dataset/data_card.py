@@ -13,18 +13,13 @@ from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.provenance import Provenance
+from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import count_values, find_range
+from throwcollect.sweep.arrow_column import find_range
 from throwcollect.units import unit_of_name
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 _MORE = "1M<n<10M"
-
-
-def count_outcomes(throws: pa.Table) -> dict[str, int]:
-    """Count the trials of each outcome, most frequent first."""
-    counts = count_values(throws["outcome"])
-    return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
 def outcome_lines(throws: pa.Table) -> list[str]:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.journal import measure_collected_s
 from throwcollect.dataset.misses import read_targets, summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.dataset.summary_files import combine_digests
+from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.errors import DatasetError
 from throwcollect.progress_log import log_progress
 from throwcollect.sweep.arrow_column import find_range, find_rows
@@ -67,15 +67,15 @@ def _find_landing_area(throws: pa.Table, success: str) -> Mapping[str, tuple[flo
     return found if len(found) == len(ranges) else None
 
 
-def check_recordings_are_there(directory: Path) -> None:
+def check_recordings_are_there(dataset: Dataset) -> None:
     """Refuse a finished dataset of which recordings are missing; `verify` says whether the others are right."""
-    missing = [name for name in Dataset.open(directory).shards if not (directory / name).exists()]
+    missing = [name for name in dataset.shards if not (dataset.directory / name).exists()]
     if missing:
         raise DatasetError(
             f"{join_names(missing[:_MOST_NAMED])}{' and more' if len(missing) > _MOST_NAMED else ''} "
             f"{'is' if len(missing) == 1 else 'are'} missing",
-            path=directory,
-            hint=f"{command('resume', directory)} collects the trials of missing recordings again",
+            path=dataset.directory,
+            hint=f"{command('resume', dataset.directory)} collects the trials of missing recordings again",
         )
 
 

@@ -17,12 +17,11 @@ from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import find_next_command, read_bag_metadata
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS, list_shards, path_of_part
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws
+from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
 from throwcollect.episode.episode_message import Episode
@@ -156,7 +155,7 @@ class Dataset(Sequence[Throw]):
     @property
     def shards(self) -> tuple[str, ...]:
         """Names of the recordings that its throws are in, in order."""
-        return tuple(sorted(count_values(self.throws["shard"].drop_null())))
+        return tuple(sorted(count_values(self.throws["shard"]).keys() - {None}))
 
     @property
     def topics(self) -> Mapping[str, int]:

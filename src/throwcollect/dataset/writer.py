@@ -18,7 +18,7 @@ import pyarrow as pa
 from throwcollect.config.schema import Config
 from throwcollect.dataset.carried_robot import write_config
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.data_card import count_outcomes, data_card
+from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN
 from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.judging import judge_episode
@@ -35,7 +35,7 @@ from throwcollect.dataset.recovery import (
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.shard_layout import ShardLayout
 from throwcollect.dataset.summary_files import write_description
-from throwcollect.dataset.throws_table import EpisodePlace, Row, RowsByTrial, ThrowsTable
+from throwcollect.dataset.throws_table import EpisodePlace, Row, RowsByTrial, ThrowsTable, count_outcomes
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError

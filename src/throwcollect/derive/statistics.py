@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.episode.record import Samples
 from throwcollect.files import StrPath
 from throwcollect.progress_log import log_progress

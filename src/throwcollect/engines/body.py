@@ -6,9 +6,10 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from throwcollect.engines.mesh import Mesh
+if TYPE_CHECKING:
+    from throwcollect.engines.mesh import Mesh
 
 Vector = tuple[float, float, float]
 

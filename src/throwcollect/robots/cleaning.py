@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import copy
 import hashlib
-import os
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from throwcollect.config.robot_config import ChainConfig, DescribedRobotConfig, LimitsConfig
 from throwcollect.engines.body import BodyJoint, BodyModel, LinkShape, to_text
 from throwcollect.engines.mesh import Mesh
-from throwcollect.errors import ConfigError, Problem
+from throwcollect.errors import ConfigError
 from throwcollect.members import load_member, names_of
-from throwcollect.robots.imported import SRDF, URDF, package_of
+from throwcollect.robots.imported import SRDF, URDF, list_shares, make_error, package_of
 from throwcollect.robots.joint_model import move_joint
 from throwcollect.robots.urdf import PACKAGE, locate_mesh, read_urdf, read_xml
 from throwcollect.wording import suggest
@@ -303,15 +301,3 @@ class Cleaning:
     @property
     def _moving(self) -> set[str]:
         return {name for names in self.controllers.values() for name in names}
-
-
-def list_shares(package: str) -> Iterator[Path]:
-    """List the directories in which ROS has installed a package, by the environment."""
-    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        if prefix and (share := Path(prefix, "share", package)).is_dir():
-            yield share
-
-
-def make_error(key: str, sentence: str, hint: str | None = None) -> ConfigError:
-    """Make the error that a key of the section `robot` is wrong."""
-    return ConfigError([Problem(sentence, f"robot.{key}" if key else "robot")], hint=hint)

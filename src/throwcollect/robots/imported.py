@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import os
+from collections.abc import Iterator
 from functools import lru_cache, partial
 from pathlib import Path
 
 from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.engines.body import Placement
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.robot import Robot
 
 URDF, SRDF = "robot.urdf", "robot.srdf"
@@ -65,8 +67,14 @@ def list_files(directory: Path) -> list[Path]:
 
 def hash_files(directory: Path) -> str:
     """Hash the files of an imported robot with their names; SHA-256, in hexadecimal."""
+    return _hash_files(tuple((path, path.stat().st_size, path.stat().st_mtime_ns) for path in list_files(directory)))
+
+
+# A command hashes the files of its robot when it imports the robot, and when it reads the description.
+@lru_cache(maxsize=16)
+def _hash_files(files: tuple[tuple[Path, int, int], ...]) -> str:
     digest = hashlib.sha256()
-    for path in list_files(directory):
+    for path, _, _ in files:
         content = path.read_bytes()
         digest.update(f"{path.name}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
@@ -85,3 +93,15 @@ def _check_directory(directory: Path, sha256: str | None) -> Path:
             hint="import the robot again, or restore a dataset by throwcollect up CONFIG --resume DIR",
         )
     return directory
+
+
+def list_shares(package: str) -> Iterator[Path]:
+    """List the directories in which ROS has installed a package, by the environment."""
+    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+        if prefix and (share := Path(prefix, "share", package)).is_dir():
+            yield share
+
+
+def make_error(key: str, sentence: str, hint: str | None = None) -> ConfigError:
+    """Make the error that a key of the section `robot` is wrong."""
+    return ConfigError([Problem(sentence, f"robot.{key}" if key else "robot")], hint=hint)

@@ -23,9 +23,7 @@ from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
 from throwcollect.files import suggest_path
-from throwcollect.robots.cleaning import Cleaning, list_shares, make_error
-from throwcollect.robots.derived import derive
-from throwcollect.robots.imported import SRDF, URDF, hash_files, make_robot
+from throwcollect.robots.imported import SRDF, URDF, hash_files, list_shares, make_error, make_robot
 from throwcollect.robots.urdf import PACKAGE, read_xml
 from throwcollect.state_directory import state_directory
 from throwcollect.version import __version__
@@ -111,6 +109,9 @@ def _describe_file(path: Path) -> list[int]:
 
 def _fill(directory: Path, section: DescribedRobotConfig, path: Path) -> None:
     """Write the files of an import; they appear all at once."""
+    from throwcollect.robots.cleaning import Cleaning
+    from throwcollect.robots.derived import derive
+
     made = Cleaning(section, path)
     model = made.clean()
     directory.parent.mkdir(exist_ok=True)

@@ -27,7 +27,6 @@ from throwcollect.engines.body import (
     Placement,
     Vector,
 )
-from throwcollect.engines.mesh import Mesh
 from throwcollect.errors import ConfigError
 
 PACKAGE = "package://"
@@ -179,6 +178,8 @@ class _Reader:
         for collision in link.findall("collision"):
             shape = self.read_shape(collision, of=link)
             if shape.kind == "mesh":
+                from throwcollect.engines.mesh import Mesh
+
                 filename = collision.find("geometry/mesh").get("filename", "")  # type: ignore[union-attr]
                 try:
                     shape = replace(shape, mesh=Mesh(self._find_mesh(filename)))

@@ -26,12 +26,14 @@ if TYPE_CHECKING:
 
 def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Say what a dataset holds."""
-    from throwcollect.dataset.inspect import check_recordings_are_there, info
+    from throwcollect.dataset.inspect import check_recordings_are_there, summary
+    from throwcollect.dataset.reader import Dataset
 
-    found = info(directory)
+    dataset = Dataset.open(directory)
+    found = summary(dataset)
     print_result(asdict(found), describe(found), json=json)
     # The summary needs only the tables, so it is printed even if recordings are missing.
-    check_recordings_are_there(directory)
+    check_recordings_are_there(dataset)
 
 
 def show_digest(directory: DatasetArgument) -> None:
@@ -110,8 +112,6 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
 
 def describe(found: Info) -> str:
     """Put the summary of a dataset into words, one fact a line; a run's summary also says if anybody could join it."""
-    from throwcollect.runs.run_record import Summary
-
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     lines = {
         "trials": f"{found.trials}: {outcomes}{_describe_shortage(found)}",
@@ -129,7 +129,7 @@ def describe(found: Info) -> str:
         lines["took"] = (
             f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, {factor:.1f} x real time, start of the nodes included"
         )
-    if isinstance(found, Summary) and found.open:
+    if getattr(found, "open", False):  # only the summary of a run has it
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
     width = max(map(len, lines))
     return "\n".join(f"{key:{width}}  {text}" for key, text in lines.items())
