@@ -6,6 +6,7 @@ They do the same as for runs of this machine, as far as the queue and the files 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from throwcollect.cli.dataset.info import print_collected
 from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
-from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, find_queued, follow
+from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, follow
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.interruption import count_interruptions
@@ -86,10 +87,10 @@ def end(run: ClusterRun) -> None:
     typer.echo(f"{run.directory}: stopped; the dataset {complete}")
 
 
-def list_queued() -> list[tuple[ClusterRun, SlicesLook]]:
+def list_queued(directories: Iterable[Path]) -> list[tuple[ClusterRun, SlicesLook]]:
     """List the runs in the queue, and how each is; print the error of one whose directory is gone, for example."""
     found = []
-    for directory in find_queued():
+    for directory in directories:
         try:
             run = ClusterRun.open(directory)
             found.append((run, run.look()))

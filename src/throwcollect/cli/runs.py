@@ -33,7 +33,7 @@ def ps(
     json: JsonOption = False,
 ) -> None:
     """List the runs of this machine, with their nodes, and the server."""
-    from throwcollect.cli import cluster_runs
+    from throwcollect.cluster.submission import find_queued
     from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_held_runs
     from throwcollect.serve.finding import SERVER, find_living
@@ -50,12 +50,15 @@ def ps(
     shown.sort(key=lambda run: run.record.started)
     held = find_held_runs()
     unrecorded = [each for run, each in held.items() if run not in ids]
-    server = find_living()
+    queued, server = find_queued(), find_living()
     if json:
         documents = [_make_document(run) for run in shown]
         for runtime, found in unrecorded:
             documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
-        documents += [cluster_runs.make_document(*each) for each in cluster_runs.list_queued()]
+        if queued:
+            from throwcollect.cli.cluster_runs import list_queued, make_document
+
+            documents += [make_document(*each) for each in list_queued(queued)]
         if server is not None:
             documents.append(
                 {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
@@ -65,7 +68,10 @@ def ps(
         return
     rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
-    rows += [(cluster_runs.make_row(*each), []) for each in cluster_runs.list_queued()]
+    if queued:
+        from throwcollect.cli.cluster_runs import list_queued, make_row
+
+        rows += [(make_row(*each), []) for each in list_queued(queued)]
     if server is not None:
         rows.append(((SERVER, "-", "-", "-", f"running at {server.url}, pid {server.pid}", "-"), []))
     for line in _make_table(rows):

@@ -11,14 +11,14 @@ from pathlib import Path
 
 from throwcollect.cluster import slurm
 from throwcollect.cluster.slurm import ArrayTask
-from throwcollect.cluster.submission import CLUSTER, Submission, is_submitted, read_submission
+from throwcollect.cluster.submission import CLUSTER, Submission, find_queued, is_submitted, read_submission
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import JOURNAL, METADATA, PLAN, THROWS
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.slices import find_finished, slice_directory
-from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.errors import Interrupted, ThrowcollectError, WorkerError
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
@@ -246,11 +246,3 @@ def find_cluster_run(named: str | None) -> ClusterRun | None:
         return ClusterRun.open(directory.absolute()) if named and is_submitted(directory) else None
     here = [each for each in find_queued() if each.is_relative_to(Path.cwd())]
     return ClusterRun.open(here[0]) if len(here) == 1 else None
-
-
-def find_queued() -> list[Path]:
-    """Find the directories of this user's submitted datasets that have jobs in the queue; none without Slurm."""
-    try:
-        return [path for path in map(Path, slurm.find_directories()) if is_submitted(path)]
-    except (ConfigError, WorkerError):
-        return []

@@ -87,7 +87,6 @@ def test_a_submission_that_is_gone_does_not_hide_the_others(
             raise ConfigError(f"{directory}: no submission")
         return there
 
-    monkeypatch.setattr(cluster_runs, "find_queued", lambda: [tmp_path / "gone", tmp_path])
     monkeypatch.setattr(cluster_runs, "ClusterRun", SimpleNamespace(open=open_run))
-    assert [run for run, _ in cluster_runs.list_queued()] == [there]
+    assert [run for run, _ in cluster_runs.list_queued([tmp_path / "gone", tmp_path])] == [there]
     assert "gone: no submission" in capsys.readouterr().err
