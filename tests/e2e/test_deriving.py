@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.e2e.collection import collect_here
-from throwcollect.cli.main import app
+from throwcollect.cli.main import assemble
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
@@ -71,7 +71,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
             else:
                 with pytest.MonkeyPatch.context() as patch:
                     patch.chdir(directory)
-                    done = CliRunner().invoke(app, [command, *arguments])
+                    done = CliRunner().invoke(assemble(), [command, *arguments])
                 assert done.exit_code == 0, done.output
     return directory / "datasets"
 

@@ -60,11 +60,6 @@ def make_field(name: str, kind: pa.DataType, description: str, *, unit: str | No
     return pa.field(name, kind, metadata=metadata)
 
 
-def _describe_swept(key: str) -> pa.Field:
-    unit = unit_of_key(key)
-    return make_field(column_of(key), pa.float64(), f"Swept value of {key} [{unit or '-'}].", unit=unit)
-
-
 def ball_state(row: Row, name: str) -> BallState | None:
     """Read the state of the ball at ``release``, ``apex`` or ``landing`` from a row of the table of throws.
 
@@ -134,8 +129,11 @@ class ThrowsTable:
     @cached_property
     def schema(self) -> pa.Schema:
         """The columns with their descriptions; units of swept keys come from the JSON Schema, which takes 40 ms."""
-        number, *others = self.columns
-        return pa.schema([number, *map(_describe_swept, self._parameters), *others[len(self._parameters) :]])
+        schema = self.columns
+        for place, (key, unit) in enumerate(zip(self._parameters, map(unit_of_key, self._parameters), strict=True), 1):
+            text = f"Swept value of {key} [{unit or '-'}]."
+            schema = schema.set(place, make_field(column_of(key), pa.float64(), text, unit=unit))
+        return schema
 
     @classmethod
     def of(cls, plan: Plan) -> ThrowsTable:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from throwcollect.config.robot_config import DescribedRobotConfig, RobotConfig
 from throwcollect.members import load_member
 from throwcollect.robots.imported import make_robot
+from throwcollect.robots.importing import import_robot
 from throwcollect.robots.robot import Robot
 
 
@@ -34,8 +35,4 @@ def complete(of: RobotConfig | str) -> RobotConfig:
             return section
         own = {name: getattr(section, name) for name in section.model_fields_set - {"name"}}
         section = member.model_copy(update=own)
-    if section.sha256 is not None:
-        return section
-    from throwcollect.robots.importing import import_robot
-
-    return import_robot(section)
+    return section if section.sha256 is not None else import_robot(section)

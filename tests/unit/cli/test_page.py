@@ -7,9 +7,9 @@ from typing import Any
 
 import typer
 
-from throwcollect.cli.main import app
+from throwcollect.cli.main import assemble
 
-COMMAND: Any = typer.main.get_command(app)
+COMMAND: Any = typer.main.get_command(assemble())
 PAGE = (Path(__file__).parents[3] / "docs" / "cli.md").read_text(encoding="utf-8")
 
 

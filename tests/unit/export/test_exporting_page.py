@@ -12,7 +12,7 @@ import pytest
 from tests.unit.export.conftest import FORMATS
 from typer.testing import CliRunner
 
-from throwcollect.cli.main import app
+from throwcollect.cli.main import assemble
 from throwcollect.dataset.inspect import info
 
 PAGE = (Path(__file__).parents[3] / "docs" / "exporting.md").read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ def place(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
         for command in COMMANDS:
-            result = CliRunner().invoke(app, command, catch_exceptions=False)
+            result = CliRunner().invoke(assemble(), command, catch_exceptions=False)
             assert result.exit_code == 0, result.output
             assert re.fullmatch(
                 rf"{command[3]}: 4 throws of 6 trials, \d+ samples at \d+ Hz, \d\.\d MB\n", result.stdout
@@ -71,7 +71,7 @@ def test_the_python_example_of_every_exported_card_runs(
 
 def test_export_with_json_prints_a_summary_as_json(source: Path, tmp_path: Path) -> None:
     arguments = ["dataset", "export", str(source), str(tmp_path / "out"), "--to", "npz", "--rate", "25", "--json"]
-    result = CliRunner().invoke(app, arguments, catch_exceptions=False)
+    result = CliRunner().invoke(assemble(), arguments, catch_exceptions=False)
     told = json.loads(result.output)
     assert (told["directory"], told["format"], told["trials"], told["episodes"]) == (str(tmp_path / "out"), "npz", 6, 4)
     assert (told["rate_hz"], told["digest"]) == (25, info(source).digest)

@@ -16,7 +16,7 @@ from tests.unit.export.conftest import FORMATS, MOVING, Export
 from typer.testing import CliRunner
 
 from throwcollect import members
-from throwcollect.cli.main import app
+from throwcollect.cli.main import assemble
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import prepare as prepare_plan
 from throwcollect.coordinator.resume import prepare_or_resume
@@ -67,7 +67,7 @@ def test_an_export_is_taken_for_no_dataset_and_stays_as_it_is(
             freeze(source / "config.yaml", directory)
         assert caught.value.hint == "choose another one with --output"
     for command in ("info", "verify"):
-        done = CliRunner().invoke(app, ["dataset", command, str(directory)])
+        done = CliRunner().invoke(assemble(), ["dataset", command, str(directory)])
         assert (done.exit_code, str(done.exception)) == (1, f"{directory}: holds no dataset")
     assert {path: path.read_bytes() for path in directory.rglob("*") if path.is_file()} == before
     assert list(tmp_path.iterdir()) == []
@@ -209,7 +209,7 @@ def with_csv(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.usefixtures("with_csv")
 def test_an_export_can_use_a_format_of_another_package(source: Path, tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["dataset", "export", str(source), str(tmp_path / "text"), "--to", "csv"])
+    done = CliRunner().invoke(assemble(), ["dataset", "export", str(source), str(tmp_path / "text"), "--to", "csv"])
     assert done.exit_code == 0, done.stderr
     assert "4 throws of 6 trials" in done.stdout
     assert len((tmp_path / "text" / "throws.csv").read_text().splitlines()) == 1 + 6
@@ -229,7 +229,7 @@ def test_an_error_in_a_format_of_another_package_names_the_package(
 
     monkeypatch.setattr(f"csv_export.csv_files.{function}", fail)
     output = tmp_path / "text"
-    done = CliRunner().invoke(app, ["dataset", "export", str(source), str(output), "--to", "csv"])
+    done = CliRunner().invoke(assemble(), ["dataset", "export", str(source), str(output), "--to", "csv"])
     assert isinstance(done.exception, MemberError)
     assert done.exception.message == (
         f"the exporter csv of csv_export 1.0 cannot write {output}: ValueError: no such column"

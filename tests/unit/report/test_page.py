@@ -15,7 +15,7 @@ from plotly.offline import get_plotlyjs
 from tests.unit.report.page_parser import Page
 from typer.testing import CliRunner
 
-from throwcollect.cli.main import dataset_app
+from throwcollect.cli.dataset.commands import dataset_app
 from throwcollect.dataset.directory import METADATA, PROVENANCE
 from throwcollect.dataset.provenance import read_provenance, write_provenance
 from throwcollect.dataset.reader import Dataset

@@ -8,7 +8,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
-from throwcollect.cli.main import dataset_app
+from throwcollect.cli.dataset.commands import dataset_app
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.split import assign
 

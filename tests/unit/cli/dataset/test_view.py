@@ -12,7 +12,7 @@ from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
 from throwcollect.cli.dataset.writing import read_trials
-from throwcollect.cli.main import app
+from throwcollect.cli.main import assemble
 from throwcollect.errors import ConfigError
 
 PAGE = Path(__file__).parents[4] / "docs" / "viewing.md"
@@ -35,7 +35,7 @@ def test_the_page_on_viewing_lists_the_files_and_topics_that_view_writes(
     (command,) = re.findall(r"^throwcollect (dataset view .*)$", page, re.MULTILINE)
     monkeypatch.chdir(tmp_path)
     Collection().collect(tmp_path / "datasets" / "quickstart")
-    result = CliRunner().invoke(app, [*shlex.split(command), "--json"], catch_exceptions=False)
+    result = CliRunner().invoke(assemble(), [*shlex.split(command), "--json"], catch_exceptions=False)
     assert result.exit_code == 0
     found = json.loads(result.stdout)
     assert (found["throws"], found["recording"]) == (4, "views/quick/throws.mcap")
@@ -53,6 +53,8 @@ def test_the_page_on_viewing_lists_the_files_and_topics_that_view_writes(
 def test_view_prints_the_command_that_opens_the_recording(tmp_path: Path) -> None:
     Collection({"trials": 1}).collect(tmp_path / "quick")
     output = tmp_path / "my view"
-    result = CliRunner().invoke(app, ["dataset", "view", str(tmp_path / "quick"), str(output)], catch_exceptions=False)
+    result = CliRunner().invoke(
+        assemble(), ["dataset", "view", str(tmp_path / "quick"), str(output)], catch_exceptions=False
+    )
     assert result.stdout.startswith(f"{output}/throws.mcap: 1 throw, ")
     assert f"ROS_PACKAGE_PATH='{output}' rerun '{output}/throws.mcap'" in result.stdout
