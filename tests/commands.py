@@ -54,7 +54,7 @@ _DECIDES_IMPORTS = ("PYTHON", "LD_", "THROWCOLLECT_ROS", "RMW_", "ROS_", "OPENBL
 _READ_LATER = ("ROS_DOMAIN_ID",)
 """Exceptions of these prefixes: each context reads these variables when it is made."""
 _IMPORTED = ("pinocchio", "pybullet", "pyarrow.parquet")
-_RUNS_WHEN_IMPORTED = "throwcollect.__main__"
+_RUN_WHEN_IMPORTED = ("throwcollect.__main__", "throwcollect.runtimes.fork_server")
 
 
 def command(*arguments: str | Path) -> list[str]:
@@ -293,7 +293,7 @@ def _import_libraries() -> None:
     for name in _IMPORTED:
         importlib.import_module(name)
     for each in pkgutil.walk_packages(throwcollect.__path__, "throwcollect.", onerror=lambda _: None):
-        if each.name != _RUNS_WHEN_IMPORTED:
+        if each.name not in _RUN_WHEN_IMPORTED:
             # A module whose extra is not installed is not needed by the commands of these tests.
             with contextlib.suppress(ImportError):
                 importlib.import_module(each.name)

@@ -72,12 +72,12 @@ class Workers(Generic[_Piece, _Found]):
         # lock.
         context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
         self._doing = doing
-        with _launching():
+        with launching():
             self._pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
 
     def submit(self, pieces: Iterable[_Piece]) -> list[Future[_Found]]:
         """Let the processes do pieces of work, in this order."""
-        with _launching(), warnings.catch_warnings():
+        with launching(), warnings.catch_warnings():
             # From 3.12 on, Python warns about the threads of Arrow and BLAS, which forked processes do not use.
             warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
             return [self._pool.submit(_work, piece) for piece in pieces]
@@ -147,7 +147,7 @@ def working_side_by_side(
 
 
 @contextmanager
-def _launching() -> Iterator[None]:
+def launching() -> Iterator[None]:
     """Let processes that start in the block not import the user's program, which may do its work when it is imported.
 
     Only this process shall see Ctrl-C and then end the others, so these start with the signal blocked.

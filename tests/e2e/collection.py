@@ -91,8 +91,8 @@ class Running:
     directory: Path
 
     def nodes(self) -> list[psutil.Process]:
-        """Nodes of the run: children of the launcher. A new one has the command line of the launcher for a moment."""
-        children = psutil.Process(self.process.pid).children()
+        """Nodes of the run; a new one has the command line of the process from which it is forked for a moment."""
+        children = psutil.Process(self.process.pid).children(recursive=True)
         return [child for child in children if not {"router", "sim", "coordinator"}.isdisjoint(words_of(child))]
 
     def node(self, *words: str) -> psutil.Process:

@@ -229,6 +229,11 @@ def prepare_run(
             volume = None
         directory = run.directory / "data" if volume else request.directory
         is_new = not directory.exists()
+        if config.run.runtime in ("auto", "local"):
+            # What nodes need is imported while this process makes the plan.
+            from throwcollect.runtimes.node_process import begin_imports
+
+            begin_imports()
         plan = plan or _make_plan(request, directory, onlooker)
         # These imports would take long, but making the plan has made them already.
         from throwcollect.coordinator.prepare import describe_plan

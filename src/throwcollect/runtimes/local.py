@@ -5,20 +5,20 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import subprocess
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
+from contextlib import suppress
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
-from throwcollect.interruption import die_with_parent
 from throwcollect.own_process import make_command
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.router_endpoint import format_endpoint, reach_from_here, reserve_port
 from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.node_process import start_process
 from throwcollect.runtimes.nodes import (
     ROUTER,
     NodeExit,
@@ -82,7 +82,7 @@ class LocalNodes(NodeHost):
             self._endpoint = format_endpoint(protocol, reach_from_here(host), port)
         connection = Connection(self._endpoint, place.key, config.run.domain_id, place.middleware)
         self._environment = {**os.environ, **node_environment(connection)}
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._processes: dict[str, BaseProcess] = {}
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
@@ -102,16 +102,11 @@ class LocalNodes(NodeHost):
         if node.name == ROUTER and self._reserved is not None:
             self._reserved.close()
         try:
-            with open(open_log(self.logs.path(node.name)), "ab") as log:
-                self._processes[node.name] = subprocess.Popen(
-                    [*make_command(), *node.arguments],
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    env=self._environment,
-                    start_new_session=True,
-                    preexec_fn=partial(_begin, os.getpid(), node.core),  # noqa: PLW1509 - it calls nothing that takes a lock
-                )
+            log = self.logs.path(node.name)
+            os.close(open_log(log))
+            self._processes[node.name] = start_process(
+                [*make_command(), *node.arguments], self._environment, log, core=node.core
+            )
         except OSError as error:
             raise WorkerError(f"{node.name}: cannot be started: {error}") from error
 
@@ -126,19 +121,23 @@ class LocalNodes(NodeHost):
 
     def exits(self) -> list[NodeExit]:
         """See `NodeHost.exits`."""
-        ended = [(name, code) for name, process in self._processes.items() if (code := process.poll()) is not None]
+        ended = [(name, code) for name, process in self._processes.items() if (code := process.exitcode) is not None]
         for name, _ in ended:
             del self._processes[name]
         return [NodeExit(name, code, describe_end(code), self.logs.tail(name)) for name, code in ended]
 
     def frozen(self) -> frozenset[str]:
         """Names of the nodes that a signal has stopped, and none has continued."""
-        return frozenset(name for name, process in self._processes.items() if _is_stopped(process.pid))
+        return frozenset(
+            name for name, process in self._processes.items() if process.pid is not None and _is_stopped(process.pid)
+        )
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """See `NodeHost.signal`."""
-        if (process := self._processes.get(name)) is not None:
-            process.send_signal(number)
+        process = self._processes.get(name)
+        if process is not None and process.pid is not None and process.exitcode is None:
+            with suppress(ProcessLookupError):
+                os.kill(process.pid, number)
 
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """See `NodeHost.stop`."""
@@ -150,11 +149,10 @@ class LocalNodes(NodeHost):
             process = self._processes.pop(name, None)
             if process is None:
                 continue
-            try:
-                process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
+            process.join(max(0.0, deadline - time.monotonic()))
+            if process.exitcode is None:
                 process.kill()
-                process.wait(_KILLED_S)
+                process.join(_KILLED_S)
 
     def close(self) -> None:
         """End all nodes, the router last, and free its port."""
@@ -164,14 +162,7 @@ class LocalNodes(NodeHost):
         self.stop([ROUTER])
 
 
-def _begin(parent: int, core: int | None) -> None:
-    """Prepare a new process before it runs a node; `parent` is the process id of the launcher."""
-    die_with_parent(parent)
-    if core is not None:
-        os.sched_setaffinity(0, {core})
-
-
-def _is_stopped(pid: int) -> bool:
+def _is_stopped(pid: int | None) -> bool:
     try:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:

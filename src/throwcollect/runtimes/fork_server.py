@@ -1,0 +1,33 @@
+"""Prepares the process that nodes are forked from, when that process imports this module; no other does.
+
+It imports what all nodes need, has a session of its own, which no terminal ends, and ends without taking the
+interpreter apart.
+"""
+
+from __future__ import annotations
+
+import atexit
+import gc
+import importlib
+import os
+
+from throwcollect.own_process import prepare_environment
+from throwcollect.ros.middleware import Middleware
+
+_IMPORTED = (
+    "throwcollect.cli.main",
+    "throwcollect.cli.node_commands",
+    "throwcollect.ros.nodes.coordinator.node",
+    "throwcollect.ros.nodes.simulation.process",
+    "throwcollect.ros.router",
+)
+
+os.setsid()
+prepare_environment()
+Middleware().settle()
+for _name in _IMPORTED:
+    importlib.import_module(_name)
+# The garbage collector does not write to frozen objects, so that forked processes share their memory.
+gc.collect()
+gc.freeze()
+atexit.register(os._exit, 0)
