@@ -100,9 +100,13 @@ class Mesh:
 
 
 def encode(triangles: Triangles) -> bytes:
-    """Encode triangles as binary STL."""
+    """Encode triangles as binary STL, with their normals: some viewers draw a mesh without them in black."""
     records = np.zeros(len(triangles), STL)
     records["corners"] = triangles
+    one, two, three = np.moveaxis(records["corners"].astype(np.float64), 1, 0)
+    normals = np.cross(two - one, three - one)
+    # A triangle without an area has no normal.
+    records["normal"] = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
     return bytes(80) + len(records).to_bytes(4, "little") + records.tobytes()
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from throwcollect.engines.mesh import Mesh
+from throwcollect.engines.mesh import STL, Mesh, encode
 from throwcollect.errors import ConfigError
 
 CORNERS = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 2.5]]], np.float32)
@@ -34,6 +34,12 @@ def test_faces_of_obj_are_split_into_triangles(tmp_path):
         [[0, 0, 0], [1, 0, 0], [1, 1, 0]],
         [[0, 0, 0], [1, 1, 0], [0, 1, 0]],
     ]
+
+
+def test_triangles_are_written_with_their_normals():
+    flat = np.array([[[0, 0, 0], [1, 0, 0], [2, 0, 0]]], np.float32)
+    written = np.frombuffer(encode(np.concatenate([CORNERS, flat])), STL, offset=84)
+    assert written["normal"] == pytest.approx(np.array([[0, 0, 1], [0, -0.832050, 0.554700], [0, 0, 0]]), abs=1e-6)
 
 
 @pytest.mark.parametrize(
