@@ -1,7 +1,7 @@
 """Takes out of an environment what throwcollect never loads: ``python3 slim.py SITE_PACKAGES``.
 
-The rules are those of one application: tests, headers, other robots, file systems in clouds. What they take too much
-shows at the end of the image's build, when a collection runs with what is left.
+The rules are those of one application: tests, headers, robots that are not built in, file systems in clouds. What they
+take too much shows at the end of the image's build, when a collection runs with what is left.
 """
 
 from __future__ import annotations
@@ -90,7 +90,13 @@ KEPT_OF_CMEEL = (
     "cmeel.prefix/lib/python*/site-packages/coal/*",
     "cmeel.prefix/lib/python*/site-packages/eigenpy/*",
     "cmeel.prefix/lib/python*/site-packages/pinocchio/*",
+    # The built-in robots.
+    "cmeel.prefix/share/example-robot-data/robots/panda_description/*",
+    "cmeel.prefix/share/example-robot-data/robots/so_arm_description/*/so101*",
     "cmeel.prefix/share/example-robot-data/robots/talos_data/*",
+    "cmeel.prefix/share/example-robot-data/robots/tiago_description/*",
+    "cmeel.prefix/share/example-robot-data/robots/ur_description/*/ur5*",
+    "cmeel.prefix/share/example-robot-data/robots/xarm_description/*",
 )
 
 ENVIRONMENT = "environment.data/data"

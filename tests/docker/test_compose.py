@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.collection import FAST, collect_here, fingerprints, write_config
+from tests.e2e.collection import CONFIG, FAST, collect_here, fingerprints, write_config
 from throwcollect.runtimes.docker.docker_engine import connect
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
@@ -20,6 +20,8 @@ ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "compose" / "collect.sh"
 DOCUMENT = (ROOT / "docs" / "compose.md").read_text(encoding="utf-8")
 COMMAND = "compose/collect.sh configs/quickstart.yaml 4 dataset"
+_ARM = (ROOT / "configs" / "panda.yaml").read_text(encoding="utf-8").replace("{", "{{").replace("}", "}}")
+PANDA = re.sub(r"^trials: .*", "trials: {trials}", _ARM, flags=re.MULTILINE)
 
 
 PLUGINS = ROOT / "build" / "docker-config"
@@ -72,13 +74,16 @@ def run(environment: dict[str, str], *arguments: str | Path, cwd: Path = ROOT) -
 
 
 @pytest.mark.parametrize(
-    ("environment", "simulations"), [("v2", "1"), ("1.29", "2")], indirect=["environment"], ids=["v2", "1.29"]
+    ("environment", "simulations", "text"),
+    [("v2", "1", PANDA), ("1.29", "2", CONFIG)],
+    indirect=["environment"],
+    ids=["v2-panda", "1.29"],
 )
 def test_compose_collects_the_files_of_one_process(
-    environment: dict[str, str], simulations: str, tmp_path: Path
+    environment: dict[str, str], simulations: str, text: str, tmp_path: Path
 ) -> None:
     """Other tests compare what two and four simulations make on v2."""
-    config = write_config(tmp_path, trials=24, sim=FAST)
+    config = write_config(tmp_path, trials=24, text=text, sim=FAST)
     collect_here(config, tmp_path / "here")
     before = leftovers()
     output = tmp_path / "data"

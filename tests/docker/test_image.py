@@ -70,9 +70,10 @@ def test_the_image_has_no_tools_that_build_or_install(client: DockerClient) -> N
     assert script(client, f"find /opt /build /wheelhouse {kinds} 2>/dev/null; true") == ""
 
 
-def test_talos_is_the_only_robot_of_the_image(client: DockerClient) -> None:
+def test_the_image_has_the_built_in_robots_alone(client: DockerClient) -> None:
     robots = "ls /opt/venv/lib/python3*/site-packages/cmeel.prefix/share/example-robot-data/robots"
-    assert script(client, robots) == "talos_data\n"
+    packages = ("panda_description", "so_arm_description", "talos_data", "tiago_description", "ur_description")
+    assert script(client, robots).split() == [*packages, "xarm_description"]
 
 
 def test_the_image_runs_as_an_ordinary_user_and_declares_no_volume(client: DockerClient) -> None:

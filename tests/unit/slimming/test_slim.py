@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 import struct
 import subprocess
 import sys
 import zipfile
+from importlib.metadata import distribution
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from throwcollect.config.robot_config import DescribedRobotConfig
+from throwcollect.robots.example_robots import PANDA, SO101, TIAGO, UR5, XARM7
 
 ROOT = Path(__file__).parents[3]
 EXTENSION = "pkg/lib.cpython-311-x86_64-linux-gnu.so"
@@ -85,7 +90,7 @@ def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path:
         ("pyarrow/_fs.cpython-311-x86_64-linux-gnu.so", True),
         ("lz4-4.4.5.dist-info/METADATA", True),
         ("cmeel.prefix/share/example-robot-data/robots/talos_data/robots/talos_reduced.urdf", True),
-        ("cmeel.prefix/share/example-robot-data/robots/ur_description/urdf/ur5.urdf", False),
+        ("cmeel.prefix/share/example-robot-data/robots/ur_description/urdf/ur10_robot.urdf", False),
         ("cmeel.prefix/lib/libcoal.so", True),
         ("cmeel.prefix/lib/cmake/coal/coalConfig.cmake", False),
         ("cmeel.prefix/lib/python3.11/site-packages/pinocchio/__init__.py", True),
@@ -110,6 +115,17 @@ def test_a_file_stays_if_a_node_may_load_it(path: str, stays: bool) -> None:
     from slim import is_kept
 
     assert is_kept(path) is stays
+
+
+@pytest.mark.parametrize("robot", [PANDA, UR5, XARM7, TIAGO, SO101], ids=lambda robot: robot.name)
+def test_all_files_of_a_built_in_robot_stay(robot: DescribedRobotConfig) -> None:
+    from slim import is_kept
+
+    urdf = f"example-robot-data/robots/{robot.urdf.removeprefix('example-robot-data:')}"
+    text = Path(str(distribution("example-robot-data").locate_file(f"cmeel.prefix/share/{urdf}"))).read_text()
+    meshes = re.findall(r'"package://([^"]+)"', text)
+    assert meshes
+    assert [path for path in (urdf, *meshes) if not is_kept(f"cmeel.prefix/share/{path}")] == []
 
 
 def test_libraries_that_no_module_reaches_are_superfluous() -> None:
