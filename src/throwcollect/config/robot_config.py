@@ -52,6 +52,11 @@ class RobotConfig(Section):
     motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0
     """Time constant with which motors follow their commands; 0: at once."""
 
+    @property
+    def mount_height_m(self) -> float:
+        """Height of the mount that viewers draw below the base: none, as the robot has feet."""
+        return 0.0
+
     def without_place(self) -> RobotConfig:
         """Make a section that is the same wherever the robot's files lie."""
         return self
@@ -127,6 +132,11 @@ class DescribedRobotConfig(RobotConfig):
     """Joints of controllers that slide: their positions are in m, and their efforts in N. An import finds them."""
     sha256: str | None = None
     """Digest of the files of an imported robot; it is written with a dataset."""
+
+    @property
+    def mount_height_m(self) -> float:
+        """Height of the mount that viewers draw below the base, which is that of an arm."""
+        return self.base_height_m
 
     def without_place(self) -> RobotConfig:
         """Make a section that is the same wherever the robot's files lie."""

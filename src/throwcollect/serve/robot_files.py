@@ -45,12 +45,14 @@ class SceneFacts:
 
     Attributes:
         base_height_m: Height of the robot's fixed base above the ground [m].
+        mount_height_m: Height of the mount below it [m]; 0 if the robot stands on feet of its own.
         landing_height_m: Height of the plane in which throws land [m]; None if that varies.
         target_distance_m: Least and greatest distance from the robot's base at which throws are to land [m]; None
             without such a target.
     """
 
     base_height_m: float
+    mount_height_m: float
     landing_height_m: float | None
     target_distance_m: tuple[float, float] | None
 
@@ -62,6 +64,7 @@ def scene_of(run: Run) -> SceneFacts:
     distance = None if config.sweep.target is None else config.sweep.target.distance_m
     return SceneFacts(
         config.robot.base_height_m,
+        config.robot.mount_height_m,
         None if varies else config.scene.landing_height_m,
         None if distance is None else (distance.min, distance.max),
     )

@@ -24,7 +24,9 @@ from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
 from throwcollect.view.viewer_directory import choose_throws
 
 _OUTWARD = np.array([0.32, -1.0, 0.22])
-"""Direction from the throw to the camera in world: a little in front of the robot, and a little above."""
+"""Direction from a throw along x to the camera: a little in front of the robot, and a little above."""
+_FAR_FLIGHT_M = 0.3
+"""A flight at least this long has a direction."""
 _TANGENT = 0.24
 """Tangent of half the vertical angle of view: small, so that lines hardly converge."""
 _NEAR_M, _FAR_M = 0.1, 100.0
@@ -97,7 +99,8 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     released_s = throw.row.get("release_time_s")
     released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
     with Renderer(robot.urdf_with_files, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA) as renderer:
-        points = [samples.ball_position]
+        # The mount, or the feet, stand at the origin.
+        points = [samples.ball_position, np.zeros((1, 3))]
         for number in shown:
             _place(renderer, joints, samples, number)
             frames = np.array(renderer.find_frames())
@@ -105,7 +108,7 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
         everything = np.concatenate(points)
         # The box around the feet would reach below the ground, where there is nothing to see.
         everything[:, 2] = np.maximum(everything[:, 2], 0)
-        camera = camera_on(everything, _WIDTH / _HEIGHT)
+        camera = camera_on(everything, _WIDTH / _HEIGHT, _find_heading(samples.ball_position[released:]))
         ground = _Ground(camera, everything[:, :2].mean(axis=0))
         pictures = []
         for number in shown:
@@ -121,6 +124,12 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
             picture.paste(body, (0, 0), body)
             pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
     return pictures
+
+
+def _find_heading(flight: NDArray[np.float64]) -> float:
+    """Find the angle from x to the direction of a flight, seen from above [rad]; 0 if it leads nowhere."""
+    x, y, _ = flight[-1] - flight[0] if len(flight) else np.zeros(3)
+    return float(np.arctan2(y, x)) if np.hypot(x, y) >= _FAR_FLIGHT_M else 0.0
 
 
 def _reduce_colours(pictures: list[Any]) -> list[Any]:
@@ -243,12 +252,14 @@ class Camera:
         return np.stack([(1 + right) / 2, (1 - up) / 2], axis=1)
 
 
-def camera_on(points: NDArray[np.float64], aspect: float) -> Camera:
-    """Place the camera as near as possible with all points in its picture.
+def camera_on(points: NDArray[np.float64], aspect: float, heading: float = 0.0) -> Camera:
+    """Place the camera as near as possible with all points in its picture, on the right of a throw.
 
-    The points are in world [m], shape ``(n, 3)``; the aspect is width over height of the picture.
+    The points are in world [m], shape ``(n, 3)``; the aspect is width over height of the picture; the heading is the
+    angle from x to the direction of the throw [rad].
     """
-    back = _OUTWARD / np.linalg.norm(_OUTWARD)
+    cos, sin = np.cos(heading), np.sin(heading)
+    back = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ _OUTWARD / np.linalg.norm(_OUTWARD)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
     # From here on the places are in the frame of the camera, whose third axis points backwards.

@@ -24,6 +24,8 @@ BALL_RGBA: Rgba = (1.0, 0.45, 0.0, 1.0)
 
 _TOOL_RGBA: Rgba = (0.55, 0.35, 0.2, 1.0)
 _DEFAULT_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
+_MOUNT_RGBA: Rgba = (0.55, 0.56, 0.59, 1.0)
+_MOUNT_RADIUS_M = 0.08
 
 
 @dataclass(frozen=True)
@@ -93,12 +95,13 @@ class DrawnRobot:
 
 
 def draw_robot_of(config: Config) -> DrawnRobot:
-    """Read the robot with its tool as viewers draw it."""
-    return read_drawn_robot(full_description(config), tool_of(config).link, robot_of(config).locate)
+    """Read the robot with its tool and its mount as viewers draw it."""
+    description, mount_m = full_description(config), config.robot.mount_height_m
+    return read_drawn_robot(description, tool_of(config).link, robot_of(config).locate, mount_m)
 
 
-def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path]) -> DrawnRobot:
-    """Read a URDF text as viewers draw it; the link of the tool has a colour of its own."""
+def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path], mount_m: float = 0.0) -> DrawnRobot:
+    """Read a URDF text as viewers draw it, on a column of that height; the link of the tool has a colour of its own."""
     try:
         robot = parse_xml(description, "robot description")
         for link in robot.iter("link"):
@@ -109,6 +112,9 @@ def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path])
                     for material in shape.findall("material"):
                         shape.remove(material)
                     shape.append(_make_material("tool", _TOOL_RGBA))
+        if mount_m > 0:
+            children = {joint.attrib["link"] for joint in robot.iterfind("joint/child")}
+            next(link for link in robot.iter("link") if link.get("name") not in children).append(_make_mount(mount_m))
         # A material may be defined at one place of a URDF, and only named at others.
         colors = {name: rgba for each in robot.iter("material") for name, rgba in _read_color(each).items() if name}
         shapes = tuple(
@@ -127,6 +133,16 @@ def ball_urdf(ball: BallConfig) -> str:
     ElementTree.SubElement(geometry, "sphere", radius=repr(ball.radius_m))
     shape.append(_make_material(BALL, BALL_RGBA))
     return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _make_mount(height_m: float) -> ElementTree.Element:
+    """Make the column from the ground to the base."""
+    shape = ElementTree.Element("visual")
+    ElementTree.SubElement(shape, "origin", xyz=f"0 0 {-height_m / 2!r}")
+    geometry = ElementTree.SubElement(shape, "geometry")
+    ElementTree.SubElement(geometry, "cylinder", radius=repr(_MOUNT_RADIUS_M), length=repr(height_m))
+    shape.append(_make_material("mount", _MOUNT_RGBA))
+    return shape
 
 
 def _make_material(name: str, rgba: Rgba) -> ElementTree.Element:

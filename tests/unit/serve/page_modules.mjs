@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { pathToFileURL } from "node:url";
 
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
-const { ballAt, decodeThrow, jointsAt, seriesOf } = await load("throws.js");
+const { ballAt, decodeThrow, jointsAt, seriesOf, widestJoint } = await load("throws.js");
 const { Playback } = await load("playback.js");
 const { inOrder, lives, steps, watchable } = await load("state.js");
 const { readChanges } = await load("controls.js");
@@ -54,6 +54,12 @@ test("velocities come from positions, and there is no series of efforts", () => 
   assert.deepEqual([...seriesOf(thrown(), "ball", "z")], [2, 3, 4]);
   assert.equal(seriesOf(thrown(), "effort", "wrist"), null);
   assert.equal(seriesOf(thrown(), "position", "knee"), null);
+});
+
+test("the widest joint is the one that moves most, not the one with the largest positions", () => {
+  const positions = Float32Array.from([0, 10, 0.5, 10.1, 1, 10.2]);
+  assert.equal(widestJoint({ ...thrown(), positions }), "elbow");
+  assert.equal(widestJoint({ ...thrown(), positions: positions.map((each, i) => each * (i % 2 ? 9 : 1)) }), "wrist");
 });
 
 test("a newer throw waits for the end of the one that is shown", () => {

@@ -14,6 +14,7 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.carried_robot import write_config
 from throwcollect.robots.talos import TALOS
 
+CONFIGS = Path(__file__).parents[3] / "configs"
 URL = "/api/v1/instances"
 
 
@@ -26,14 +27,17 @@ def test_the_scene_has_its_heights_and_the_range_of_targets(
     directory.mkdir(parents=True)
     text = "name: a\ntrials: 3\nrobot: {base_height_m: 1.1}\nscene: {landing_height_m: 0.4}\n"
     (directory / "config.yaml").write_text(text)
-    known = {"base_height_m": 1.1, "landing_height_m": 0.4, "target_distance_m": None}
+    known = {"base_height_m": 1.1, "mount_height_m": 0, "landing_height_m": 0.4, "target_distance_m": None}
     assert client.get(f"{URL}/a/scene").json() == known
     (directory / "config.yaml").write_text(f"""{text}sweep:
   parameters: {{scene.landing_height_m: {{min: 0.1, max: 0.5}}, task.duration_s: {{min: 0.9, max: 1.2}}}}
   target: {{distance_m: {{min: 0.5, max: 2.5, bins: 4}}}}
 """)
-    aimed = {"base_height_m": 1.1, "landing_height_m": None, "target_distance_m": [0.5, 2.5]}
+    aimed = {"base_height_m": 1.1, "mount_height_m": 0, "landing_height_m": None, "target_distance_m": [0.5, 2.5]}
     assert client.get(f"{URL}/a/scene").json() == aimed
+    (directory / "config.yaml").write_text((CONFIGS / "panda.yaml").read_text())
+    arm = {"base_height_m": 0.8, "mount_height_m": 0.8, "landing_height_m": 0.0, "target_distance_m": None}
+    assert client.get(f"{URL}/a/scene").json() == arm
 
 
 def test_meshes_can_be_fetched_by_digest_and_cached_for_ever(

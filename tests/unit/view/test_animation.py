@@ -66,6 +66,14 @@ def test_the_camera_sees_all_points_and_stands_no_farther_than_needed() -> None:
     assert min(shares.min(), 1 - shares.max()) == pytest.approx(0.06)
 
 
+@pytest.mark.parametrize("heading", [-1.0, 0.0, 1.5, 3.0])
+def test_a_throw_leads_to_the_right_of_the_picture_wherever_it_goes(heading: float) -> None:
+    away = np.array([np.cos(heading), np.sin(heading), 0.0])
+    path = np.linspace(0, 1, 20)[:, np.newaxis] * away + [0, 0, 1]
+    (left, _), *_, (right, _) = camera_on(path, 1.6, heading).project(path)
+    assert right - left == pytest.approx(0.88)
+
+
 def test_an_unknown_trial_or_kind_of_picture_is_an_error(collected: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no trial 7"):
         render(collected, tmp_path / "throw.webp", trial=7)

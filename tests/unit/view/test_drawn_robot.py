@@ -32,6 +32,13 @@ def test_a_sphere_is_drawn_with_its_diameter(snowman: DrawnRobot) -> None:
     assert (nose.type, nose.mesh_resource) == (nose.MESH_RESOURCE, "data:model/stl;base64,c29saWQgbm9zZQ==")
 
 
+def test_an_arm_stands_on_a_column_that_reaches_the_ground() -> None:
+    joint = '<joint name="neck" type="fixed"><parent link="nose"/><child link="head"/></joint></robot>'
+    drawn = read_drawn_robot(URDF.replace("</robot>", joint), "none", Path, 0.8)
+    (mount,) = (shape for shape in drawn.shapes if shape.kind == "cylinder")
+    assert (mount.link, mount.position, mount.size[2]) == ("nose", (0, 0, -0.4), 0.8)
+
+
 def test_a_package_without_a_name_gets_that_of_its_directory(snowman: DrawnRobot, tmp_path: Path) -> None:
     snowman.copy_package(tmp_path / "view")
     assert (tmp_path / "view" / "snow" / "meshes" / "nose.stl").read_bytes() == b"solid nose"

@@ -2,9 +2,8 @@
 
 import { get, setChoices } from "./dom.js";
 import { PlotPanel } from "./plot_panel.js";
+import { widestJoint } from "./throws.js";
 import { readTooltips } from "./tooltips.js";
-
-const DEFAULT_JOINT = "arm_right_4_joint";
 
 /** All plots, and the dialog that adds one. */
 export class Plots {
@@ -78,9 +77,10 @@ export class Plots {
     const robot = this.#robot();
     const isBall = get("plot-field").value === "ball";
     const names = isBall ? ["x", "y", "z"] : (robot?.joints ?? []);
-    const isFirst = get("plot-name").options.length === 0;
+    const before = get("plot-name").value;
     setChoices(get("plot-name"), names.map((name) => [name, name]));
-    if (isFirst && names.includes(DEFAULT_JOINT)) get("plot-name").value = DEFAULT_JOINT;
+    const shown = this.playback.at(get("plot-simulation").value)?.shown;
+    if (!isBall && shown && !names.includes(before)) get("plot-name").value = widestJoint(shown);
     setChoices(get("plot-link"), (robot?.links ?? []).map((name) => [name, name]));
     this.#bind();
   }

@@ -1,6 +1,6 @@
 /** Robots from their descriptions; each mesh is fetched once for all robots. */
 
-import { Group, Mesh, Vector3 } from "./vendor/three/build/three.module.js";
+import { CylinderGeometry, Group, Mesh, MeshLambertMaterial, Vector3 } from "./vendor/three/build/three.module.js";
 import { ColladaLoader } from "./vendor/three/examples/jsm/loaders/ColladaLoader.js";
 import { OBJLoader } from "./vendor/three/examples/jsm/loaders/OBJLoader.js";
 import { STLLoader } from "./vendor/three/examples/jsm/loaders/STLLoader.js";
@@ -8,6 +8,8 @@ import URDFLoader from "./vendor/urdf-loader/src/URDFLoader.js";
 import { coarsen } from "./coarse.js";
 
 const PACKAGE = "package://";
+const MOUNT_RADIUS_M = 0.08;
+const MOUNT_COLOR = "#8c9096";
 /** Edges of the cubes that merge vertices, as shares of a mesh's size; the first edge that gives few triangles is used. */
 const SHARES = [1 / 32, 1 / 24, 1 / 16, 1 / 12];
 const FEW_TRIANGLES = 1200;
@@ -83,6 +85,14 @@ function parse(path, bytes) {
   throw new Error(`${path}: neither STL nor Collada nor OBJ`);
 }
 
+/** A column from the ground to the base. */
+function makeMount(height) {
+  const shape = new CylinderGeometry(MOUNT_RADIUS_M, MOUNT_RADIUS_M, height).rotateX(Math.PI / 2);
+  const mount = new Mesh(shape, new MeshLambertMaterial({ color: MOUNT_COLOR }));
+  mount.position.z = -height / 2;
+  return mount;
+}
+
 /** A robot whose base is fixed above the origin. */
 export class Robot {
   object = new Group();
@@ -94,15 +104,16 @@ export class Robot {
 
   /**
    * @param {string} urdf description
-   * @param {number} baseHeight of the base above the ground [m]
+   * @param {{base_height_m: number, mount_height_m: number}} scene heights of the base above the ground, and of the mount below it
    * @param {Meshes} meshes
    * @param {() => void} changed called when there is something new to draw
    * @param {(error: Error) => void} failed called for each mesh that cannot be fetched
    * @throws {Error} if the description cannot be read
    */
-  constructor(urdf, baseHeight, meshes, changed, failed) {
+  constructor(urdf, scene, meshes, changed, failed) {
     this.urdf = urdf;
-    this.object.position.z = baseHeight;
+    this.object.position.z = scene.base_height_m;
+    if (scene.mount_height_m > 0) this.object.add(makeMount(scene.mount_height_m));
     const loader = new URDFLoader();
     loader.packages = (name) => PACKAGE + name;
     loader.parseCollision = false;
@@ -194,7 +205,7 @@ export class Robot {
   /** Free the geometries that no other robot shares. */
   dispose() {
     this.object.removeFromParent();
-    this.#robot.traverse((part) => {
+    this.object.traverse((part) => {
       if (part.isMesh && !COARSE.has(part.geometry) && !FINE.has(part.geometry)) part.geometry.dispose();
     });
   }

@@ -85,3 +85,15 @@ export function seriesOf(shown, field, name) {
     return to > from ? ((series[to] - series[from]) * shown.rate_hz) / (to - from) : 0;
   });
 }
+
+/**
+ * @param {Throw} shown
+ * @returns {string} the joint that moves most: whose greatest and least position differ most
+ */
+export function widestJoint(shown) {
+  const ranges = shown.joints.map((joint) => {
+    const series = seriesOf(shown, "position", joint);
+    return Math.max(...series) - Math.min(...series);
+  });
+  return shown.joints[ranges.indexOf(Math.max(...ranges))];
+}

@@ -62,7 +62,7 @@ export class Watching {
     const station = this.view.stations.get(name);
     if (!station || !this.#scene || station.robot?.urdf === urdf) return;
     try {
-      station.setRobot(new Robot(urdf, this.#scene.base_height_m, this.meshes, () => this.view.touch(), ({ message }) => this.tell(`a mesh is missing: ${message}`)));
+      station.setRobot(new Robot(urdf, this.#scene, this.meshes, () => this.view.touch(), ({ message }) => this.tell(`a mesh is missing: ${message}`)));
       this.described(name, urdf);
     } catch (error) {
       this.tell(`the robot's description cannot be drawn: ${error.message}`);
