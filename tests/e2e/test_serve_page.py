@@ -72,6 +72,10 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert tab.evaluate("document.querySelector('#play').textContent") == "Play"
         tab.evaluate("throwcollect.playback.seek(0); document.querySelector('#play').click()")
         tab.wait_for("document.querySelector('#scrub').value > 0.2")
+        # A plot is offered first for the joint that moves most.
+        tab.evaluate("document.querySelector('#add-plot').click()")
+        assert tab.evaluate("document.querySelector('#plot-name').value") == "arm_right_4_joint"
+        tab.evaluate("document.querySelector('#plot-dialog').close()")
         # All landings are on the map, whether their throws were shown or not.
         tab.wait_for("document.querySelector('#map-text').textContent.includes('landings so far')")
         # Each plot of a description is shown once, even if it comes twice; entries that cannot be plotted are left out.
