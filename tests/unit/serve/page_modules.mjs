@@ -134,6 +134,8 @@ test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp"
   const box = coarsen(new BoxGeometry(1, 1, 1), 0.4);
   assert.equal(box.index.count, 36);
   assert.ok(box.getAttribute("position").count > 8);
+  // Each side of a box has a material of its own.
+  assert.deepEqual(box.groups.map(({ start, count, materialIndex }) => [start, count, materialIndex]), [0, 1, 2, 3, 4, 5].map((side) => [6 * side, 6, side]));
 });
 
 test("a run counts as living while it is planning, starting or running", () => {

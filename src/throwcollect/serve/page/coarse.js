@@ -54,14 +54,19 @@ export function coarsen(geometry, edge) {
   const index = geometry.getIndex();
   const count = index ? index.count : position.count;
   const triangles = [];
-  for (let i = 0; i < count; i += 3) {
-    const [a, b, c] = [i, i + 1, i + 2].map((at) => (index ? index.getX(at) : at));
-    if (cubeOf[a] !== cubeOf[b] && cubeOf[b] !== cubeOf[c] && cubeOf[c] !== cubeOf[a]) {
-      triangles.push(cornerOf[a], cornerOf[b], cornerOf[c]);
+  const coarse = new BufferGeometry();
+  // A mesh with several materials draws its groups of triangles alone.
+  for (const group of geometry.groups.length ? geometry.groups : [{ start: 0, count }]) {
+    const start = triangles.length;
+    for (let i = group.start; i < group.start + group.count; i += 3) {
+      const [a, b, c] = [i, i + 1, i + 2].map((at) => (index ? index.getX(at) : at));
+      if (cubeOf[a] !== cubeOf[b] && cubeOf[b] !== cubeOf[c] && cubeOf[c] !== cubeOf[a]) {
+        triangles.push(cornerOf[a], cornerOf[b], cornerOf[c]);
+      }
     }
+    coarse.addGroup(start, triangles.length - start, group.materialIndex);
   }
   const places = cubeOfCorner.flatMap((cube) => sums[cube].slice(0, 3).map((sum) => sum / sums[cube][3]));
-  const coarse = new BufferGeometry();
   coarse.setAttribute("position", new BufferAttribute(Float32Array.from(places), 3));
   coarse.setAttribute("normal", new BufferAttribute(Float32Array.from(normals.flat()), 3));
   coarse.normalizeNormals();
