@@ -252,7 +252,8 @@ function drawGrid(pen, style, at, scale, { width, height }) {
   });
   lines(height, bottom, (value, y) => {
     stroke(pen, [0, y], [width, y]);
-    pen.fillText(`${(-value).toFixed(1)} m`, 3, y - 3);
+    // The other axis has its numbers at the bottom.
+    if (y < height - 14) pen.fillText(`${(-value).toFixed(1)} m`, 3, y - 3);
   });
 }
 
