@@ -57,20 +57,27 @@ class Mesh:
             raise ConfigError(f"{path}: coordinates beyond {_LARGEST_COORDINATE:g}")
         return triangles
 
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """Different corners in the order of their coordinates, shape ``(n_corners, 3)``, in the units of the file."""
+        corners = self.triangles.reshape(-1, 3)
+        # Sorting columns is several times as fast as `np.unique`, which sorts rows.
+        corners = corners[np.lexsort(corners.T[::-1])]
+        changes = (corners[1:] != corners[:-1]).any(axis=1)
+        return corners[np.concatenate([[True], changes])].astype(np.float64)
+
     @property
     def is_flat(self) -> bool:
         """Whether all corners lie in one plane, so that the mesh has no inside."""
-        corners = self.triangles.reshape(-1, 3).astype(np.float64)
-        extents = np.linalg.svd(np.unique(corners - corners.mean(axis=0), axis=0), compute_uv=False)
+        extents = np.linalg.svd(self.corners - self.corners.mean(axis=0), compute_uv=False)
         return bool(len(extents) < 3 or extents[2] <= _LEAST_THICKNESS * extents[0])
 
     def find_hull(self, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> pinocchio.coal.CollisionGeometry:
         """Compute the convex hull, as which the mesh collides in every engine, with coordinates times these factors."""
         if self.is_flat:
             raise ConfigError(f"{self.path}: the mesh is flat, so nothing can collide with it")
-        corners = self.triangles.reshape(-1, 3).astype(np.float64) * scale
         points = pinocchio.coal.StdVec_Vec3s()
-        points.extend(list(np.unique(corners, axis=0)))
+        points.extend(list(self.corners * scale))
         try:
             return pinocchio.coal.Convex.convexHull(points, True, "Qt")
         except RuntimeError as error:
