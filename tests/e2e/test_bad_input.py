@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.commands import command
+from tests.commands import command, start_command
 from tests.e2e.collection import FAST, INPROCESS, call, call_here, collect_here, write_config
 from tests.restrictions import Restrictions
 from throwcollect.runs.records import Records
@@ -281,15 +281,13 @@ def test_a_closed_output_pipe_is_no_error(arguments: list[str], small: Path) -> 
 def test_a_collection_goes_on_when_its_output_pipe_is_closed(lost: str, small: Path, tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    collecting = subprocess.run(
-        command("up", *(("-n", "1") if lost == "both" else INPROCESS), small, "--output", tmp_path / "data"),
-        stdin=subprocess.DEVNULL,
+    collecting = start_command(
+        *("up", *(("-n", "1") if lost == "both" else INPROCESS), small, "--output", tmp_path / "data"),
         stdout=writing if lost == "both" else subprocess.PIPE,
         stderr=writing,
-        timeout=60,
-        check=False,
     )
     os.close(writing)
+    collecting.communicate(timeout=60)
     assert collecting.returncode == (6 if lost == "both" else 0)
     (run,) = [run for run in Records().all() if run.record.directory == str(tmp_path / "data")]
     assert (run.record.exit_code, run.record.failure) == (0, None)

@@ -20,7 +20,7 @@ def test_the_project_comes_with_the_known_configurations() -> None:
 
 @pytest.mark.parametrize("config", CONFIGS, ids=lambda path: path.stem)
 def test_a_configuration_is_collected_and_verified(config: Path, tmp_path: Path) -> None:
-    trials = WHOLE.get(config.stem, 3)
+    trials = WHOLE.get(config.stem, 2)
     options = [] if config.stem in WHOLE else ["--trials", str(trials)]
     summary = collect_here(config, tmp_path / "data", "--set", "run.replay=0", *options)
     assert summary["trials"] == trials

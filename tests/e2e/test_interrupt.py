@@ -20,7 +20,6 @@ from tests.e2e.collection import (
     FAST,
     INPROCESS,
     Running,
-    call,
     call_here,
     collect_here,
     fingerprints,
@@ -230,7 +229,7 @@ def test_resuming_after_a_power_cut_keeps_the_episodes_on_the_disk(
     os.truncate(part, part.stat().st_size * 2 // 3)
     kept = len(episodes(part, cut=True))
     os.truncate(tmp_path / "data" / "plan.parquet", 100)
-    said = call("resume", tmp_path / "data", "-n", "2", "--runtime", "local")
+    said = call_here("resume", tmp_path / "data", *INPROCESS)
     assert said.returncode == 0, said.stderr
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
     assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") == kept > 0

@@ -102,10 +102,6 @@ def flip_bit(path: Path) -> None:
     flip(path, path.stat().st_size * 2 // 3)
 
 
-def flip_early(path: Path) -> None:
-    flip(path, path.stat().st_size // 10)
-
-
 def flip_end(path: Path) -> None:
     flip(path, path.stat().st_size - 10)
 
@@ -130,7 +126,7 @@ def rename_to_part(path: Path) -> None:
     path.rename(path.with_name(f"{path.name}.part"))
 
 
-WAYS = (delete, empty, cut, extend, flip_bit, flip_early, flip_end)
+WAYS = (delete, empty, cut, flip_bit)
 TABLES = ("throws.parquet", "plan.parquet", "datapackage.json", "metadata.yaml")
 DAMAGE = [
     *((name, way, ALL) for name in TABLES for way in WAYS),

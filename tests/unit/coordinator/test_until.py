@@ -113,7 +113,7 @@ def test_it_ends_with_the_trial_at_which_enough_have_landed(undisturbed: Path) -
     assert verify(undisturbed) == []
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_it_is_the_same_for_any_simulations_order_kills_and_losses(
     deliver: Deliver, undisturbed: Path, tmp_path: Path, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -76,7 +76,7 @@ def test_the_long_throw_is_refused_for_the_effort_that_saturated_in_the_physics(
 
 def test_random_throws_from_the_recommended_sweep_box_are_feasible(reason):
     draw = np.random.default_rng(0)
-    for _ in range(200):
+    for _ in range(50):
         elbow, wrist, duration_s, gamma = draw.uniform([-0.95, 0.1, 0.9, 0.95], [-0.25, 0.5, 1.3, 1.3])
         config = throw({"arm_right_4_joint": elbow, "arm_right_7_joint": wrist}, duration_s=duration_s, gamma=gamma)
         assert reason(config) is None
@@ -206,7 +206,7 @@ def test_the_clearance_check_agrees_with_the_distances_of_all_pairs():
     data, shapes = model.createData(), geometry.createData()
     draw, limits = np.random.default_rng(1), joint_limits(TALOS)
     found = 0
-    for _ in range(120):
+    for _ in range(60):
         configuration = pinocchio.neutral(model)
         for joint in ("torso_1_joint", *(f"arm_right_{number}_joint" for number in range(1, 8))):
             column = JOINTS.index(joint)
@@ -232,7 +232,7 @@ class Unknowing:
 
 
 def test_skipping_postures_near_clear_ones_misses_no_approach():
-    """6,000 postures, many of which collide: the result is that of a check of all links in every posture."""
+    """2,400 postures, many of which collide: the result is that of a check of all links in every posture."""
     model = joint_model(TALOS)
     quick, thorough = (Clearance(TALOS, model, tool_of(Config())) for _ in range(2))
     thorough._clear = [Unknowing()]
@@ -241,7 +241,7 @@ def test_skipping_postures_near_clear_ones_misses_no_approach():
     columns = [JOINTS.index(joint) for joint in ("torso_1_joint", *(f"arm_right_{n}_joint" for n in range(1, 8)))]
     order = [JOINTS.index(name) for name in list(model.names)[1:]]
     approaches = []
-    for number in range(200):
+    for number in range(80):
         # The same few joints again and again, as in a sweep, or all of them at random.
         moved = columns if number % 4 == 0 else [columns[1], columns[2], columns[4]]
         goal = draw.uniform(limits.lower[moved], limits.upper[moved])
@@ -257,7 +257,7 @@ def test_dynamics_of_only_the_free_joints_give_the_same_refusals():
     whole._dynamics_of_free_joints = lambda _: whole._dynamics
     draw = np.random.default_rng(3)
     reasons = []
-    for _ in range(150):
+    for _ in range(60):
         elbow, wrist, duration_s, gamma = draw.uniform([-0.5, 0.4, 0.85, 1.0], [-0.2, 0.6, 1.0, 1.3])
         config = throw(
             {"arm_right_4_joint": elbow, "arm_right_7_joint": wrist},

@@ -54,21 +54,16 @@ EQUAL = [
     "asr_twodof_description/urdf/TwoDofs",
     "b1_description/urdf/b1",
     "bolt_description/robots/bolt",
-    "borinot_description/urdf/borinot_flying_arm_2",
     "double_pendulum_description/urdf/double_pendulum",
     "finger_edu_description/robots/finger_edu",
     "go1_description/urdf/go1",
-    "go2_description/urdf/go2",
     "hextilt_description/urdf/hextilt_flying_arm_5",
     "hyq_description/robots/hyq_no_sensors",
     "iris_description/robots/iris",
-    "laikago_description/urdf/laikago",
-    "quadruped_description/urdf/quadruped",
     "simple_humanoid_description/urdf/simple_humanoid",
     "solo_description/robots/solo",
     "talos_data/robots/talos_left_arm",
     "ur_description/urdf/ur5_robot",
-    "xarm_description/urdf/xarm7",
 ]
 
 

@@ -38,7 +38,7 @@ def test_without_weights_a_dmp_is_a_critically_damped_spring():
 
 
 @pytest.mark.parametrize("alpha_z", [10.0, 48.0, 200.0])
-@pytest.mark.parametrize(("count", "tau"), [(2, 0.1), (20, 3.0), (300, 1.0)])
+@pytest.mark.parametrize(("count", "tau"), [(2, 0.1), (100, 3.0)])
 def test_a_finer_step_does_not_move_the_curve(count, tau, alpha_z):
     family = DynamicMovementPrimitive(family="dmp", basis_functions=count, alpha_z=alpha_z)
     # Weights that bend the path by about a radian.
