@@ -19,7 +19,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 
 .PHONY: up ros dist test test-fast \
-    test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client wait-for-image test-containers \
+    test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client wait-for-image wait-for-cluster test-containers \
     test-image test-processes test-cluster image sif sif-without-engine \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
@@ -85,7 +85,7 @@ test-fast: $(READY_DEV)
 
 # What waits for others is run beside what computes, and each group begins as soon as it can, so that both cores always have something
 # to do. Tests of containers take longest, one by one, so they begin as soon as there is an image; next come those of processes, which
-# take nearly as long. Continuous integration makes the image meanwhile, and names the process that does.
+# take nearly as long. Continuous integration makes the image and then the cluster meanwhile, and names the processes that do.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
@@ -111,8 +111,10 @@ test-units-of-nodes:
 	$(BIN)/python -m pytest tests/unit tests/install tests/rclzenoh tests/contract tests/physics \
 	    $(addprefix --ignore=,$(DATA) $(FACES))
 
-wait-for-image:
-	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
+wait-for-image: MAKER = $(MAKES_IMAGE)
+wait-for-cluster: MAKER = $(MAKES_CLUSTER)
+wait-for-image wait-for-cluster:
+	@while [ -n "$(MAKER)" ] && kill -0 $(MAKER) 2> /dev/null; do sleep 1; done
 
 # These tests of genuine ROS 2 need an engine, too.
 WITH_ENGINE := tests/ros/test_containers.py
@@ -137,7 +139,7 @@ test-processes: wait-for-image
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
-test-cluster: wait-for-image
+test-cluster: wait-for-cluster
 	$(BIN)/python -m pytest tests/cluster
 
 # Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.

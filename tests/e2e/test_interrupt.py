@@ -28,7 +28,6 @@ from tests.e2e.collection import (
     words_of,
     write_config,
 )
-from throwcollect.interruption import stop_signals
 
 pytestmark = pytest.mark.e2e
 TRIALS = 16
@@ -127,21 +126,13 @@ def test_ctrl_c_before_any_simulation_is_ready_ends_the_run_and_its_nodes(
     assert_gone(nodes)
 
 
-_HANGUP = pytest.param(
-    signal.SIGHUP,
-    0.7,
-    marks=pytest.mark.skipif(signal.SIGHUP not in stop_signals(), reason="SIGHUP is ignored here, as below nohup"),
-)
-
-
-@pytest.mark.parametrize(("number", "share"), [(signal.SIGINT, 0.3), _HANGUP])
 def test_an_interruption_finishes_the_running_trials(
-    number: signal.Signals, share: float, config: Path, reference: Path, tmp_path: Path, started: list[Running]
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
-    in_the_middle(running, share, whole=reference)
+    in_the_middle(running, whole=reference)
     before = running.count_bytes()
-    running.process.send_signal(number)
+    running.process.send_signal(signal.SIGINT)
     code, out, err = running.finish()
     assert (code, out) == (130, "")
     assert "interrupted: finishing the running trials; once more ends at once" in err

@@ -221,7 +221,7 @@ def test_a_killed_launcher_ends_its_nodes_and_commands_report_its_death(
 
 
 def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, records: Records, tmp_path: Path) -> None:
-    running = start(config, tmp_path / "data", 2, *UNTIL_STOPPED)
+    running = start(config, tmp_path / "data", 1, *UNTIL_STOPPED)
     running.wait_until(lambda: bool(records.ids()))
     (run,) = records.ids()
     in_the_middle(records, run)
@@ -244,7 +244,6 @@ def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, re
         [run, "local"],
         ["router", "running"],
         ["sim_0", "running"],
-        ["sim_1", "running"],
         ["coordinator", "running"],
     ]
     assert call_here("stop").returncode == 0
@@ -286,7 +285,7 @@ def test_ps_lists_the_server_that_view_begins_and_stop_ends_it_if_no_run_lives(
     assert listed == {"run": "server", "kind": "server", "status": "running", "url": viewed, "pid": listed["pid"]}
     row = ("server", "-", "-", "-", "running", "at", f"{viewed},", "pid", str(listed["pid"]), "-")
     assert tuple(say("ps")[1].splitlines()[1].split()) == row
-    run = detach(config, tmp_path / "data", *UNTIL_STOPPED)
+    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     assert [each["run"] for each in list_runs()] == [run, "server"]
     assert say("stop")[1].startswith(f"{run}: stopped")
     assert list_runs() == [listed]

@@ -1,6 +1,5 @@
 """Native libraries of rclpy, pybullet, Pinocchio and Zenoh in one process, whichever is loaded first."""
 
-import itertools
 import os
 import subprocess
 import sys
@@ -15,6 +14,8 @@ IMPORTS = {
     "pinocchio": "import pinocchio",
     "zenoh": "import zenoh",
 }
+# Each comes first once, and before and after each other one.
+ORDERS = [[*[*IMPORTS][first:], *[*IMPORTS][:first]] for first in range(len(IMPORTS))]
 WORK = """
 import os, numpy, pyarrow, scipy.linalg
 
@@ -70,10 +71,8 @@ print("all of it works")
 """
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(IMPORTS, 2)), ids="-".join)
-def test_all_native_libraries_work_in_one_process(order):
-    # The other imports keep their order: only the first two matter.
-    names = [*order, *(name for name in IMPORTS if name not in order)]
+@pytest.mark.parametrize("names", ORDERS, ids="-".join)
+def test_all_native_libraries_work_in_one_process(names):
     program = "\n".join([*(IMPORTS[name] for name in names), WORK])
     found = subprocess.run(
         [sys.executable, "-c", program],

@@ -60,11 +60,11 @@ class Mesh:
     @cached_property
     def corners(self) -> NDArray[np.float64]:
         """Different corners in the order of their coordinates, shape ``(n_corners, 3)``, in the units of the file."""
-        corners = self.triangles.reshape(-1, 3)
         # Sorting columns is several times as fast as `np.unique`, which sorts rows.
+        corners: NDArray[np.float64] = self.triangles.reshape(-1, 3).astype(np.float64)
         corners = corners[np.lexsort(corners.T[::-1])]
-        changes = (corners[1:] != corners[:-1]).any(axis=1)
-        return corners[np.concatenate([[True], changes])].astype(np.float64)
+        corners = corners[np.append(True, (corners[1:] != corners[:-1]).any(axis=1))]
+        return corners
 
     @property
     def is_flat(self) -> bool:
