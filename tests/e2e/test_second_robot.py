@@ -84,10 +84,10 @@ def process() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture(scope="module")
 def arm(process: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A dataset that two simulation nodes have collected."""
+    """A dataset that nodes have collected."""
     scratch = tmp_path_factory.mktemp("arm")
     (scratch / "arm.yaml").write_text(CONFIG)
-    summary = process.submit(collect, scratch / "arm.yaml", scratch / "data", 2, "--set", "run.replay=0").result()
+    summary = process.submit(collect, scratch / "arm.yaml", scratch / "data", 1, "--set", "run.replay=0").result()
     assert summary["outcomes"] == {"landed": 6}
     return scratch / "data"
 

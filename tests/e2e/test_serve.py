@@ -35,7 +35,7 @@ from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
-TRIALS, MANY = 10, 24
+TRIALS, MANY = 10, 12
 NO_AUTHORITIES = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 """Requests do not use TLS; without this context, each of them would read all certificate authorities, for 30 ms."""
 SLOWLY = {"sim.real_time_factor": 1}
@@ -199,7 +199,7 @@ def test_a_watched_run_outlives_its_server_and_can_be_stopped_and_resumed(
     place: Place, first: Server, tmp_path: Path
 ) -> None:
     # Enough to go on for as long as a server takes to start on a busy machine.
-    wish = {"component": "throws", "simulations": 2, "set": {**SLOWLY, "trials": MANY}}
+    wish = {"component": "throws", "simulations": 1, "set": {**SLOWLY, "trials": MANY}}
     assert first.ask("PUT", "/instances/watched", wish)[0] == 202
     assert first.ask("PUT", "/instances/watched", wish)[0] == 200
     with closing(never_read(first, "/state")), closing(never_read(first, "/instances/watched/shown")):
