@@ -21,7 +21,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "trials: 1920" in yaml
     path = tmp_path_factory.mktemp("config") / "targets.yaml"
     coarse = f"sim: {{physics_hz: 250, engine: ballistic}}\nrecord: {{rate_hz: 125}}\nrun: {{replay: 0}}\n{yaml}"
-    path.write_text(coarse.replace("trials: 1920", "trials: 60"), encoding="utf-8")
+    path.write_text(coarse.replace("trials: 1920", "trials: 90"), encoding="utf-8")
     return path
 
 
@@ -30,7 +30,7 @@ def test_rounds_are_datasets_that_can_be_continued_and_merged(config: Path, tmp_
     few = call_here("cover", *INPROCESS, config, "--rounds", "3", "--output", rounds)
     assert few.returncode == 0, few.stderr
     found = [rounds / f"round_0{number}" for number in (1, 2, 3)]
-    assert [len(Dataset.open(each)) for each in found] == [20, 20, 20]
+    assert [len(Dataset.open(each)) for each in found] == [30, 30, 30]
     assert [verify(each) for each in found] == [[], [], []]
     assert load(found[1] / "config.yaml").sweep.target == load(config).sweep.target
     before = [fingerprints(each) for each in found]

@@ -14,9 +14,9 @@ ROOT = Path(__file__).parents[2]
 # Genuine and embedded nodes meet only over Zenoh, so another RMW has no mixed cases.
 MIXED = [("rclpy", "embedded"), ("embedded", "rclpy")] if os.environ.get(RMW_VARIABLE) == EMBEDDED_RMW else []
 
-# On Fast DDS those that tell most: the acceptance cases of the controllers, and trials. Others lean on an order of
-# messages from different publishers that DDS does not promise.
-TOLD = [f"tests/integration/test_{name}.py" for name in ("controllers", "trajectories", "leases", "play_motion")]
+# On Fast DDS those that tell most: actions of the controllers, and trials. Others lean on an order of messages from
+# different publishers that DDS does not promise.
+TOLD = [f"tests/integration/test_{name}.py" for name in ("controllers", "leases")]
 
 
 @pytest.mark.parametrize(("client", "simulation"), [*MIXED, ("rclpy", "rclpy")])

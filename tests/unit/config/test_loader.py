@@ -151,7 +151,7 @@ configs = st.builds(
 )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(config=configs)
 def test_a_dumped_configuration_loads_back_equal(tmp_path_factory, config):
     path = tmp_path_factory.getbasetemp() / "resolved.yaml"

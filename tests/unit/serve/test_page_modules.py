@@ -14,16 +14,18 @@ import pytest
 from throwcollect.serve import app
 
 PAGE = Path(app.__file__).parent / "page"
+PARSE = """
+for (const path of process.argv.slice(1)) {
+  new vm.SourceTextModule(fs.readFileSync(path, "utf8"), { identifier: path });
+}
+"""
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node, which reads modules without a browser")
-@pytest.mark.parametrize("path", sorted(PAGE.glob("*.js")), ids=lambda path: path.name)
-def test_node_can_parse_every_module_of_the_page(path: Path) -> None:
-    command = ["node", "--input-type=module", "--check"]
-    done = subprocess.run(
-        command, input=path.read_bytes(), env={**os.environ, "NODE_OPTIONS": ""}, capture_output=True, check=False
-    )
-    assert done.returncode == 0, done.stderr.decode()
+def test_node_can_parse_every_module_of_the_page() -> None:
+    command = ["node", "--experimental-vm-modules", "--no-warnings", "--eval", PARSE, *sorted(PAGE.glob("*.js"))]
+    done = subprocess.run(command, env={**os.environ, "NODE_OPTIONS": ""}, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("script", ["page_modules.mjs", "page_elements.mjs"])

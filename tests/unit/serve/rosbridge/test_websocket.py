@@ -112,7 +112,7 @@ def test_memory_for_a_client_that_never_reads_is_bounded(url: str, node: Node) -
             return False
 
         wait_for(hears, "the topic is heard")
-        for number in range(250):
+        for number in range(160):
             publisher.publish(String(data=f"{number} {text}"))
             while not hear(quick)["msg"]["data"].startswith(f"{number} "):
                 pass
