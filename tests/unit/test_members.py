@@ -1,12 +1,14 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
-from tests.with_plugins import run_with_plugins
+from tests.e2e.collection import call_here
+from tests.e2e.plugins import process_with_plugins
 
 from throwcollect import members
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
@@ -14,6 +16,7 @@ from throwcollect.engines.bullet.bullet_engine import BulletEngine
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.members import explain_failure, load_member, load_part, names_of
 
+Say = Callable[..., subprocess.CompletedProcess[str]]
 BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
 ARM = """\
 robot: {name: planar_arm}
@@ -24,8 +27,11 @@ task:
 """
 
 
-def with_plugins(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return run_with_plugins("throwcollect", *arguments)
+@pytest.fixture(scope="module")
+def with_plugins() -> Iterator[Say]:
+    """A function that calls throwcollect where the packages of `tests/plugins` are installed."""
+    with process_with_plugins() as process:
+        yield lambda *arguments: process.submit(call_here, *arguments).result()
 
 
 @pytest.mark.parametrize("family", ["robots", "tools", "engines", "tasks", "runtimes", "exporters"])
@@ -66,7 +72,7 @@ def test_an_unknown_member_is_an_error() -> None:
         load_member("robots", "hand")
 
 
-def test_a_configuration_may_name_a_robot_of_another_package(tmp_path: Path) -> None:
+def test_a_configuration_may_name_a_robot_of_another_package(with_plugins: Say, tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(ARM)
     done = with_plugins("config", str(path))
@@ -74,7 +80,7 @@ def test_a_configuration_may_name_a_robot_of_another_package(tmp_path: Path) -> 
     assert "name: planar_arm" in done.stdout
 
 
-def test_an_unknown_joint_of_a_robot_of_another_package_is_an_error(tmp_path: Path) -> None:
+def test_an_unknown_joint_of_a_robot_of_another_package_is_an_error(with_plugins: Say, tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(ARM.replace("elbow_joint: 0.3", "elbow: 0.3"))
     done = with_plugins("config", str(path))
@@ -82,7 +88,7 @@ def test_an_unknown_joint_of_a_robot_of_another_package_is_an_error(tmp_path: Pa
     assert f"{path}:4: task.end.elbow: the planar arm has no joint 'elbow'; did you mean 'elbow_joint'?" in done.stderr
 
 
-def test_a_robot_without_postures_does_not_get_those_of_talos(tmp_path: Path) -> None:
+def test_a_robot_without_postures_does_not_get_those_of_talos(with_plugins: Say, tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text("trials: 4\nrobot: {name: planar_arm}\n")
     done = with_plugins("config", str(path))
@@ -96,7 +102,7 @@ def test_a_robot_without_postures_does_not_get_those_of_talos(tmp_path: Path) ->
     ]
 
 
-def test_an_unknown_robot_is_an_error_without_complaints_about_joints(tmp_path: Path) -> None:
+def test_an_unknown_robot_is_an_error_without_complaints_about_joints(with_plugins: Say, tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(ARM.replace("planar_arm", "planar_hand"))
     done = with_plugins("config", str(path))
