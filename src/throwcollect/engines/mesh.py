@@ -61,10 +61,10 @@ class Mesh:
     def corners(self) -> NDArray[np.float64]:
         """Different corners in the order of their coordinates, shape ``(n_corners, 3)``, in the units of the file."""
         # Sorting columns is several times as fast as `np.unique`, which sorts rows.
-        corners: NDArray[np.float64] = self.triangles.reshape(-1, 3).astype(np.float64)
+        corners = self.triangles.reshape(-1, 3).astype(np.float64)
         corners = corners[np.lexsort(corners.T[::-1])]
-        corners = corners[np.append(True, (corners[1:] != corners[:-1]).any(axis=1))]
-        return corners
+        repeated = 1 + np.flatnonzero((corners[1:] == corners[:-1]).all(axis=1))
+        return np.delete(corners, repeated, axis=0)
 
     @property
     def is_flat(self) -> bool:
