@@ -23,7 +23,6 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.robots.description import robot_of
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
 from throwcollect.sweep.plan import make_trials, refusal
@@ -192,8 +191,7 @@ class Simulator:
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
         # In a dataset, these two values come from a shard; the row was made without one.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
-        sliding = robot_of(self.config).sliding
-        return Throw(table.table([row]), 0, keys, episode, self._source, sliding)
+        return Throw(table.table([row]), 0, keys, episode, self._source, self.config)
 
 
 def _locate(problem: Problem, index: int, point: Point) -> Problem:

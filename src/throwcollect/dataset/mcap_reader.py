@@ -199,6 +199,11 @@ class McapContents:
             raise DatasetError(f"/robot_description is not readable: {error}") from error
         return text
 
+    def chunk(self, offset: int) -> Chunk:
+        """Read the chunk that begins at an offset, alone."""
+        size = Chunk.read_announced_size(self.slice(offset, offset + CHUNK_HEADER_BYTES))
+        return Chunk.parse(self.slice(offset, offset + size))
+
     def episode(self, chunk: McapRecord) -> StoredEpisode:
         """Read the episode whose chunk a record is."""
         if chunk.opcode != Opcode.CHUNK:
@@ -262,6 +267,33 @@ def open_mcap(path: Path) -> Iterator[McapContents]:
         if contents.slice(0, len(MAGIC)) != MAGIC:
             raise DatasetError("not an MCAP file", path=path)
         yield contents
+
+
+class EpisodePlace(NamedTuple):
+    """The place of an episode: its file, and the offset of its chunk there [bytes].
+
+    `start_ns`, the time of its first sample [ns], says which trial it is of; `samples` is their number.
+    """
+
+    path: Path
+    offset: int
+    start_ns: int
+    samples: int
+
+    def read(self) -> Episode:
+        """Read the episode from its file."""
+        with open_mcap(self.path) as contents:
+            try:
+                episode = contents.episode(contents.record(self.offset)).episode
+                self.check_start(episode.chunk)
+            except DatasetError as error:
+                raise error.locate(self.path, f"byte {self.offset}") from error
+        return episode
+
+    def check_start(self, chunk: Chunk) -> None:
+        """Check that the chunk at this place begins when the episode does."""
+        if chunk.start_ns != self.start_ns:
+            raise DatasetError(f"starts at {chunk.start_ns} ns", expected=f"{self.start_ns} ns")
 
 
 def scan(contents: McapContents) -> Iterator[StoredEpisode]:

@@ -18,12 +18,12 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import find_next_command, read_bag_metadata
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS, list_shards, path_of_part
-from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
-from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
+from throwcollect.dataset.trajectory_columns import COLUMNS
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
@@ -114,7 +114,7 @@ class Dataset(Sequence[Throw]):
         if isinstance(which, slice):
             return replace(self, throws=self.throws.take(pa.array(range(len(self))[which], pa.int64())))
         position = range(len(self))[which]
-        return Throw(self.throws, position, self.plan.keys, self._stored[position], str(self.directory), self._sliding)
+        return Throw(self.throws, position, self.plan.keys, self._stored[position], str(self.directory), self.config)
 
     def __contains__(self, column: object) -> bool:
         return column in self.throws.column_names
@@ -260,7 +260,7 @@ class Dataset(Sequence[Throw]):
             if joint not in known:
                 raise ConfigError(unknown_joint(joint, robot_of(self.config)))
         wanted = tuple(columns)
-        return read_trajectories(trials, self._stored, wanted, chosen, threads=threads)
+        return read_trajectories(trials, self._stored, wanted, known, chosen, threads=threads)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -273,22 +273,16 @@ class Dataset(Sequence[Throw]):
         return tuple(joint for joint in self.joints if joint in self.config.task.end)
 
     @cached_property
-    def _sliding(self) -> frozenset[str]:
-        return robot_of(self.config).sliding
-
-    @cached_property
-    def _stored(self) -> Sequence[StoredThrow | None]:
+    def _stored(self) -> Sequence[EpisodePlace | None]:
         """Where the episode of each throw lies; None where there is none."""
         columns = (self.throws[name].to_pylist() for name in ("trial", "shard", "chunk_offset", "samples"))
         rows = list(zip(*columns, strict=True))
         paths = {name: self.directory / name for name in {shard for _, shard, *_ in rows} if name is not None}
-        start_ns, joints, first = self.config.trial_start_ns, self.joints, self.plan.first_of_part
-
-        def place(trial: int, shard: str, offset: int, samples: int) -> StoredThrow:
-            own = trial - first(trial)
-            return StoredThrow(own, start_ns(own), paths[shard], offset, samples, joints)
-
-        return [None if row[1] is None else place(*row) for row in rows]
+        start_ns, first = self.config.trial_start_ns, self.plan.first_of_part
+        return [
+            None if shard is None else EpisodePlace(paths[shard], offset, start_ns(trial - first(trial)), samples)
+            for trial, shard, offset, samples in rows
+        ]
 
 
 def load(directory: StrPath) -> Dataset:

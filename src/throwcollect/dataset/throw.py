@@ -13,24 +13,26 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.config.schema import Config
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of
+from throwcollect.dataset.mcap_reader import EpisodePlace
 from throwcollect.dataset.motion import Ball, Joints
 from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.dataset.trajectory_columns import (
+    ATTRIBUTES,
     BALL_COLUMNS,
+    JOINT_COLUMNS,
+    STAMPS,
     TIMES,
     Column,
-    StoredThrow,
-    empty_columns,
-    fill,
     name_components,
 )
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.episode.trajectory_rows import JOINT_COLUMNS, STAMPS, trajectory_rows
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
+from throwcollect.robots.description import robot_of
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
@@ -118,7 +120,7 @@ class Throw:
         parameters: Swept keys.
         episode: Where its episode lies, or the episode itself; None if it has none.
         source: Directory of its dataset, or its configuration, for messages.
-        sliding: Joints that are prismatic.
+        config: Configuration of its dataset.
     """
 
     def __init__(
@@ -126,16 +128,16 @@ class Throw:
         table: pa.Table,
         position: int,
         parameters: tuple[str, ...],
-        episode: StoredThrow | Episode | None,
+        episode: EpisodePlace | Episode | None,
         source: str,
-        sliding: frozenset[str] = frozenset(),
+        config: Config,
     ) -> None:
         self._table = table
         self._position = position
         self._keys = parameters
         self._episode = episode
         self._source = source
-        self._sliding = sliding
+        self._config = config
 
     def __repr__(self) -> str:
         text = f"Throw({self.trial}: {self.outcome}"
@@ -163,7 +165,7 @@ class Throw:
     def __reduce__(self) -> tuple[type[Throw], tuple[object, ...]]:
         # Another process gets neither the whole table nor the arrays that were read.
         table = pa.Table.from_pylist([self.row], schema=self._table.schema)
-        return Throw, (table, 0, self._keys, self._episode, self._source, self._sliding)
+        return Throw, (table, 0, self._keys, self._episode, self._source, self._config)
 
     @cached_property
     def row(self) -> Row:
@@ -219,8 +221,19 @@ class Throw:
         Raises:
             DatasetError: If it has none, or it is damaged.
         """
-        episode = self._require_episode()
-        return episode.read() if isinstance(episode, StoredThrow) else episode
+        if self._episode is None:
+            why = self.outcome if self.reason is None else f"{self.outcome}: {self.reason}"
+            raise DatasetError(
+                f"trial {self.trial} has no episode: {why}",
+                path=Path(self._source),
+                hint="leave such trials out: dataset.recorded",
+            )
+        return self._episode.read() if isinstance(self._episode, EpisodePlace) else self._episode
+
+    @cached_property
+    def _recording(self) -> tuple[EpisodeHeader, Samples]:
+        episode = self.read_episode()
+        return episode.header, episode.samples(robot_of(self._config).joints)
 
     def read_samples(self) -> tuple[EpisodeHeader, Samples]:
         """Read the header of its episode, and its samples.
@@ -229,9 +242,7 @@ class Throw:
             DatasetError: If it has none, or it is damaged; the error names the dataset and the trial.
         """
         with self.locating_damage():
-            episode = self.read_episode()
-            joints = self._episode.joints if isinstance(self._episode, StoredThrow) else None
-            return episode.header, episode.samples(joints)
+            return self._recording
 
     @contextmanager
     def locating_damage(self) -> Iterator[None]:
@@ -245,32 +256,6 @@ class Throw:
             located.hint = located.hint or command("dataset", "verify", self._source)
             raise located from error
 
-    def _require_episode(self) -> StoredThrow | Episode:
-        if self._episode is None:
-            why = self.outcome if self.reason is None else f"{self.outcome}: {self.reason}"
-            raise DatasetError(
-                f"trial {self.trial} has no episode: {why}",
-                path=Path(self._source),
-                hint="leave such trials out: dataset.recorded",
-            )
-        return self._episode
-
-    @cached_property
-    def _rows(self) -> tuple[int, tuple[str, ...], NDArray[np.void]]:
-        """Start of the trial [ns], the joints that are recorded, and the rows of its samples; see `trajectory_rows`."""
-        episode = self._require_episode()
-        if isinstance(episode, StoredThrow):
-            return episode.start_ns, episode.joints, episode.read_rows()
-        header, joints = episode.header, episode.table.joints
-        return header.start_ns, joints, trajectory_rows(episode.chunk.contents, header.samples, joints)
-
-    def _read_columns(self, names: Iterable[str]) -> list[Column]:
-        """Read columns into arrays of their own, after those of times and stamps."""
-        start_ns, joints, rows = self._rows
-        columns = empty_columns([TIMES, STAMPS, *names], len(rows), len(joints))
-        fill(columns, [(start_ns, len(rows))], [rows], joints, joints)
-        return list(columns.values())
-
     @cached_property
     def ball(self) -> Ball:
         """The ball over time.
@@ -278,7 +263,7 @@ class Throw:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        return Ball(*self._read_columns(BALL_COLUMNS))
+        return Ball(*self._copy_columns(BALL_COLUMNS))
 
     @cached_property
     def joints(self) -> Joints:
@@ -287,7 +272,13 @@ class Throw:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        return Joints(self._rows[1], *self._read_columns(JOINT_COLUMNS))
+        return Joints(robot_of(self._config).joints, *self._copy_columns(JOINT_COLUMNS))
+
+    def _copy_columns(self, names: Iterable[str]) -> list[Column]:
+        """Copy columns of the samples into arrays that belong to the caller, after those of times and stamps."""
+        header, samples = self.read_samples()
+        columns = (getattr(samples, ATTRIBUTES[name]) for name in (STAMPS, *names))
+        return [samples.seconds_since(header.start_ns), *(np.array(column, order="C") for column in columns)]
 
     def to_pandas(self) -> DataFrame:
         """Make a DataFrame of the motion of ball and joints: one row a sample, by time since the start of the trial.
@@ -300,8 +291,9 @@ class Throw:
             MissingExtraError: If pandas is not installed.
         """
         columns: dict[str, NDArray[np.float64]] = {}
+        sliding = robot_of(self._config).sliding
         for name in (*JOINT_COLUMNS, *BALL_COLUMNS):
             series, _, quantity = name.partition("_")
             values = getattr(getattr(self, series), quantity)
-            columns |= dict(zip(name_components(name, self.joints.names, self._sliding), values.T, strict=True))
+            columns |= dict(zip(name_components(name, self.joints.names, sliding), values.T, strict=True))
         return pd.DataFrame(columns, index=pd.Index(self.ball.time_s, name=TIMES))

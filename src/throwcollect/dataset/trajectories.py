@@ -12,7 +12,8 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.trajectory_columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
+from throwcollect.dataset.mcap_reader import EpisodePlace
+from throwcollect.dataset.trajectory_columns import COLUMNS, Column, empty_columns, fill
 from throwcollect.errors import ConfigError
 from throwcollect.wording import format_count, suggest
 
@@ -99,15 +100,16 @@ class Trajectories:
 
 def read_trajectories(
     trials: Sequence[int],
-    places: Sequence[StoredThrow | None],
+    places: Sequence[EpisodePlace | None],
     columns: Sequence[str],
+    known: tuple[str, ...],
     joints: tuple[str, ...],
     *,
     threads: int | None = None,
 ) -> Trajectories:
     """Read the trajectories of trials, whose episodes lie at these places; None for a trial that has none.
 
-    The other arguments are those of `Dataset.trajectories`.
+    Episodes have the joints `known`. The other arguments are those of `Dataset.trajectories`.
 
     Raises:
         ConfigError: If there is no such column.
@@ -123,10 +125,8 @@ def read_trajectories(
     blocks = [stored[first : first + _BLOCK] for first in range(0, len(stored), _BLOCK)]
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 
-    def read(block: Sequence[StoredThrow], start: int, stop: int) -> None:
-        throws = [(place.start_ns, place.samples) for place in block]
-        parts = {name: column[start:stop] for name, column in found.items()}
-        fill(parts, throws, read_stored_rows(block), block[0].joints, joints)
+    def read(block: Sequence[EpisodePlace], start: int, stop: int) -> None:
+        fill({name: column[start:stop] for name, column in found.items()}, block, known, joints)
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:

@@ -64,7 +64,9 @@ class Episode:
     @cached_property
     def table(self) -> MessageTable:
         """The message records of the chunk as a table."""
-        return MessageTable(self.chunk.contents, self.header.samples)
+        table = MessageTable(self.chunk.contents, self.header.samples)
+        table.check_rows()
+        return table
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
         """Read the samples; `joints` must have been recorded, in this order."""

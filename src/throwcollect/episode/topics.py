@@ -31,14 +31,8 @@ STAMP = np.dtype([("stamp.sec", "<i4"), ("stamp.nanosec", "<u4")])
 
 Rows = NDArray[np.void]
 """Messages of one topic, one per sample: an array of the layout's structured type."""
-
-
-@dataclass(frozen=True)
-class Recording:
-    """The values from which messages are made: samples, and set points of controllers by name."""
-
-    samples: Samples
-    controllers: Mapping[str, ControllerSamples]
+SetPoints = Mapping[str, ControllerSamples]
+"""Set points of controllers by name."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +49,13 @@ class Topic:
     name: str
     type_name: str
     layout: MessageLayout
-    fill: Callable[[Rows, Recording], None]
+    fill: Callable[[Rows, Samples, SetPoints], None]
 
-    def encode(self, recording: Recording) -> NDArray[np.uint8]:
+    def encode(self, samples: Samples, targets: SetPoints) -> NDArray[np.uint8]:
         """Make the CDR messages of all samples, shape ``(n_samples, size)``."""
         template = np.frombuffer(self.layout.template, np.uint8)
-        messages = np.tile(template, (len(recording.samples), 1))
-        self.fill(messages.view(self.layout.dtype)[:, 0], recording)
+        messages = np.tile(template, (len(samples), 1))
+        self.fill(messages.view(self.layout.dtype)[:, 0], samples, targets)
         return messages
 
 
@@ -125,8 +119,7 @@ def read_joint_names(message: bytes) -> tuple[str, ...]:
     return joints
 
 
-def _fill_joint_states(rows: Rows, recording: Recording) -> None:
-    samples = recording.samples
+def _fill_joint_states(rows: Rows, samples: Samples, _: SetPoints) -> None:
     put_stamps(rows, "header.stamp", samples.stamps_ns)
     rows["position"] = samples.position
     rows["velocity"] = samples.velocity
@@ -149,35 +142,12 @@ def make_header(frame: str, stamp_ns: int = 0) -> Any:
     return get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=frame)
 
 
-def _fill_ball_odometry(rows: Rows, recording: Recording) -> None:
-    samples = recording.samples
+def _fill_ball_odometry(rows: Rows, samples: Samples, _: SetPoints) -> None:
     put_stamps(rows, "header.stamp", samples.stamps_ns)
     rows["pose.pose.position"] = samples.ball_position
     rows["pose.pose.orientation"] = orientation = samples.ball_orientation_xyzw
     rows["twist.twist.linear"], rows["twist.twist.angular"] = rotate(
         orientation, samples.ball_linear_velocity, samples.ball_angular_velocity, inverse=True
-    )
-
-
-def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
-    """Read samples from the messages of `joint_states` and `ball_odometry`, each of shape ``(n_samples,)``.
-
-    Velocities are turned back into world. The numbers of each joint and each axis lie side by side in memory: in the
-    messages they are kilobytes apart and not aligned, so that arithmetic with them takes several times as long.
-    """
-    orientation = np.asfortranarray(ball_rows["pose.pose.orientation"])
-    linear, angular = rotate(
-        orientation, ball_rows["twist.twist.linear"], ball_rows["twist.twist.angular"], inverse=False
-    )
-    return Samples(
-        stamps_ns=read_stamps(joint_rows, "header.stamp"),
-        position=np.asfortranarray(joint_rows["position"]),
-        velocity=np.asfortranarray(joint_rows["velocity"]),
-        effort=np.asfortranarray(joint_rows["effort"]),
-        ball_position=np.asfortranarray(ball_rows["pose.pose.position"]),
-        ball_orientation_xyzw=orientation,
-        ball_linear_velocity=linear,
-        ball_angular_velocity=angular,
     )
 
 
@@ -188,8 +158,8 @@ def clock() -> Topic:
     return Topic("/clock", kind, MessageLayout(get_message(kind)(), ["clock.sec", "clock.nanosec"]), _fill_clock)
 
 
-def _fill_clock(rows: Rows, recording: Recording) -> None:
-    put_stamps(rows, "clock", recording.samples.stamps_ns)
+def _fill_clock(rows: Rows, samples: Samples, _: SetPoints) -> None:
+    put_stamps(rows, "clock", samples.stamps_ns)
 
 
 def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
@@ -203,8 +173,7 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     moved = [0, *(number for number, frame in enumerate(frames, start=1) if frame.slides)]
     layout = MessageLayout(message, [*variable, *(f"transforms.{n}.transform.translation" for n in moved)])
 
-    def fill(rows: Rows, recording: Recording) -> None:
-        samples = recording.samples
+    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
         for number in range(len(pairs)):
             put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
         rows["transforms.0.transform.translation"] = samples.ball_position
@@ -267,8 +236,8 @@ def controller_state(robot: Robot, controller: str) -> Topic:
     elapsed = [f"{part}.time_from_start.{key}" for part in _TIMED for key in ("sec", "nanosec")]
     layout = MessageLayout(message, [*_STAMP, *points, *elapsed, "reference.accelerations", "output.positions"])
 
-    def fill(rows: Rows, recording: Recording) -> None:
-        samples, target = recording.samples, recording.controllers[controller]
+    def fill(rows: Rows, samples: Samples, targets: SetPoints) -> None:
+        target = targets[controller]
         position, velocity = samples.position[:, columns], samples.velocity[:, columns]
         put_stamps(rows, "header.stamp", samples.stamps_ns)
         for part in _TIMED:

@@ -21,8 +21,8 @@ from throwcollect.episode.frames import FrameTree, read_frames
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import (
-    Recording,
     Rows,
+    SetPoints,
     Topic,
     ball_odometry,
     joint_states,
@@ -143,8 +143,8 @@ class ViewRecording:
     def _put_samples(self, samples: Samples, start_ns: int) -> None:
         # Throws follow one another in this file, so the stamps of the dataset are replaced.
         stamps = samples.stamps_ns - samples.stamps_ns[0] + start_ns
-        recording = Recording(replace(samples, stamps_ns=stamps), {})
-        columns = [(self._numbers[topic.name], topic.encode(recording)) for topic in self._topics]
+        samples = replace(samples, stamps_ns=stamps)
+        columns = [(self._numbers[topic.name], topic.encode(samples, {})) for topic in self._topics]
         for number, stamp in enumerate(stamps.tolist()):
             for channel, messages in columns:
                 self._put_data(channel, stamp, messages[number].tobytes())
@@ -155,8 +155,8 @@ def _ball_speed() -> Topic:
     """``/view/ball_speed``: std_msgs/Float64, speed of the ball's centre [m/s]."""
     kind = "std_msgs/msg/Float64"
 
-    def fill(rows: Rows, recording: Recording) -> None:
-        rows["data"] = np.linalg.norm(recording.samples.ball_linear_velocity, axis=1)
+    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
+        rows["data"] = np.linalg.norm(samples.ball_linear_velocity, axis=1)
 
     return Topic("/view/ball_speed", kind, MessageLayout(get_message(kind)(), ["data"]), fill)
 
@@ -168,8 +168,8 @@ def _range_shares(robot: Robot, joints: tuple[str, ...]) -> Topic:
     message = get_message(kind)(name=list(joints), position=np.zeros(len(joints)))
     layout = MessageLayout(message, ["header.stamp.sec", "header.stamp.nanosec", "position"])
 
-    def fill(rows: Rows, recording: Recording) -> None:
-        samples, limits = recording.samples, joint_limits(robot)
+    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
+        limits = joint_limits(robot)
         lower, upper = limits.lower[columns], limits.upper[columns]
         put_stamps(rows, "header.stamp", samples.stamps_ns)
         rows["position"] = (2 * samples.position[:, columns] - lower - upper) / (upper - lower)

@@ -131,7 +131,7 @@ def with_column(dataset: Dataset, name: str, values: list[Any]) -> Dataset:
 def test_trajectories_refuse_a_row_with_the_offset_of_another_trial(loaded: Dataset, threads: int) -> None:
     offsets = loaded.throws["chunk_offset"].to_pylist()
     wrong = with_column(loaded, "chunk_offset", [offsets[1], offsets[0], *offsets[2:]])
-    with pytest.raises(DatasetError, match=r"quick_00000\.mcap: byte \d+: starts at \d+ ns(.|\n)*expected: trial 0 at"):
+    with pytest.raises(DatasetError, match=r"quick_00000\.mcap: byte \d+: starts at \d+ ns(.|\n)*expected: \d+ ns"):
         wrong.trajectories(threads=threads)
 
 

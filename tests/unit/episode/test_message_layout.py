@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rclzenoh.interfaces import get_message, message_definition
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
-from throwcollect.episode.topics import Recording, Topic, ball_odometry, controller_state, joint_states, transforms
+from throwcollect.episode.topics import Topic, ball_odometry, controller_state, joint_states, transforms
 from throwcollect.robots.talos import TALOS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -33,7 +33,7 @@ def wild(shape: tuple[int, ...], *, seed: int) -> np.ndarray[Any, np.dtype[np.fl
 
 
 def messages_of(topic: Topic, samples: Samples, targets: dict[str, ControllerSamples] | None = None) -> list[bytes]:
-    return [row.tobytes() for row in topic.encode(Recording(samples, targets or {}))]
+    return [row.tobytes() for row in topic.encode(samples, targets or {})]
 
 
 def by_rosbags(type_name: str, **fields: object) -> bytes:

@@ -13,7 +13,7 @@ from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import pack
 from throwcollect.episode.record import Samples
-from throwcollect.episode.topics import Recording, Topic
+from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.ros import (
@@ -179,8 +179,7 @@ class SimulationNode(Node):
             samples = self._simulation.last_sample()
         if len(samples):
             self._published_at = time.monotonic()
-        recording = Recording(samples, {})
-        columns = [(publisher, topic.encode(recording)) for topic, publisher in self._listened]
+        columns = [(publisher, topic.encode(samples, {})) for topic, publisher in self._listened]
         for index in range(len(samples)):
             for publisher, messages in columns:
                 publisher.publish(messages[index].tobytes())
