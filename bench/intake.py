@@ -21,7 +21,7 @@ from throwcollect.episode.episode_message import Episode, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of, trajectory_of
-from throwcollect.trial.conditions import Settings, conditions_from_json
+from throwcollect.trial.conditions import Settings, explain_difference
 
 _SECRET = b"key of a run"
 _SIGNER = Signer(_SECRET)
@@ -42,7 +42,7 @@ def measure(directory: Path) -> tuple[float, float]:
         config = dataset.plan.config_of(trial)
         result = columns.to_json(judge_episode(config, episode))
         conditions = settings.conditions_of(config, trajectory_of(config).digest)
-        judged = Episode(episode.header, episode.chunk, result=result, conditions=conditions.to_json())
+        judged = Episode(episode.header, episode.chunk, result=result, conditions=conditions)
         messages.append(pack(judged, _SIGNER))
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
@@ -62,7 +62,7 @@ def _take_in(messages: list[bytes], plan: Plan, settings: Settings, directory: P
         trial = plan.trial(episode.header.trial)
         config = plan.config_of(trial)
         expected = settings.conditions_of(config, trajectory_of(config).digest)
-        if conditions_from_json(episode.conditions).explain(expected):
+        if explain_difference(episode.conditions, expected):
             raise ValueError(f"trial {trial.number} is refused")
         writer.append(episode, columns.from_json(task.outcomes, episode.result))
     seconds = time.perf_counter() - began

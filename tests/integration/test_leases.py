@@ -66,8 +66,9 @@ def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> 
     leases = [lease(robot, {"ball.mass_kg": 0.04 + trial / 1000}, trial=trial) for trial in (4, 2, 3)]
     deliveries = wait_for_episodes(robot, *leases)
     assert [delivery.header.trial for delivery in deliveries] == [4, 2, 3]
-    conditions = [json.loads(delivery.conditions) for delivery in deliveries]
-    assert [each["values"] for each in conditions] == [dict(each.values) for each in leases]
+    assert [json.loads(delivery.conditions.split("\n")[2]) for delivery in deliveries] == [
+        dict(each.values) for each in leases
+    ]
     assert [json.loads(delivery.result)["outcome"] for delivery in deliveries] == ["landed"] * 3
     start_ns = [delivery.header.start_ns for delivery in deliveries]
     assert start_ns == [CONFIG.trial_start_ns(trial) for trial in (4, 2, 3)]
@@ -101,7 +102,7 @@ def test_a_leased_trial_ignores_parameters_that_were_set_by_hand(robot: Robot) -
     assert robot.set(by_hand).successful
     assert robot.set({"constraints.goal_time": 0.1, "cmd_timeout": 0.2}, node=ARM).successful
     (delivery,) = wait_for_episodes(robot, lease(robot, {"ball.mass_kg": 0.05}))
-    assert json.loads(delivery.conditions)["values"] == {"ball.mass_kg": 0.05}
+    assert '{"ball.mass_kg": 0.05}' in delivery.conditions.split("\n")
     number, controllers, *physics = robot.parameters("get_parameters", names=list(by_hand)).values
     assert (number.integer_value, list(controllers.string_array_value)) == (-1, [""])
     assert [value.double_value for value in physics] == [CONFIG.ball.friction, CONFIG.scene.gravity_mps2]
@@ -115,7 +116,7 @@ def test_a_reset_after_a_lease_begins_the_trial_of_the_parameters(robot: Robot) 
     assert robot.now_ns() == 0
     assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO]}).successful
     robot.reset()
-    assert json.loads(by_hand(robot).conditions)["values"] == {}
+    assert by_hand(robot).conditions.split("\n")[2] == "{}"
 
 
 @pytest.mark.parametrize(("factor", "accepted"), [(0.0, True), (1.0, True), (5.0, True), (0.99, False), (0.001, False)])
@@ -199,6 +200,5 @@ def test_an_episode_without_a_lease_has_no_trajectory_in_its_conditions(robot: R
     assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO], "ball.mass_kg": 0.05}).successful
     robot.reset()
     delivery = by_hand(robot)
-    conditions = json.loads(delivery.conditions)
-    assert (conditions["trajectory"], delivery.result) == ("", "")
-    assert conditions["values"] == {"ball.mass_kg": 0.05}
+    assert delivery.conditions.split("\n")[2:] == ['{"ball.mass_kg": 0.05}', ""]
+    assert delivery.result == ""

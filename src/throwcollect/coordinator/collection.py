@@ -26,7 +26,7 @@ from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.sweep.plan import Check, refusal
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of, trajectory_of
-from throwcollect.trial.conditions import Settings, conditions_from_json
+from throwcollect.trial.conditions import Settings, explain_difference
 from throwcollect.wording import command, format_count
 
 _SYNC_EVERY_S = 1.0
@@ -211,7 +211,7 @@ class TrialCollection:
             result = self._columns.from_json(self._outcome_names, episode.result)
             config = self.writer.plan.config_of(self.writer.plan.trial(trial))
             expected = self._settings.conditions_of(config, trajectory_of(config).digest)
-            reason = conditions_from_json(episode.conditions).explain(expected)
+            reason = explain_difference(episode.conditions, expected)
         except DatasetError as error:
             reason = error.message
         if reason is not None:

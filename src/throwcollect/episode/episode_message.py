@@ -1,7 +1,7 @@
 """The one message that carries an episode from a simulation to the coordinator: std_msgs/UInt8MultiArray.
 
 Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
-JSON; ``conditions``, the conditions of the episode in JSON; ``hash``, the SHA-256 of the records of the chunk as 32
+JSON; ``conditions``, the conditions of the episode in lines; ``hash``, the SHA-256 of the records of the chunk as 32
 bytes; ``chunk``, its MCAP Chunk record with its Message Index records behind it; and ``signature``, which covers all
 parts before it. The coordinator trusts a sender who has the key of the run, so it does not decompress, hash or judge
 the episode again.
@@ -47,7 +47,7 @@ class Episode:
         header: The facts besides the samples.
         chunk: The recorded messages, with their hash.
         result: Result of the trial in JSON; empty if no simulation has judged the episode.
-        conditions: Conditions of the episode in JSON; empty if it comes from a file.
+        conditions: Conditions of the episode in lines; empty if it comes from a file.
     """
 
     def __init__(self, header: EpisodeHeader, chunk: Chunk, *, result: str = "", conditions: str = "") -> None:

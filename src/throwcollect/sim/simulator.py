@@ -181,7 +181,7 @@ class Simulator:
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
         result = self._judge(config, motion, table.samples, header) if motion else ""
-        return Episode(header, state, result=result, conditions=conditions.to_json())
+        return Episode(header, state, result=result, conditions=conditions)
 
     def take_recording(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:
         """Return what was recorded of a trial that has ended, only once; None while there is no such recording."""

@@ -160,6 +160,6 @@ def test_a_trial_without_retries_whose_episode_is_refused_is_lost(
     collection.lease("/sim_0")
     assert not collection.take_in("/sim_0", change(deliveries[0], conditions=deliveries[1].conditions))
     assert not collection.take_in("/sim_0", change(deliveries[1], result="{}"))
-    assert "trial 0 is lost: its episode is refused: ball.mass_kg was" in said[0]
+    assert "trial 0 is lost: its episode is refused: its values are not those of the plan" in said[0]
     assert "trial 1 is lost: its episode is refused: result of a trial: " in said[1]
     assert not collection.backlog
