@@ -8,7 +8,6 @@ from dataclasses import replace
 from threading import RLock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.loader import load
@@ -26,7 +25,7 @@ from throwcollect.files import StrPath
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
 from throwcollect.sweep.plan import make_trials, refusal
-from throwcollect.sweep.points import Points, Targets
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.trials import Trial
 
 # If the extra is missing, importing `Simulator` fails with the hint on it, and not only the first throw.
@@ -115,8 +114,7 @@ class Simulator:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
         # This checks the keys, too, which `make_trials` does not.
         refused = self.find_refusal(point)
-        wanted = None if target is None else Targets(tuple(target), _make_row(target))
-        points = Points(tuple(point), _make_row(point), wanted)
+        points = Points((*point, *(target or ())), np.array([[*point.values(), *(target or {}).values()]], np.float64))
         (planned,) = make_trials(self.config, points, first=trial)
         if refused is not None:
             raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
@@ -203,11 +201,6 @@ def _locate(problem: Problem, index: int, point: Point) -> Problem:
         return replace(problem, key=f"{place}.{problem.key}", argument=True)
     values = ", ".join(f"{key}={value}" for key, value in (point or {}).items())
     return Problem(f"{problem.message} ({values or 'with no value of its own'})", place, argument=True)
-
-
-def _make_row(values: Point) -> NDArray[np.float64]:
-    """Make a table of values as its only row, shape ``(1, n_values)``."""
-    return np.array([list(values.values())], np.float64).reshape(1, len(values))
 
 
 def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:

@@ -155,8 +155,7 @@ def throw(
         rows: Sequence[tuple[dict[str, float], dict[str, float]]] = [({}, {})]
         if points is not None:
             read = read_points(points, simulator.config, key="--list")
-            drawn = (dict(zip(read.keys, values, strict=True)) for values in read.values.tolist())
-            rows = [(row, read.targets.row(number) if read.targets else {}) for number, row in enumerate(drawn)]
+            rows = [read.row(number) for number in range(len(read))]
         measures = simulator.config.task.targets
         measures += tuple(dict.fromkeys(each.miss for each in simulator.config.task.target_columns))
         refused = 0

@@ -114,14 +114,14 @@ def plan(
                     "seed": trial.seed,
                     "digest": trial.digest,
                     "refused": trial.refused,
-                    **({"target": dict(trial.target)} if found.trials.target_names else {}),
+                    **({"target": dict(trial.target)} if found.trials.points.target_names else {}),
                 }
                 for trial in found.trials
             ]
         )
         return
     if output is None:
-        names = (*found.keys, *found.trials.target_names)
+        names = found.trials.points.names
         typer.echo("  ".join(["trial", *names]))
         for trial in found.trials:
             values = {**trial.values, **trial.target}

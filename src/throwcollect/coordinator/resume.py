@@ -269,7 +269,8 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)} or more",
         )
     before, after = old.trials[:count], new.trials[:count]
-    are_same = np.array_equal(before.digests, after.digests) and before.targets == after.targets
+    targets = before.points.targets, after.points.targets
+    are_same = np.array_equal(before.digests, after.digests) and np.array_equal(*targets, equal_nan=True)
     # With `until`, the collection checks most of the trials.
     if not are_same or (new.config.until is None and before.refused.keys() != after.refused.keys()):
         drawn = "the list" if new.config.sweep.file is not None else f"the sampler {new.config.sweep.sampler}"

@@ -15,29 +15,22 @@ from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.sweep.arrow_column import nan_where_null
-from throwcollect.sweep.points import Targets
 from throwcollect.units import unit_of_name
 
 
-def read_targets(throws: pa.Table) -> Targets | None:
-    """Read the targets of all trials of a table of throws, in order; None if it has no columns of targets."""
-    names = tuple(name for name in throws.column_names if is_target(name))
-    if not names:
-        return None
-    columns = [nan_where_null(throws[name].combine_chunks()) for name in names]
-    return Targets(names, np.column_stack(columns))
+def read_targets(throws: pa.Table) -> dict[str, NDArray[np.float64]]:
+    """Read the columns of targets of a table of throws, each ``(n_throws,)``, NaN where a trial has none, by name."""
+    return {name: nan_where_null(throws[name].combine_chunks()) for name in throws.column_names if is_target(name)}
 
 
 def summarise_misses(config: Config, throws: pa.Table) -> dict[str, MissSummary]:
     """Summarise by how much trials missed their targets, by column of misses; empty if they have no targets."""
     targets = read_targets(throws)
-    if targets is None:
-        return {}
-    misses = Misses(config, targets.names)
+    misses = Misses(config, tuple(targets))
     summaries = {}
     for name in misses.descriptions:
-        columns = [number for number, each in enumerate(misses.targets) if each.miss == name]
-        aimed = int((~np.isnan(targets.values[:, columns])).any(axis=1).sum())
+        columns = [targets[each.name] for each in misses.targets if each.miss == name]
+        aimed = int((~np.isnan(columns)).any(axis=0).sum())
         values = throws[name].drop_null().to_numpy()
         largest = float(values.max()) if len(values) else None
         summaries[name] = MissSummary(aimed, len(values), find_median(values), find_share90(values), largest)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from throwcollect.dataset.bag import BAG_SECTION, FileSummary, bag_information, to_yaml
 from throwcollect.dataset.carried_robot import list_carried
@@ -18,7 +19,6 @@ from throwcollect.dataset.shard import Recording
 from throwcollect.episode.channels import Channels
 from throwcollect.files import write_file
 from throwcollect.sweep.parquet_file import write_table
-from throwcollect.sweep.points import Targets
 
 
 def write_description(
@@ -58,7 +58,7 @@ def metadata_text(files: Sequence[FileSummary], channels: Channels, digest: str)
     return to_yaml({BAG_SECTION: bag_information(files, channels.all, custom)})
 
 
-def combine_digests(digests: Iterable[str], targets: Targets | None) -> str:
+def combine_digests(digests: Iterable[str], targets: Mapping[str, NDArray[np.float64]]) -> str:
     """Compute SHA-256 over the digests of all episodes in order of trials, each as 32 bytes; digests are hexadecimal.
 
     The targets of all trials follow, if trials have some, as no episode contains them: of each column its name, a zero
@@ -67,7 +67,7 @@ def combine_digests(digests: Iterable[str], targets: Targets | None) -> str:
     combined = hashlib.sha256()
     for digest in digests:
         combined.update(bytes.fromhex(digest))
-    for name, values in () if targets is None else zip(targets.names, targets.values.T, strict=True):
+    for name, values in targets.items():
         combined.update(name.encode() + b"\0")
         combined.update(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
     return combined.hexdigest()

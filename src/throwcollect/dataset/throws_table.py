@@ -138,7 +138,7 @@ class ThrowsTable:
     @classmethod
     def of(cls, plan: Plan) -> ThrowsTable:
         """Make the table of a plan's trials."""
-        return cls(plan.keys, plan.config, plan.trials.target_names)
+        return cls(plan.keys, plan.config, plan.trials.points.target_names)
 
     def row(self, trial: Trial, result: Result, place: EpisodePlace | None) -> Row:
         """Make the row of a trial that was run; `place` is None if it has no episode."""

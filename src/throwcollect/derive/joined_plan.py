@@ -13,7 +13,7 @@ from throwcollect.config.values import leaves, reason_not_sweepable
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.points import Points, Targets
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.trials import Trials
 
 _ABSENT = object()
@@ -45,13 +45,15 @@ def _join_trials(plans: Sequence[Plan]) -> Trials:
     if len(plans) == 1:
         return plans[0].trials
     keys = _find_keys(plans)
+    present = {name for plan in plans for name in plan.trials.points.target_names}
+    targets = tuple(each.name for each in plans[0].config.task.target_columns if each.name in present)
     refused: dict[int, str] = {}
     first = 0
     for plan in plans:
         refused |= {first + number: reason for number, reason in plan.trials.refused.items()}
         first += len(plan.trials)
     return Trials(
-        Points(keys, np.vstack([_tabulate(plan, keys) for plan in plans]), _join_targets(plans)),
+        Points((*keys, *targets), np.vstack([_tabulate(plan, keys, targets) for plan in plans])),
         np.concatenate([plan.trials.seeds for plan in plans]),
         np.concatenate([plan.trials.digests for plan in plans]),
         refused=refused,
@@ -85,23 +87,9 @@ def _collect_fixed_values(config: Config) -> dict[str, Any]:
     return {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.determines_samples}
 
 
-def _tabulate(plan: Plan, keys: Sequence[str]) -> Any:
-    """Tabulate the values of some keys in all trials, shape ``(n_trials, n_keys)``."""
-    swept, fixed, count = plan.keys, _collect_fixed_values(plan.config), len(plan.trials)
-    columns = [plan.trials.values[:, swept.index(key)] if key in swept else np.full(count, fixed[key]) for key in keys]
-    return np.column_stack([np.empty((count, 0)), *columns])
-
-
-def _join_targets(plans: Sequence[Plan]) -> Targets | None:
-    """Join the targets of all trials; NaN where a plan lacks a column."""
-    present = {name for plan in plans for name in plan.trials.target_names}
-    names = tuple(each.name for each in plans[0].config.task.target_columns if each.name in present)
-    if not names:
-        return None
-    values = []
-    for plan in plans:
-        own, count = plan.trials.targets, len(plan.trials)
-        missing = np.full(count, np.nan)
-        columns = [own.values[:, own.names.index(name)] if own and name in own.names else missing for name in names]
-        values.append(np.column_stack(columns))
-    return Targets(names, np.vstack(values))
+def _tabulate(plan: Plan, keys: Sequence[str], targets: Sequence[str]) -> Any:
+    """Tabulate some keys and targets of all trials, shape ``(n_trials, n_columns)``; NaN where they lack a target."""
+    points, fixed = plan.trials.points, {**_collect_fixed_values(plan.config), **dict.fromkeys(targets, np.nan)}
+    swept = dict(zip(points.names, points.table.T, strict=True))
+    columns = [swept[name] if name in swept else np.full(len(points), fixed[name]) for name in (*keys, *targets)]
+    return np.column_stack([np.empty((len(points), 0)), *columns])

@@ -258,7 +258,7 @@ def _begin_other(directory: Path, engine: str) -> Callable[[int], Deviation]:
     dataset = Dataset.open(directory)
     plan, own = dataset.plan, dataset.config
     config = own.model_copy(update={"sim": own.sim.model_copy(update={"engine": engine})})
-    table = ThrowsTable(plan.keys, config, plan.trials.target_names)
+    table = ThrowsTable(plan.keys, config, plan.trials.points.target_names)
     simulator = Simulator(config)
 
     def simulate(number: int) -> Deviation:

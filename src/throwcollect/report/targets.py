@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,6 @@ from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, Scor
 from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
 from throwcollect.report.measured import choose_points, read_numbers
-from throwcollect.sweep.points import Targets
 from throwcollect.units import choose_shown_unit, unit_of_name
 from throwcollect.wording import command, format_count
 
@@ -111,10 +110,10 @@ _TITLE = "How targets are missed"
 def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
     """Show the targets of trials; nothing if they have none."""
     targets = read_targets(dataset.throws)
-    if targets is None:
+    if not targets:
         return ()
     misses = summarise_misses(dataset.config, dataset.throws)
-    targeted = int((~np.isnan(targets.values)).any(axis=1).sum())
+    targeted = int((~np.isnan(list(targets.values()))).any(axis=0).sum())
     said = [
         "{}: median {}, 9 of 10 below {}".format(name, *each.format_misses(unit_of_name(name))[:2])
         for name, each in misses.items()
@@ -133,15 +132,15 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
     return (ReportSection("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(misses))),)
 
 
-def _show_map(dataset: Dataset, targets: Targets) -> Panel:
+def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> Panel:
     """Show the first two columns of targets."""
     declared = {column.name: column for column in dataset.config.task.target_columns}
-    throws, shown = dataset.throws, targets.names[:2]
+    throws, shown = dataset.throws, tuple(targets)[:2]
     nowhere = np.full(len(throws), np.nan)
     sources = [column_of(declared[name].of) for name in shown]
     ends = [read_numbers(throws, name) if name in throws.column_names else nowhere for name in sources]
     chosen = choose_points(len(throws))
-    goals, places = targets.values[chosen, : len(shown)], np.column_stack(ends)[chosen]
+    goals, places = np.column_stack([targets[name][chosen] for name in shown]), np.column_stack(ends)[chosen]
     aimed = ~np.isnan(goals).any(axis=1)
     titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
     times = choose_scale(goals[aimed], places[aimed])

@@ -18,7 +18,7 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Pla
 from throwcollect.files import write_file
 from throwcollect.sweep.digest import config_digest, is_digest, trial_digests
 from throwcollect.sweep.parquet_file import encode_table, open_parquet
-from throwcollect.sweep.points import Points, Targets
+from throwcollect.sweep.points import Points
 from throwcollect.sweep.slice import Slice
 from throwcollect.sweep.trials import DIGEST_BYTES, Trial, Trials
 from throwcollect.wording import blank_numbers, format_count
@@ -101,15 +101,14 @@ class Plan:
             np.frombuffer(trials.digests.tobytes().hex().encode(), f"S{2 * DIGEST_BYTES}"),
             trials.seeds,
             [trials.refused.get(number) for number in trials.numbers],
-            *trials.values.T,
-            *([] if trials.targets is None else map(null_where_nan, trials.targets.values.T)),
+            *map(null_where_nan, trials.points.table.T),
         ]
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
             metadata[_SLICE_KEY] = str(self.slice)
         if self.joined:
             metadata[_JOINED_KEY] = " ".join(map(str, self.joined))
-        schema = _make_schema(self.keys, trials.target_names).with_metadata(metadata)
+        schema = _make_schema(trials.points.names).with_metadata(metadata)
         return encode_table(make_table(columns, schema))
 
     @classmethod
@@ -124,14 +123,8 @@ class Plan:
             metadata = file.schema_arrow.metadata or {}
             # The first four columns are those of every plan; the values that were drawn for each trial follow.
             columns = file.schema_arrow.names[4:]
-            keys = tuple(name for name in columns if not is_target(name))
-            targets = tuple(name for name in columns if is_target(name))
             version = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
-            if (
-                version != _FORMAT
-                or not file.schema_arrow.equals(_make_schema(keys, targets))
-                or not file.metadata.num_rows
-            ):
+            if version != _FORMAT or not file.schema_arrow.equals(_make_schema(columns)) or not file.metadata.num_rows:
                 raise DatasetError(
                     "not a plan that this version reads",
                     path=path,
@@ -141,15 +134,15 @@ class Plan:
             if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
                 raise ForeignPlanError("the plan belongs to another configuration", path=path)
             # The digest above covers only the configuration, so somebody may have changed the columns.
-            for key in keys:
+            for key in (name for name in columns if not is_target(name)):
                 if reason := reason_not_sweepable(config, key):
                     raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
-            for name, reason in config.task.find_wrong_targets(targets).items():
+            for name, reason in config.task.find_wrong_targets(tuple(filter(is_target, columns))).items():
                 raise DatasetError(f"is damaged: column {name!r}: {reason}", path=path)
             table = file.read().combine_chunks()
             table.validate(full=True)
             (rows,) = table.to_batches()
-            trials = _read_trials(rows, keys, targets, path)
+            trials = _read_trials(rows, columns, path)
         stored = metadata.get(_SLICE_KEY)
         if stored is not None:
             try:
@@ -203,7 +196,7 @@ def check_some_left(found: Sequence[str | None]) -> None:
     )
 
 
-def _read_trials(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
+def _read_trials(rows: Any, names: Sequence[str], path: Path) -> Trials:
     """Read the trials of the table of a plan."""
     from throwcollect.sweep.arrow_column import nan_where_null, read_numbers
 
@@ -214,11 +207,10 @@ def _read_trials(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], pat
     if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:
         raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
     # The empty array gives the result its shape where no key is swept.
-    values = np.column_stack([np.empty((len(rows), 0)), *(read_numbers(rows[key]) for key in keys)])
-    aims = Targets(targets, np.column_stack([nan_where_null(rows[name]) for name in targets])) if targets else None
+    table = np.column_stack([np.empty((len(rows), 0)), *(nan_where_null(rows[name]) for name in names)])
     reasons = enumerate(rows["refused"].to_pylist(), first)
     return Trials(
-        Points(keys, values, aims),
+        Points(tuple(names), table),
         read_numbers(rows["seed"]),
         np.frombuffer(bytes.fromhex("".join(digests)), np.uint8).reshape(-1, DIGEST_BYTES),
         first=first,
@@ -226,10 +218,10 @@ def _read_trials(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], pat
     )
 
 
-def _make_schema(keys: Sequence[str], targets: Sequence[str]) -> Any:
+def _make_schema(names: Sequence[str]) -> Any:
     import pyarrow as pa
 
     kinds = {"trial": pa.int64(), "digest": pa.string(), "seed": pa.uint64(), "refused": pa.string()}
-    kinds |= dict.fromkeys((*keys, *targets), pa.float64())
-    nullable = {"refused", *targets}
+    kinds |= dict.fromkeys(names, pa.float64())
+    nullable = {"refused", *filter(is_target, names)}
     return pa.schema([pa.field(name, kind, nullable=name in nullable) for name, kind in kinds.items()])

@@ -18,7 +18,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import suggest_path
 from throwcollect.sweep.csv_file import MOST_PROBLEMS, read_csv
 from throwcollect.sweep.parquet_file import encode_table
-from throwcollect.sweep.points import Points, Targets
+from throwcollect.sweep.points import Points
 
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
 """Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
@@ -61,19 +61,15 @@ def encode_points(points: Points) -> bytes:
 
     from throwcollect.sweep.arrow_column import make_column, null_where_nan
 
-    columns: dict[str, Any] = {key: points.values[:, column] for column, key in enumerate(points.keys)}
-    if (targets := points.targets) is not None:
-        values = map(null_where_nan, targets.values.T)
-        columns |= {name: make_column(each, pa.float64()) for name, each in zip(targets.names, values, strict=True)}
-    return encode_table(pa.table(columns))
+    columns = [make_column(null_where_nan(each), pa.float64()) for each in points.table.T]
+    return encode_table(pa.table(columns, names=list(points.names)))
 
 
 def _make_points(names: tuple[str, ...], values: NDArray[np.float64], config: Config) -> Points:
-    """Separate keys from targets, and put targets into the order of the task."""
-    keys = [column for column, name in enumerate(names) if not is_target(name)]
-    targets = tuple(column.name for column in config.task.target_columns if column.name in names)
-    aims = Targets(targets, values[:, [names.index(name) for name in targets]]) if targets else None
-    return Points(tuple(names[column] for column in keys), values[:, keys], aims)
+    """Put targets behind the keys, in the order of the task."""
+    keys = [name for name in names if not is_target(name)]
+    ordered = (*keys, *(column.name for column in config.task.target_columns if column.name in names))
+    return Points(ordered, values[:, [names.index(name) for name in ordered]])
 
 
 def _read_csv(path: Path, config: Config) -> _Read:
@@ -122,16 +118,14 @@ def _check_columns(names: tuple[str, ...], line: int | None, *, path: Path, conf
 
 def _find_target_problems(points: Points, rows: Sequence[int], path: Path, config: Config) -> Iterator[Problem]:
     """Find rows with incomplete targets, and with targets that no robot reaches."""
-    if (targets := points.targets) is None:
-        return
-    far = np.argwhere(np.abs(targets.values) > LARGEST_TARGET)
+    far = np.argwhere(np.abs(points.targets) > LARGEST_TARGET)
     for row, column in far[:MOST_PROBLEMS].tolist():
         sentence = f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}"
-        yield _of_row(f"{sentence}, got {targets.values[row, column]}", targets.names[column], path, rows[row])
-    there = ~np.isnan(targets.values)
+        yield _of_row(f"{sentence}, got {points.targets[row, column]}", points.target_names[column], path, rows[row])
+    there = ~np.isnan(points.targets)
     # Few combinations of targets occur, so each combination is checked once, however many rows have it.
     for pattern in np.unique(there, axis=0):
-        names = [name for name, has in zip(targets.names, pattern.tolist(), strict=True) if has]
+        names = [name for name, has in zip(points.target_names, pattern.tolist(), strict=True) if has]
         wrong = config.task.find_wrong_targets(names)
         for row in np.flatnonzero((there == pattern).all(axis=1))[:MOST_PROBLEMS] if wrong else ():
             for name, sentence in wrong.items():

@@ -8,55 +8,56 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-
-@dataclass(frozen=True, eq=False)
-class Targets:
-    """Places where trials should end, one row per trial; the simulation does not depend on them.
-
-    Attributes:
-        names: Columns of targets that the task declares, ``(n_targets,)``.
-        values: In the units of their names, NaN where a trial has none, shape ``(n_trials, n_targets)``.
-    """
-
-    names: tuple[str, ...]
-    values: NDArray[np.float64]
-
-    def __getitem__(self, rows: slice) -> Targets:
-        return Targets(self.names, self.values[rows])
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Targets):
-            return NotImplemented
-        return self.names == other.names and np.array_equal(self.values, other.values, equal_nan=True)
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def row(self, number: int) -> dict[str, float]:
-        """Return the target of a row by column, without missing values; empty if it has none."""
-        pairs = zip(self.names, self.values[number].tolist(), strict=True)
-        return {name: value for name, value in pairs if not math.isnan(value)}
+from throwcollect.config.task_config import is_target
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Values of the swept keys, one row per trial.
+    """Values of the swept keys, and places where trials should end, on which no simulation depends; one row per trial.
 
     Attributes:
-        keys: Dotted configuration keys, ``(n_keys,)``.
-        values: In the units of the keys, shape ``(n_trials, n_keys)``.
-        targets: Places where the trials should end; None if no trial has one.
+        names: Dotted configuration keys, then columns of targets that the task declares, ``(n_columns,)``.
+        table: In the units of the names, NaN where a trial has no target, shape ``(n_trials, n_columns)``.
     """
 
-    keys: tuple[str, ...]
-    values: NDArray[np.float64]
-    targets: Targets | None = None
+    names: tuple[str, ...]
+    table: NDArray[np.float64]
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Points):
             return NotImplemented
-        return self.keys == other.keys and np.array_equal(self.values, other.values) and self.targets == other.targets
+        return self.names == other.names and np.array_equal(self.table, other.table, equal_nan=True)
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __len__(self) -> int:
+        return len(self.table)
+
     def __getitem__(self, rows: slice) -> Points:
-        return Points(self.keys, self.values[rows], self.targets and self.targets[rows])
+        return Points(self.names, self.table[rows])
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Dotted configuration keys, ``(n_keys,)``."""
+        return tuple(name for name in self.names if not is_target(name))
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Values of the keys, shape ``(n_trials, n_keys)``."""
+        return self.table[:, : len(self.keys)]
+
+    @property
+    def target_names(self) -> tuple[str, ...]:
+        """Columns of targets; empty if no trial has one."""
+        return self.names[len(self.keys) :]
+
+    @property
+    def targets(self) -> NDArray[np.float64]:
+        """Places where the trials should end, shape ``(n_trials, n_targets)``."""
+        return self.table[:, len(self.keys) :]
+
+    def row(self, number: int) -> tuple[dict[str, float], dict[str, float]]:
+        """Return the values of a row by key, and its target by column, without missing numbers."""
+        numbers = dict(zip(self.names, self.table[number].tolist(), strict=True))
+        target = {name: numbers.pop(name) for name in self.target_names}
+        return numbers, {name: value for name, value in target.items() if not math.isnan(value)}

@@ -10,7 +10,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.sweep.points import Points, Targets
+from throwcollect.sweep.points import Points
 
 DIGEST_BYTES = 32
 """Size of a SHA-256 [bytes]."""
@@ -66,21 +66,6 @@ class Trials(Sequence[Trial]):
     def keys(self) -> tuple[str, ...]:
         """Swept dotted keys."""
         return self.points.keys
-
-    @property
-    def values(self) -> NDArray[np.float64]:
-        """Values of the keys, shape ``(n_trials, n_keys)``."""
-        return self.points.values
-
-    @property
-    def targets(self) -> Targets | None:
-        """Places where the trials should end; None if no trial has one."""
-        return self.points.targets
-
-    @property
-    def target_names(self) -> tuple[str, ...]:
-        """Columns of targets; empty if no trial has one."""
-        return () if self.targets is None else self.targets.names
 
     @property
     def refused(self) -> Mapping[int, str]:
@@ -147,9 +132,8 @@ class Trials(Sequence[Trial]):
 
     def _make_trial(self, number: int) -> Trial:
         row = number - self.first
-        values = dict(zip(self.keys, self.values[row].tolist(), strict=True))
+        values, target = self.points.row(row)
         digest = self.digests[row].tobytes().hex()
-        target = {} if self.targets is None else self.targets.row(row)
         return Trial(number, values, int(self.seeds[row]), digest, self._refused.get(number), target)
 
 

@@ -161,8 +161,8 @@ def test_columns_of_targets_are_no_keys_and_may_be_empty_in_a_row(csv):
     points = read_points(csv(TARGETED + "1.0,-0.2,1.4\n1.1,,\n1.2, ,\n"), Config())
     assert points.keys == ("task.duration_s",)
     assert points.values.tolist() == [[1.0], [1.1], [1.2]]
-    assert points.targets.names == ("target_x_m", "target_y_m")
-    assert [points.targets.row(number) for number in range(3)] == [{"target_x_m": 1.4, "target_y_m": -0.2}, {}, {}]
+    assert points.target_names == ("target_x_m", "target_y_m")
+    assert [points.row(number)[1] for number in range(3)] == [{"target_x_m": 1.4, "target_y_m": -0.2}, {}, {}]
 
 
 def test_targets_survive_the_way_through_a_parquet_file(csv, tmp_path):
