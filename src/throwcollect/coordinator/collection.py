@@ -311,7 +311,7 @@ class TrialCollection:
         if self._config.until is not None:
             self.writer.end_with(self._prefix.stop - 1)
         # The comparison comes first, because what is written next makes the dataset count as finished.
-        if (sentence := self._replay.compare(self.writer.episode_rows(), meanwhile=meanwhile)) is not None:
+        if (sentence := self._replay.compare(self.writer.throws(), meanwhile=meanwhile)) is not None:
             say(sentence)
         outcomes = self.writer.finish(simulations=len(self._took_part) or None)
         lost = explain_loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)

@@ -103,8 +103,8 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     # If some trials have not been checked, and few have, others may be left that can be run.
     if count == len(points.values) or count >= _TRIALS_A_PIECE:
         check_some_left(reasons)
-    unchecked = [None] * (len(points.values) - count)
-    return Plan(config, make_trials(config, points).refuse([*reasons, *unchecked]))
+    refused = {number: reason for number, reason in enumerate(reasons) if reason is not None}
+    return Plan(config, replace(make_trials(config, points), refused=refused))
 
 
 def find_sunken_robot(config: Config) -> str | None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pyarrow as pa
+
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import CONFIG, PLAN
-from throwcollect.dataset.throws_table import Row
+from throwcollect.dataset.throws_table import Row, find_row
 from throwcollect.errors import DatasetError
 from throwcollect.side_by_side import Workers
 from throwcollect.sweep.plan import Plan
@@ -48,15 +50,16 @@ class ReplayCheck:
         self.begun = True
         self._simulate(choose_trials(trials, count=self._count, seed=self._seed))
 
-    def compare(self, rows: Mapping[int, Row], *, meanwhile: Callable[[], None]) -> str | None:
+    def compare(self, throws: pa.Table, *, meanwhile: Callable[[], None]) -> str | None:
         """Compare episodes and results of some trials, and return a sentence on that; None if there are no trials.
 
         Args:
-            rows: Row of each trial that has an episode, in order of trials.
+            throws: The table of throws.
             meanwhile: Is called again and again while a process works.
         """
         # The choice is made by place in the list, so the order must not depend on which episode came first.
-        trials = choose_trials(list(rows), count=self._count, seed=self._seed)
+        recorded = throws["trial"].filter(throws["digest"].is_valid()).to_pylist()
+        trials = choose_trials(recorded, count=self._count, seed=self._seed)
         if list(self._again) != trials:
             # If the guess was wrong, do not wait: a trial that was lost may never end in that process, either.
             self._simulate(trials)
@@ -64,7 +67,8 @@ class ReplayCheck:
             meanwhile()
         again = {trial: self._workers.wait(future) for trial, future in self._again.items()}
         self.close()
-        wrong = {trial: sentence for trial in trials if (sentence := _find_difference(rows[trial], again[trial]))}
+        pairs = {trial: (find_row(throws, trial) or {}, again[trial]) for trial in trials}
+        wrong = {trial: sentence for trial, pair in pairs.items() if (sentence := _find_difference(*pair))}
         if wrong:
             counted = f"{len(wrong)} of {format_count(len(trials), 'trial')}"
             raise DatasetError(

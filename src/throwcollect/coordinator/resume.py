@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +31,7 @@ from throwcollect.dataset.manifest import entry_of, entry_of_file, is_begun
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws, read_throws_table
+from throwcollect.dataset.throws_table import ThrowsTable, find_row, read_throws, read_throws_table
 from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
@@ -294,12 +294,12 @@ def finish_without_simulating(
         onlooker.say(f"{directory}: is finished, and no file of it is missing or damaged")
         return
     table, provenance = ThrowsTable.of(plan), read_provenance(directory)
-    rows: Mapping[int, Row] = {}
+    throws = table.table([])
     with suppress(DatasetError):
-        rows = RowsByTrial(read_throws_table(directory / THROWS, plan))
+        throws = read_throws_table(directory / THROWS, plan)
 
     def judge(config: Config, episode: Episode) -> Result:
-        row = rows.get(episode.header.trial)
+        row = find_row(throws, episode.header.trial)
         return table.result(row) if row and row["digest"] == episode.digest else judge_episode(config, episode)
 
     there: list[int] = []
@@ -318,13 +318,14 @@ def finish_without_simulating(
         writer.recover(keep, judge=judge)
         if plan.config.until is not None:
             # Where the dataset ends without the missing trials is not known, so it ends with the last known one.
-            last = max([*there, *([] if wanted <= 0 else rows)], default=plan.trials.first)
+            known = [] if wanted <= 0 else throws["trial"].drop_null().to_pylist()
+            last = max([*there, *known], default=plan.trials.first)
             for trial in writer.list_missing():
-                if (row := rows.get(trial)) and row["outcome"] == REFUSED:
+                if (row := find_row(throws, trial)) and row["outcome"] == REFUSED:
                     writer.refuse(trial, row["reason"])
             writer.end_with(last)
         for trial in writer.list_missing():
-            row = rows.get(trial)
+            row = find_row(throws, trial)
             writer.append_lost(trial, row["reason"] if row and row["outcome"] == LOST else _NO_EPISODE)
         writer.finish(provenance=provenance)
 

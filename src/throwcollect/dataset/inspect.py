@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 
 from throwcollect.dataset.journal import measure_collected_s
@@ -15,7 +16,7 @@ from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.errors import DatasetError
 from throwcollect.progress_log import log_progress
-from throwcollect.sweep.arrow_column import find_range, find_rows
+from throwcollect.sweep.arrow_column import nan_where_null
 from throwcollect.wording import command, join_names
 
 _MOST_NAMED = 5
@@ -61,10 +62,14 @@ def summary(dataset: Dataset) -> Info:
 
 def _find_landing_area(throws: pa.Table, success: str) -> Mapping[str, tuple[float, float]] | None:
     """Find where the throws of this outcome ended; a ball that hit the robot first may cross the landing plane, too."""
-    rows = find_rows(throws["outcome"], success)
-    ranges = {axis: find_range(throws[f"landing_{axis}"], rows) for axis in ("x_m", "y_m")}
-    found = {axis: each for axis, each in ranges.items() if each is not None}
-    return found if len(found) == len(ranges) else None
+    rows = np.array([outcome == success for outcome in throws["outcome"].to_pylist()], np.bool_)
+    found = {}
+    for axis in ("x_m", "y_m"):
+        ends = nan_where_null(throws[f"landing_{axis}"].combine_chunks())[rows]
+        if np.isnan(ends).all():
+            return None
+        found[axis] = float(np.nanmin(ends)), float(np.nanmax(ends))
+    return found
 
 
 def check_recordings_are_there(dataset: Dataset) -> None:

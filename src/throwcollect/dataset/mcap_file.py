@@ -64,12 +64,14 @@ class RecordGroup:
         chunk_index: Index of the chunk, as if the run began at offset 0.
         counts: Number of messages on each channel, by its number.
         metadata_length: Size of the Metadata record at the end [bytes]; 0 if there is none.
+        offset: Where the run begins in a file [bytes], if it lies in one.
     """
 
     data: bytes
     chunk_index: records.ChunkIndex
     counts: Mapping[int, int]
     metadata_length: int
+    offset: int = 0
 
     @property
     def length(self) -> int:

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple
 
 from mcap import records
 from mcap.data_stream import ReadDataStream
@@ -46,13 +46,6 @@ _EFFORT = 64
 """Most bytes that are read in vain for each byte of the file; only a file that was made to be slow needs more."""
 
 _RECORD_HEADER = struct.Struct("<BQ")
-_R = TypeVar("_R", covariant=True)
-
-
-class _Kind(Protocol[_R]):
-    """Class of an MCAP record that can be read without its length."""
-
-    def read(self, stream: ReadDataStream) -> _R: ...
 
 
 class McapRecord(NamedTuple):
@@ -73,12 +66,13 @@ class McapRecord(NamedTuple):
         # Before Python 3.12, to look for a number in the enumeration itself is an error.
         return Opcode(self.opcode).name.lower() if self.opcode in set(Opcode) else f"record 0x{self.opcode:02x}"
 
-    def parse(self, kind: _Kind[_R]) -> _R:
-        """Read its fields; `kind` is its class, which cannot be Message, as that has no length of its own."""
+    def parse_metadata(self) -> records.Metadata:
+        """Read the fields of a Metadata record."""
         try:
-            return kind.read(ReadDataStream(io.BytesIO(self.data[_RECORD_HEADER.size :])))
+            read: records.Metadata = records.Metadata.read(ReadDataStream(io.BytesIO(self.data[_RECORD_HEADER.size :])))
         except (EndOfFile, struct.error, UnicodeDecodeError) as error:
             raise DatasetError(f"{self.kind} record is not readable", place=f"byte {self.offset}") from error
+        return read
 
 
 @dataclass(frozen=True)
@@ -105,9 +99,9 @@ class StoredEpisode:
         return self.facts.end
 
     @classmethod
-    def of(cls, chunk: McapRecord, indexes: bytes, facts: McapRecord) -> StoredEpisode:
-        """Make the episode of a chunk, its message indexes, and the Metadata record behind them."""
-        stated = facts.parse(records.Metadata) if facts.opcode == Opcode.METADATA else None
+    def of(cls, contents: McapContents, chunk: McapRecord, facts: McapRecord) -> StoredEpisode:
+        """Read the episode of a chunk and of the Metadata record that ends it, whatever lies between the two."""
+        stated = facts.parse_metadata() if facts.opcode == Opcode.METADATA else None
         if stated is None or stated.name != EPISODE:
             place = f"byte {facts.offset}"
             raise DatasetError(f"a {facts.kind} where the metadata of an episode should be", place=place)
@@ -118,16 +112,18 @@ class StoredEpisode:
             episode = Episode(header_from_json(stated.metadata.get("header", "")), parsed)
         except DatasetError as error:
             raise error.locate(place=f"byte {chunk.offset}") from error
+        indexes = contents.slice(chunk.end, facts.offset)
         return cls(episode, chunk, indexes, facts, stated.metadata.get("digest"))
 
     @property
     def run(self) -> RecordGroup | None:
-        """Its run of records; None if that is not byte for byte what the writer makes of the episode.
+        """Its run of records without their bytes; None if it is not byte for byte what the writer makes of the episode.
 
         The message indexes or metadata of a whole episode without a run are damaged, so it has to be written anew.
         """
         run = episode_run(self.episode)
-        return run if run.data == self.chunk.data + self.indexes + self.facts.data else None
+        same = run.data == self.chunk.data + self.indexes + self.facts.data
+        return replace(run, data=b"", offset=self.offset) if same else None
 
     def check_whole(self) -> None:
         """Compare everything that is hashed with its hashes."""
@@ -180,19 +176,10 @@ class McapContents:
             mark = self.find(CHUNK_MARK, mark + 1)
         return -1
 
-    def records(self, offset: int = len(MAGIC)) -> Iterator[McapRecord]:
-        """Read the records from an offset on, to the footer or the end of the file."""
-        while offset < len(self._data):
-            record = self.record(offset)
-            yield record
-            if record.opcode == Opcode.FOOTER:
-                return
-            offset = record.end
-
     def read_robot_description(self) -> str:
         """Read the URDF text of the robot, which is among the latched messages that every file begins with."""
         try:
-            table = read_latched_table(self.record(self.next_chunk(0)))
+            table = MessageTable(self.chunk(self.next_chunk(0)).decompress(), 1)
             message = table.messages(ROBOT_DESCRIPTION_ID)[0].tobytes()
             text: str = deserialize(message, get_message("std_msgs/msg/String")).data
         except (DatasetError, KeyError, ValueError) as error:
@@ -211,16 +198,7 @@ class McapContents:
         record = self.record(chunk.end)
         while record.opcode == Opcode.MESSAGE_INDEX:
             record = self.record(record.end)
-        return self.episode_between(chunk, record)
-
-    def episode_between(self, chunk: McapRecord, facts: McapRecord) -> StoredEpisode:
-        """Read the episode of a chunk and of the Metadata record that ends it, whatever lies between the two."""
-        return StoredEpisode.of(chunk, self.slice(chunk.end, facts.offset), facts)
-
-
-def read_latched_table(record: McapRecord) -> MessageTable:
-    """Read the messages of the chunk of the latched topics."""
-    return MessageTable(Chunk.parse(record.data).decompress(), 1)
+        return StoredEpisode.of(self, chunk, record)
 
 
 def _measure(descriptor: int) -> int:
@@ -342,7 +320,7 @@ def _find_whole(contents: McapContents, chunk: McapRecord, facts: int) -> Stored
     between the chunk and these metadata may be damaged.
     """
     try:
-        stored = contents.episode_between(chunk, contents.record(facts))
+        stored = StoredEpisode.of(contents, chunk, contents.record(facts))
         stored.check_whole()
     except DatasetError:
         return None

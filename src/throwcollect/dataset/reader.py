@@ -22,15 +22,14 @@ from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, read_throws
-from throwcollect.dataset.trajectories import Trajectories, read_trajectories
-from throwcollect.dataset.trajectory_columns import COLUMNS
+from throwcollect.dataset.trajectories import COLUMNS, Trajectories, read_trajectories
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import count_values, find_trial
+from throwcollect.sweep.arrow_column import find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
 
@@ -155,7 +154,7 @@ class Dataset(Sequence[Throw]):
     @property
     def shards(self) -> tuple[str, ...]:
         """Names of the recordings that its throws are in, in order."""
-        return tuple(sorted(count_values(self.throws["shard"]).keys() - {None}))
+        return tuple(sorted(set(self.throws["shard"].to_pylist()) - {None}))
 
     @property
     def topics(self) -> Mapping[str, int]:

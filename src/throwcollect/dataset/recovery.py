@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.config.schema import Config
@@ -29,7 +29,7 @@ from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import map_file, scan_file
 from throwcollect.dataset.shard import FinishedShard, OpenShard, rewrite
-from throwcollect.dataset.throws_table import EpisodePlace
+from throwcollect.dataset.throws_table import Row, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
@@ -48,13 +48,13 @@ _MANY_EPISODES = 1000
 class RecoveredEpisode:
     """An episode on disk that is as a new simulation of its trial would record it, so the trial need not run again.
 
-    It lies at `place` now. `run` has its records without their bytes; None if they are not byte for byte what the
-    writer writes, so that the episode has to be written anew.
+    It lies at `place` now, in columns of the table. `run` has its records without their bytes; None if they are not
+    byte for byte what the writer writes, so that the episode has to be written anew.
     """
 
     trial: int
     result: Result
-    place: EpisodePlace
+    place: Row
     run: RecordGroup | None
 
 
@@ -84,10 +84,6 @@ class LeftOfShard:
         return LeftOfShard(final, begun, None)
 
 
-LeftShard = tuple[Path, Plan]
-"""A shard of which something may be left: its final path and its trials."""
-
-
 def remove_unfinished(directory: Path) -> None:
     """Remove half-written files that a killed process left beside the recordings; the files themselves stay."""
     for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
@@ -95,9 +91,9 @@ def remove_unfinished(directory: Path) -> None:
 
 
 def find_left(
-    parts: Sequence[LeftShard], channels: Channels, *, judge: Judge = judge_episode, processes: int = 1
+    parts: Sequence[tuple[Path, Plan]], channels: Channels, *, judge: Judge = judge_episode, processes: int = 1
 ) -> Iterator[LeftOfShard]:
-    """Look for what is left of shards, in several of them at a time if there are many episodes. Changes nothing.
+    """Look for what is left of shards, given by final path and trials, side by side if there are many. Changes nothing.
 
     Yields:
         What is left of each, in order.
@@ -109,8 +105,8 @@ def find_left(
     )
 
 
-def _look_with(channels: Channels, judge: Judge) -> Callable[[LeftShard], LeftOfShard]:
-    def look(part: LeftShard) -> LeftOfShard:
+def _look_with(channels: Channels, judge: Judge) -> Callable[[tuple[Path, Plan]], LeftOfShard]:
+    def look(part: tuple[Path, Plan]) -> LeftOfShard:
         path, plan = part
         final = find_episodes(path, plan, channels, judge=judge)
         # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
@@ -144,12 +140,12 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
         _rename(shard.part, shard.path)
         final, begun = begun, {}
     # Both files have episodes if an earlier process was killed before it had removed one of them.
-    runs = {trial: (each.place.chunk_offset, each.run) for trial, each in begun.items() if each.run is not None}
+    runs = {trial: each.run for trial, each in begun.items() if each.run is not None}
     if runs:
         shard.adopt(runs)
     else:
         remove(shard.part)
-    only_final = {each.place.chunk_offset: each for trial, each in final.items() if trial not in runs}
+    only_final = {each.place["chunk_offset"]: each for trial, each in final.items() if trial not in runs}
     if only_final:
         for found in scan_file(shard.path):
             if found.offset in only_final:
@@ -191,16 +187,16 @@ def find_episodes(
             continue
         recorded = channels is None or channels.numbers == tuple(episode.table.columns)
         if recorded and episode.header.start_ns == plan.config.trial_start_ns(trial):
-            place = EpisodePlace(path.name, found.offset, episode.header.samples, episode.digest)
+            place = place_columns(path.name, found.offset, episode)
             run = found.run
             if run is not None or trial not in episodes:
-                episodes[trial] = RecoveredEpisode(trial, result, place, run and replace(run, data=b""))
+                episodes[trial] = RecoveredEpisode(trial, result, place, run)
     return episodes
 
 
 def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, RecoveredEpisode]) -> FinishedShard | None:
     """Describe a finished file; None if it is not, byte for byte, what the writer makes of its episodes."""
-    runs = {trial: (each.place.chunk_offset, each.run) for trial, each in episodes.items() if each.run is not None}
+    runs = {trial: each.run for trial, each in episodes.items() if each.run is not None}
     if len(runs) < len(episodes):
         return None
     with map_file(path) as contents:

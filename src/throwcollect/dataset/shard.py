@@ -8,11 +8,10 @@ file ``<name>_00000.mcap``, and the other vanishes.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from operator import itemgetter
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
@@ -28,8 +27,6 @@ from throwcollect.files import open_regular, remove, replacing, unwritable, writ
 
 Recording = tuple[FileSummary, FileEntry]
 """What bag's metadata and manifest say of an MCAP file."""
-Runs = Mapping[int, tuple[int, RecordGroup]]
-"""By trial, where the run of its episode begins in a file [bytes], and its records without their bytes."""
 
 
 @dataclass(frozen=True)
@@ -45,45 +42,34 @@ class FinishedShard:
     offsets: dict[int, int]
 
 
-def write_in_order(
-    write: Callable[[bytes], None],
-    channels: Channels,
-    runs: Runs,
-    read: Callable[[int, int], bytes],
-    *,
-    name: str,
-) -> FinishedShard:
-    """Write the finished file of some episodes, which depends on nothing but them.
-
-    The runs lie in another file; `read`, called with an offset and a length, returns bytes of it.
-    """
-    trials, places = zip(*sorted(runs.items(), key=itemgetter(0)), strict=True)
-    whole = (replace(run, data=read(offset, run.length)) for offset, run in places)
-    recording, offsets = write_runs(write, channels, whole, name=name)
-    return FinishedShard(recording, dict(zip(trials, offsets, strict=True)))
-
-
 def write_runs(
-    write: Callable[[bytes], None], channels: Channels, runs: Iterable[RecordGroup], *, name: str
-) -> tuple[Recording, list[int]]:
-    """Write a finished file of some runs, at least one; return also where each begins [bytes]."""
-    sha256, file, offsets = RunningHash(), None, []
+    write: Callable[[bytes], None], channels: Channels, runs: Iterable[tuple[int, RecordGroup]], *, name: str
+) -> FinishedShard:
+    """Write the finished file of some episodes, at least one, each with its trial; it depends on nothing but them."""
+    sha256, file, offsets = RunningHash(), None, {}
 
     def put(data: bytes) -> None:
         write(data)
         sha256.update(data)
 
-    for run in runs:
+    for trial, run in runs:
         file = file or McapFile(put, channels, start_ns=run.start_ns)
-        offsets.append(file.size)
+        offsets[trial] = file.size
         file.append(run)
     if file is None:
         raise ValueError(name)
     summary = file.finish(name)
-    return (summary, FileEntry(name, file.size, sha256.hexdigest())), offsets
+    return FinishedShard((summary, FileEntry(name, file.size, sha256.hexdigest())), offsets)
 
 
-def rewrite(contents: McapContents, channels: Channels, runs: Runs, *, name: str) -> tuple[FinishedShard, int | None]:
+def _read_runs(runs: Mapping[int, RecordGroup], read: Callable[[int, int], bytes]) -> Iterator[tuple[int, RecordGroup]]:
+    """Read runs from the file that they lie in, in order of trials; `read` takes an offset and a length."""
+    return ((trial, replace(run, data=read(run.offset, run.length))) for trial, run in sorted(runs.items()))
+
+
+def rewrite(
+    contents: McapContents, channels: Channels, runs: Mapping[int, RecordGroup], *, name: str
+) -> tuple[FinishedShard, int | None]:
     """Write the finished file of the episodes of a file, and compare the two.
 
     Returns:
@@ -100,7 +86,7 @@ def rewrite(contents: McapContents, channels: Channels, runs: Runs, *, name: str
     def read(offset: int, length: int) -> bytes:
         return contents.slice(offset, offset + length)
 
-    finished = write_in_order(compare, channels, runs, read, name=name)
+    finished = write_runs(compare, channels, _read_runs(runs, read), name=name)
     return finished, size if difference is None and size != len(contents) else difference
 
 
@@ -123,19 +109,19 @@ class OpenShard:
         self._descriptor: int | None = None
         self._size = 0
         self._synced = True
-        self._runs: dict[int, tuple[int, RecordGroup]] = {}
+        self._runs: dict[int, RecordGroup] = {}
 
-    def adopt(self, runs: Runs) -> None:
+    def adopt(self, runs: Mapping[int, RecordGroup]) -> None:
         """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off."""
-        size = max(offset + run.length for offset, run in runs.values())
+        size = max(run.offset + run.length for run in runs.values())
         try:
             self._descriptor = open_regular(self.part, os.O_RDWR)
             self._cut(self._descriptor, size)
         except OSError as error:
             raise unwritable(self.part, error) from error
         self._size = size
-        for trial, (offset, run) in runs.items():
-            self._remember(trial, offset, run)
+        self._runs |= runs
+        self.missing.difference_update(runs)
 
     def append(self, episode: Episode) -> None:
         """Write an episode; when it fails, the file is as it was before."""
@@ -155,7 +141,9 @@ class OpenShard:
                     self._cut(self._descriptor, start)
             self._size = start
             raise unwritable(self.part, error) from error
-        self._remember(episode.header.trial, offset, run)
+        # The bytes are dropped, as the file has them; otherwise, whole shards would be in memory.
+        self._runs[episode.header.trial] = replace(run, data=b"", offset=offset)
+        self.missing.discard(episode.header.trial)
 
     def finish(self) -> FinishedShard:
         """Write the shard in trial order and remove what it was copied from."""
@@ -163,8 +151,8 @@ class OpenShard:
         if self._runs:
             # The final file is on the disk before the unfinished one is removed, so at any moment one has all episodes.
             with replacing(self.path) as descriptor:
-                write = partial(write_all, descriptor)
-                finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
+                runs = _read_runs(self._runs, self._read)
+                finished = write_runs(partial(write_all, descriptor), self._channels, runs, name=self.path.name)
         if self._descriptor is not None:
             self.close()
             remove(self.part)
@@ -185,11 +173,6 @@ class OpenShard:
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
-
-    def _remember(self, trial: int, offset: int, run: RecordGroup) -> None:
-        # The bytes are dropped, as the file has them; otherwise, whole shards would be in memory.
-        self._runs[trial] = (offset, replace(run, data=b""))
-        self.missing.discard(trial)
 
     def _read(self, offset: int, length: int) -> bytes:
         if self._descriptor is None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.dataset.directory import path_of_part, shard_name
-from throwcollect.dataset.recovery import LeftShard
 from throwcollect.sweep.plan import Plan
 
 
@@ -44,7 +43,7 @@ class ShardLayout:
         path = self.path(number)
         return path.exists() or path_of_part(path).exists()
 
-    def part(self, number: int) -> LeftShard:
+    def part(self, number: int) -> tuple[Path, Plan]:
         """Describe a shard for `find_left`, without a look into its files."""
         members, first = self.members(number), self.plan.trials.first
         trials = self.plan.trials[members.start - first : members.stop - first]

@@ -19,7 +19,7 @@ from throwcollect.config.values import column_of
 from throwcollect.dataset.mcap_reader import EpisodePlace
 from throwcollect.dataset.motion import Ball, Joints
 from throwcollect.dataset.throws_table import Row, ball_state
-from throwcollect.dataset.trajectory_columns import (
+from throwcollect.dataset.trajectories import (
     ATTRIBUTES,
     BALL_COLUMNS,
     JOINT_COLUMNS,

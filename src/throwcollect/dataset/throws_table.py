@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,10 @@ from throwcollect.config.task_config import TARGET_PREFIX, is_target
 from throwcollect.config.values import column_of
 from throwcollect.dataset.directory import SOURCES, THROWS, list_shards
 from throwcollect.dataset.misses import Misses
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.members import explain_failure
-from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_numbers, read_validity
+from throwcollect.sweep.arrow_column import find_range, find_trial, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
@@ -35,21 +35,12 @@ Row = dict[str, Any]
 
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
-_ROWS_A_PIECE = 500
-"""Number of rows that are made at a time: enough that this takes no longer than making all at once."""
 
 
-@dataclass(frozen=True)
-class EpisodePlace:
-    """The place of an episode in a dataset: its MCAP file and the offset of its first chunk there [bytes].
-
-    Number of samples and digest say which episode it is.
-    """
-
-    shard: str
-    chunk_offset: int
-    samples: int
-    digest: str
+def place_columns(shard: str, chunk_offset: int, episode: Episode) -> Row:
+    """Make the columns that say where an episode lies, with the offset of its chunk [bytes], and which one it is."""
+    samples, digest = episode.header.samples, episode.digest
+    return {"shard": shard, "chunk_offset": chunk_offset, "samples": samples, "digest": digest}
 
 
 def make_field(name: str, kind: pa.DataType, description: str, *, unit: str | None = None) -> pa.Field:
@@ -140,14 +131,12 @@ class ThrowsTable:
         """Make the table of a plan's trials."""
         return cls(plan.keys, plan.config, plan.trials.points.target_names)
 
-    def row(self, trial: Trial, result: Result, place: EpisodePlace | None) -> Row:
-        """Make the row of a trial that was run; `place` is None if it has no episode."""
+    def row(self, trial: Trial, result: Result, place: Row | None) -> Row:
+        """Make the row of a trial that was run; `place` are its `place_columns`, None if it has no episode."""
         row = self._start_row(trial, result.outcome.value, result.reason)
         row.update(self._columns.write(result))
         row.update(self._misses.measure(trial.target, row))
-        if place is not None:
-            row.update(vars(place))
-        return row
+        return row | (place or {})
 
     def make_refused_row(self, trial: Trial) -> Row:
         """Make the row of a trial that the plan refused."""
@@ -181,46 +170,14 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
 
 def count_outcomes(throws: pa.Table) -> dict[str, int]:
     """Count the trials of each outcome, most frequent first."""
-    counts = count_values(throws["outcome"])
+    counts = Counter(throws["outcome"].to_pylist())
     return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
-class RowsByTrial(Mapping[int, Row]):
-    """The rows of a table of throws, in order of trials; rows without a trial are left out.
-
-    Only a piece of the table at a time is made into rows, which take ten times its memory: a million rows would take
-    3 GB.
-
-    Args:
-        table: The table.
-        recorded: Whether rows of trials without an episode are left out, too.
-    """
-
-    def __init__(self, table: pa.Table, *, recorded: bool = False) -> None:
-        self._table = table
-        places = np.flatnonzero(read_validity(table["digest" if recorded else "trial"].combine_chunks()))[::-1]
-        # Of the rows of one trial in a damaged table, the last one counts.
-        self._trials, first = np.unique(read_numbers(table["trial"].combine_chunks())[places], return_index=True)
-        self._places = places[first]
-        self._start = 0
-        self._piece: list[Row] = []
-
-    def __getitem__(self, trial: int) -> Row:
-        # Dictionaries of a million trials would take 200 MB.
-        index = int(np.searchsorted(self._trials, trial))
-        if index == len(self) or self._trials[index] != trial:
-            raise KeyError(trial)
-        place = int(self._places[index])
-        if not self._start <= place < self._start + len(self._piece):
-            self._start = place - place % _ROWS_A_PIECE
-            self._piece = self._table.slice(self._start, _ROWS_A_PIECE).to_pylist()
-        return self._piece[place - self._start]
-
-    def __iter__(self) -> Iterator[int]:
-        return map(int, self._trials)
-
-    def __len__(self) -> int:
-        return len(self._trials)
+def find_row(table: pa.Table, trial: int) -> Row | None:
+    """Read the row of a trial from a table of throws; None if it has none."""
+    position = find_trial(table["trial"], trial)
+    return None if position < 0 else table.slice(position, 1).to_pylist()[0]
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:
@@ -245,7 +202,7 @@ def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
         "shard": {None, *list_shards(plan)},
     }
     for name, values in known.items():
-        if unknown := count_values(table[name]).keys() - values:
+        if unknown := set(table[name].to_pylist()) - values:
             return f"{name} is {min(map(repr, unknown))} in some row, which no row of this plan can have"
     places = ("shard", "chunk_offset", "samples", "digest")
     shard, *rest = (read_validity(table[name].combine_chunks()) for name in places)

@@ -2,25 +2,74 @@
 
 from __future__ import annotations
 
+import math
+import mmap
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import overload
+from itertools import groupby
+from operator import attrgetter
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.mcap_reader import EpisodePlace
-from throwcollect.dataset.trajectory_columns import COLUMNS, Column, empty_columns, fill
-from throwcollect.errors import ConfigError
+from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
+from throwcollect.episode.message_table import MessageTable, read_column
+from throwcollect.episode.topics import STAMP, read_stamps, rotate
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.units import NS_PER_S, name_sliding
 from throwcollect.wording import format_count, suggest
 
+TIMES = "time_s"
+STAMPS = "stamps_ns"
+ATTRIBUTES = {
+    STAMPS: "stamps_ns",
+    "joints_position": "position",
+    "joints_velocity": "velocity",
+    "joints_effort": "effort",
+    "ball_position": "ball_position",
+    "ball_orientation_xyzw": "ball_orientation_xyzw",
+    "ball_velocity": "ball_linear_velocity",
+    "ball_angular_velocity": "ball_angular_velocity",
+}
+"""The attribute of `Samples` that each recorded column has."""
+COLUMNS = (TIMES, *ATTRIBUTES)
+"""All columns of a trajectory; ``docs/reading.md`` describes them."""
+JOINT_COLUMNS, BALL_COLUMNS = COLUMNS[2:5], COLUMNS[5:]
+_ORIENTATION, *_VELOCITIES = COLUMNS[6:]
+
+_JOINT_COMPONENTS = {"position": "position_rad", "velocity": "velocity_radps", "effort": "effort_nm"}
+_BALL_COMPONENTS = {
+    "position": ("x_m", "y_m", "z_m"),
+    "orientation_xyzw": ("qx", "qy", "qz", "qw"),
+    "velocity": ("vx_mps", "vy_mps", "vz_mps"),
+    "angular_velocity": ("wx_radps", "wy_radps", "wz_radps"),
+}
+
+Column = NDArray[Any]
+"""float64, or int64 for stamps."""
+
+_LARGE_BYTES = 4 << 20
 _BLOCK = 16
 """Throws that are read at once: enough to be worth an array, few enough for the caches."""
 _MOST_THREADS = 4
 """More are of no use, as part of the work holds the lock of the interpreter."""
+
+
+def name_components(column: str, joints: Sequence[str], sliding: Collection[str] = ()) -> tuple[str, ...]:
+    """Name the components of a column, with units, for a table in which each has a column of its own.
+
+    The column is any of `COLUMNS` but times and stamps. A column of joints has the joints `joints`, of
+    which some may be `sliding`.
+    """
+    series, _, quantity = column.partition("_")
+    if series == "joints":
+        names = {joint: f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints}
+        return tuple(name_sliding(name) if joint in sliding else name for joint, name in names.items())
+    return tuple(f"ball_{component}" for component in _BALL_COMPONENTS[quantity])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,12 +170,12 @@ def read_trajectories(
     stored = [place for place in places if place is not None]
     offsets = np.zeros(len(places) + 1, np.int64)
     np.cumsum([place.samples if place else 0 for place in places], out=offsets[1:])
-    found = empty_columns(columns, int(offsets[-1]), len(joints))
+    found = _make_columns(columns, int(offsets[-1]), len(joints))
     blocks = [stored[first : first + _BLOCK] for first in range(0, len(stored), _BLOCK)]
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 
     def read(block: Sequence[EpisodePlace], start: int, stop: int) -> None:
-        fill({name: column[start:stop] for name, column in found.items()}, block, known, joints)
+        _fill({name: column[start:stop] for name, column in found.items()}, block, known, joints)
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:
@@ -134,3 +183,77 @@ def read_trajectories(
         for _ in (pool.map if pool else map)(read, blocks, starts[:-1], starts[1:]):
             pass
     return Trajectories(np.array(trials, np.int64), offsets, found, joints)
+
+
+def _make_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str, Column]:
+    """Make arrays for some of `COLUMNS`, by name; shape ``(samples,)`` or ``(samples, n)``.
+
+    `joints` is the number of joints that the columns of joints have.
+    """
+    widths = dict.fromkeys(JOINT_COLUMNS, joints) | {name: len(name_components(name, ())) for name in BALL_COLUMNS}
+    shapes = {name: (samples, widths[name]) if name in widths else (samples,) for name in columns}
+    return {name: _make_empty(shape, np.int64 if name == STAMPS else np.float64) for name, shape in shapes.items()}
+
+
+def _make_empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < _LARGE_BYTES:
+        return np.empty(shape, dtype)
+    # NumPy asks the kernel for huge pages. A virtual machine whose host takes back free memory gets these piece by
+    # piece, which can take several times as long as everything else here, so the memory is mapped without them.
+    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    return np.frombuffer(memory, dtype).reshape(shape)
+
+
+def _fill(
+    columns: Mapping[str, Column], places: Sequence[EpisodePlace], known: tuple[str, ...], joints: tuple[str, ...]
+) -> None:
+    """Fill columns with those of some throws, one after the other.
+
+    Args:
+        columns: Arrays with as many rows as the throws have samples, by name, as `_make_columns` makes them.
+        places: The throws.
+        known: Joints that are recorded.
+        joints: Joints that the columns of joints have; some of those that are recorded.
+    """
+    velocities = [name for name in _VELOCITIES if name in columns]
+    # Velocities in world follow from orientations, and times from stamps, so these are read even if nobody asks.
+    sources = {_ORIENTATION: velocities, STAMPS: [name for name in (STAMPS, TIMES) if name in columns]}
+    missing = {name for name, derived in sources.items() if derived} - columns.keys()
+    recorded = {**columns, **_make_columns(missing, sum(place.samples for place in places), 0)}
+    some = [] if joints == known else [name for name in JOINT_COLUMNS if name in columns]
+    # Rows of whole columns are copied as runs of bytes.
+    whole = [
+        (column.reshape(len(column), -1).view(f"V{column.strides[0]}")[:, 0], ATTRIBUTES[name])
+        for name, column in recorded.items()
+        if name not in {TIMES, *some}
+    ]
+    indexes = np.array([known.index(joint) for joint in joints], np.intp)
+    filled = 0
+    for path, group in groupby(places, attrgetter("path")):
+        with open_mcap(path) as contents:
+            for place in group:
+                span = slice(filled, filled := filled + place.samples)
+                try:
+                    chunk = contents.chunk(place.offset)
+                    place.check_start(chunk)
+                    rows = MessageTable(chunk.decompress(), place.samples).rows(known)
+                except DatasetError as error:
+                    raise error.locate(path, f"byte {place.offset}") from error
+                for target, name in whole:
+                    target[span] = rows[name]
+                for name in some:
+                    every = read_column(rows, ATTRIBUTES[name])
+                    # With the default mode, NumPy would write to a buffer first; all indexes are valid.
+                    np.take(every, indexes, axis=1, out=columns[name][span], mode="clip")
+                del rows, chunk  # the next ones then take their place in the caches
+    if sources[STAMPS]:
+        stamps = recorded[STAMPS]
+        stamps[:] = read_stamps(stamps.view(STAMP), "stamp")
+        if TIMES in columns:
+            starts, lengths = zip(*((place.start_ns, place.samples) for place in places), strict=True)
+            np.divide(stamps - np.repeat(starts, lengths), NS_PER_S, out=columns[TIMES])
+    if velocities:
+        turned = rotate(recorded[_ORIENTATION], *(columns[name] for name in velocities), inverse=False)
+        for name, values in zip(velocities, turned, strict=True):
+            columns[name][:] = values

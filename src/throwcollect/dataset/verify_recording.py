@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import McapContents, StoredEpisode, map_file, scan
 from throwcollect.dataset.shard import rewrite
-from throwcollect.dataset.throws_table import EpisodePlace, Row, ThrowsTable
+from throwcollect.dataset.throws_table import Row, ThrowsTable, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, find_infinite_columns
@@ -114,7 +114,7 @@ class _RecordingCheck:
         waiting = {trial: row for trial, row in self._rows.items() if row["shard"] is not None}
         # Trials of merged plans have the numbers in their episodes that they were collected by.
         first = self._plan.first_of_part(next(iter(self._rows)))
-        runs: dict[int, tuple[int, RecordGroup]] = {}
+        runs: dict[int, RecordGroup] = {}
         for stored in scan(contents):
             number = stored.episode.header.trial
             row = waiting.pop(first + number, None)
@@ -125,8 +125,7 @@ class _RecordingCheck:
             if (run := stored.run) is None:
                 self._add(place, "the message indexes or the metadata do not fit the chunk")
             else:
-                # The bytes are dropped, as the file has them.
-                runs[number] = stored.offset, replace(run, data=b"")
+                runs[number] = run
             self.report.digests[row["trial"]] = stored.episode.digest
             for problem in self._find_problems(stored, row, channels):
                 self._add(place, problem)
@@ -142,7 +141,7 @@ class _RecordingCheck:
     def _find_problems(self, stored: StoredEpisode, row: Row, channels: Channels) -> Iterator[str]:
         """Find what is wrong with an episode, given the row of its trial, a sentence each."""
         episode, trial = stored.episode, self._plan.trial(row["trial"])
-        place = EpisodePlace(self._name, stored.offset, episode.header.samples, episode.digest)
+        place = place_columns(self._name, stored.offset, episode)
         try:
             config = self._plan.config_of(trial)
             if (found := tuple(episode.table.columns)) != channels.numbers:
@@ -153,7 +152,7 @@ class _RecordingCheck:
                 yield from infinite
                 return
             yield from find_flight_problems(episode, config)
-            expected = {**_planned_columns(trial), **vars(place)}
+            expected = {**_planned_columns(trial), **place}
             if self._robot:
                 expected = self._table.row(trial, judge_episode(config, episode), place)
         except (ConfigError, DatasetError) as error:

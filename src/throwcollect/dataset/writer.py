@@ -8,7 +8,7 @@ stopped, the next writer takes in the files that it left (see `recovery`) and go
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ from throwcollect.dataset.recovery import (
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.shard_layout import ShardLayout
 from throwcollect.dataset.summary_files import write_description
-from throwcollect.dataset.throws_table import EpisodePlace, Row, RowsByTrial, ThrowsTable, count_outcomes
+from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
@@ -145,7 +145,7 @@ class DatasetWriter:
 
     def refuse(self, trial: int, reason: str) -> None:
         """Note that a trial, which has no episode, is not run after all."""
-        self.plan.trials.add_refusal(trial, reason)
+        self.plan.trials.refused[trial] = reason
         number = self._layout.number_of(trial)
         self._get_shard(number).missing.discard(trial)
         self._finish_shard_if_complete(number)
@@ -176,7 +176,7 @@ class DatasetWriter:
         shard = self._get_shard(number)
         shard.append(episode)
         # The offset is not known before the shard is written in order of trials; `_close_shard` puts it in.
-        place = EpisodePlace(shard.path.name, -1, episode.header.samples, episode.digest)
+        place = place_columns(shard.path.name, -1, episode)
         row = shard.rows[trial] = self._make_row(trial, result, place)
         ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
         self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest, **ends)
@@ -205,11 +205,8 @@ class DatasetWriter:
         for shard in self._shards.values():
             shard.sync()
 
-    def episode_rows(self) -> Mapping[int, Row]:
-        """Return the row of each trial that has an episode, in order of trials; all shards must be finished."""
-        return RowsByTrial(self._join_rows(), recorded=True)
-
-    def _join_rows(self) -> pa.Table:
+    def throws(self) -> pa.Table:
+        """Join the rows of all trials, in their order; all shards must be finished."""
         return pa.concat_tables(rows for _, rows in sorted(self._finished_rows.items()))
 
     def finish(
@@ -229,7 +226,7 @@ class DatasetWriter:
             missing = self.list_missing()
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
-        throws = self._join_rows()
+        throws = self.throws()
         if self._journal is not None:
             wall_s = self._journal.measure_collected_s()
         provenance = provenance or Provenance.of_this_machine(
@@ -257,7 +254,7 @@ class DatasetWriter:
         shard = self._get_shard(number)
         episodes = recover_shard(shard, left)
         for each in episodes:
-            place = replace(each.place, shard=shard.path.name)
+            place = {**each.place, "shard": shard.path.name}
             shard.rows[each.trial] = self._make_row(each.trial, each.result, place)
         return episodes
 
@@ -268,7 +265,7 @@ class DatasetWriter:
             self._shards[number].missing.update(self._layout.to_run(number))
         return self._shards[number]
 
-    def _make_row(self, trial: int, result: Result, place: EpisodePlace | None) -> Row:
+    def _make_row(self, trial: int, result: Result, place: Row | None) -> Row:
         return self._table.row(self.plan.trial(trial), result, place)
 
     def _find_waiting_shard(self, trial: int) -> int:

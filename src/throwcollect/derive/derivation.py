@@ -26,7 +26,8 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
 from throwcollect.dataset.shard import write_runs
 from throwcollect.dataset.summary_files import write_description
-from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, make_field
+from throwcollect.dataset.throw import Throw
+from throwcollect.dataset.throws_table import Row, ThrowsTable, make_field
 from throwcollect.derive.joined_plan import join_plans
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
@@ -100,20 +101,20 @@ def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
     channels = _read_channels(sources)
     create(directory, plan, listed=plan.trials.points)
     carry_robot(sources[0].config, directory)
-    table, rows = ThrowsTable.of(plan), [RowsByTrial(source.throws) for source in sources]
+    table = ThrowsTable.of(plan)
     tables, recordings = [], []
     progress = log_progress(copies, len(copies), "trial", "written")
     for name, members in groupby(progress, key=lambda copy: shard_of(plan, copy.number)):
-        held = list(members)
-        episodes = (_read(sources[copy.source], rows[copy.source][copy.trial]) for copy in held)
+        held = [(copy.number, sources[copy.source].throw(copy.trial)) for copy in members]
+        runs = ((number, episode_run(_read(throw))) for number, throw in held)
         with replacing(directory / name) as descriptor:
             write = partial(write_all, descriptor)
-            recording, offsets = write_runs(write, channels, map(episode_run, episodes), name=name)
-        recordings.append(recording)
+            finished = write_runs(write, channels, runs, name=name)
+        recordings += [finished.recording] if finished.recording else []
         tables.append(
             table.table(
-                _make_row(plan, copy.number, rows[copy.source][copy.trial]) | {"shard": name, "chunk_offset": offset}
-                for copy, offset in zip(held, offsets, strict=True)
+                _make_row(plan, number, throw.row) | {"shard": name, "chunk_offset": finished.offsets[number]}
+                for number, throw in held
             )
         )
     throws = pa.concat_tables(tables)
@@ -147,14 +148,13 @@ def _read_channels(sources: Sequence[Dataset]) -> Channels:
     return Channels(sources[0].config, *robots)
 
 
-def _read(source: Dataset, row: Row) -> Episode:
-    throw = source.throw(row["trial"])
+def _read(throw: Throw) -> Episode:
     with throw.locating_damage():
         episode = throw.read_episode()
         # The copy gets hashes of its own, which would make damage look as if it had been recorded.
         episode.chunk.check_records()
-        if episode.digest != row["digest"]:
-            raise DatasetError(f"digest {episode.digest}", expected=f"{row['digest']} as throws.parquet says")
+        if episode.digest != throw["digest"]:
+            raise DatasetError(f"digest {episode.digest}", expected=f"{throw['digest']} as throws.parquet says")
         return episode
 
 

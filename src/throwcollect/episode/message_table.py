@@ -146,15 +146,14 @@ class MessageTable:
         column = self.columns[channel]
         return self._table[:, column.start + MESSAGE_HEADER.size : column.stop]
 
-    def message_index(self, channel: int) -> bytes:
-        """Encode the MCAP Message Index record of one channel: log time and offset in the chunk of each message."""
-        offsets = np.arange(self.columns[channel].start, self._table.size, self._table.shape[1])
-        return encode_message_index(channel, self.headers(channel)["log_time"], offsets)
-
     @property
     def message_indexes(self) -> dict[int, bytes]:
-        """The Message Index records of all channels, by channel."""
-        return {channel: self.message_index(channel) for channel in self.columns}
+        """The MCAP Message Index records of all channels, by channel: log time and offset of each message."""
+        rows = np.arange(0, self._table.size, self._table.shape[1])
+        return {
+            channel: encode_message_index(channel, self.headers(channel)["log_time"], column.start + rows)
+            for channel, column in self.columns.items()
+        }
 
     def rows(self, joints: tuple[str, ...]) -> Rows:
         """View the samples, which have these joints, shape ``(n_samples,)``: fields named as in `Samples`, as bytes.

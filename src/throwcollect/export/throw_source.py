@@ -16,7 +16,7 @@ from throwcollect.arguments import refuse_argument
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.trajectory_columns import name_components
+from throwcollect.dataset.trajectories import name_components
 from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
@@ -271,17 +271,14 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
     # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
-    orientation = _interpolate_linearly(_remove_flips(samples.ball_orientation_xyzw), places)
-    return Samples(
-        stamps_ns=samples.stamps_ns[0] + np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64),
-        position=_interpolate_cubically(samples.position, samples.velocity / recorded_hz, places),
-        velocity=_interpolate_linearly(samples.velocity, places),
-        effort=_interpolate_linearly(samples.effort, places),
-        ball_position=_interpolate_cubically(samples.ball_position, samples.ball_linear_velocity / recorded_hz, places),
-        ball_orientation_xyzw=orientation / np.linalg.norm(orientation, axis=1, keepdims=True),
-        ball_linear_velocity=_interpolate_linearly(samples.ball_linear_velocity, places),
-        ball_angular_velocity=_interpolate_linearly(samples.ball_angular_velocity, places),
-    )
+    columns = {**vars(samples), "ball_orientation_xyzw": _remove_flips(samples.ball_orientation_xyzw)}
+    del columns["stamps_ns"]
+    found = {name: _interpolate_linearly(column, places) for name, column in columns.items()}
+    for name, slopes in {"position": "velocity", "ball_position": "ball_linear_velocity"}.items():
+        found[name] = _interpolate_cubically(columns[name], columns[slopes] / recorded_hz, places)
+    found["ball_orientation_xyzw"] /= np.linalg.norm(found["ball_orientation_xyzw"], axis=1, keepdims=True)
+    elapsed_ns = np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64)
+    return Samples(stamps_ns=samples.stamps_ns[0] + elapsed_ns, **found)
 
 
 def _interpolate_linearly(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +145,7 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
     places = grid.measure(columns)
     learned, _, _ = fit_throws(Kind.LOCAL, axes, grid.names, values[landed], places, columns[EFFORT])
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(number, 0)))
-    found = _aim(learned, Tried(axes, values, ~landed), parameters, grid, count, randomness)
+    found = _aim(learned, partial(_find_promising, axes, values, ~landed), parameters, grid, count, randomness)
     if not len(found):
         raise ConfigError("sweep.target: none of its cells is in reach", hint="look at the report of the first round")
     keys = [axis.key for axis in axes]
@@ -166,26 +167,18 @@ def _list_axes(config: Config) -> tuple[Axis, ...]:
     return tuple(sorted(axes, key=lambda axis: axis.role is KeyRole.CONTEXT))
 
 
-class Tried:
-    """All trials so far, which show where throws fail; `values` are in the units of the axes, ``(n, n_axes)``."""
-
-    def __init__(self, axes: tuple[Axis, ...], values: Array, failed: NDArray[np.bool_]) -> None:
-        self._axes = axes
-        self._inputs = scale_values(axes, values)
-        self._failed = failed
-
-    def find_promising(self, values: Array) -> NDArray[np.bool_]:
-        """Find the points near which at most half of the trials have failed."""
-        near = [
-            find_nearest(((self._inputs - row) ** 2).sum(axis=1), _NEIGHBOURS)
-            for row in scale_values(self._axes, values)
-        ]
-        return np.array([self._failed[rows].mean() <= _RISK for rows in near], np.bool_)
+def _find_promising(
+    axes: tuple[Axis, ...], tried: Array, failed: NDArray[np.bool_], values: Array
+) -> NDArray[np.bool_]:
+    """Find the points near which at most half of the trials have failed; both in units of the axes, ``(n, n_axes)``."""
+    inputs = scale_values(axes, tried)
+    near = [find_nearest(((inputs - row) ** 2).sum(axis=1), _NEIGHBOURS) for row in scale_values(axes, values)]
+    return np.array([failed[rows].mean() <= _RISK for rows in near], np.bool_)
 
 
 def _aim(
     learned: LearnedMap,
-    tried: Tried,
+    find_promising: Callable[[Array], NDArray[np.bool_]],
     parameters: Mapping[str, Parameter],
     grid: Grid,
     count: int,
@@ -225,7 +218,7 @@ def _aim(
         noise = spread_out * randomness.standard_normal((len(starts), len(learned.axes_of(KeyRole.PARAMETER))))
         aims = aim(_start_from(learned, starts, noise), goals, learned.scale(KeyRole.CONTEXT, context))
         values = np.hstack([learned.unscale(KeyRole.PARAMETER, aims.parameters), context])
-        predicted, safe = grid.find_cells(aims.predicted) == cells, tried.find_promising(values)
+        predicted, safe = grid.find_cells(aims.predicted) == cells, find_promising(values)
         for cell, inside, sure, row in zip(cells.tolist(), predicted.tolist(), safe.tolist(), values, strict=True):
             # At the edge of what is in reach, many throws have failed; some risk shows where the edge is.
             hit = inside and (sure or planned[cell] < landed[cell] + _RISKY)

@@ -7,7 +7,6 @@ of columns import `pyarrow.compute`, which takes 0.05 s.
 from __future__ import annotations
 
 from array import array
-from collections import Counter
 from collections.abc import Sequence
 from itertools import accumulate
 from math import isnan
@@ -18,7 +17,6 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 _CODES = {pa.int64(): "q", pa.uint64(): "Q", pa.float64(): "d"}
-_VALUES_AT_ONCE = 1 << 16
 
 
 def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.Array:
@@ -81,29 +79,14 @@ def read_validity(column: pa.Array) -> NDArray[np.bool_]:
     return np.unpackbits(np.frombuffer(bits, np.uint8), bitorder="little")[slice(*ends)].astype(np.bool_)
 
 
-def find_range(column: pa.ChunkedArray, rows: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
-    """Find the least and the largest number of a column, as ``pyarrow.compute.min_max`` does; None if all are null.
-
-    Args:
-        column: The column.
-        rows: Which rows count, shape ``(n_rows,)``; None for all.
-    """
+def find_range(column: pa.ChunkedArray) -> tuple[float, float] | None:
+    """Find the least and the largest number of a column, as ``pyarrow.compute.min_max`` does; None if all are null."""
     if column.null_count == len(column):
         return None
     whole = column.combine_chunks()
-    valid = read_validity(whole)
-    numbers = read_numbers(whole)[valid if rows is None else valid & rows]
-    if not len(numbers):
-        return None
+    numbers = read_numbers(whole)[read_validity(whole)]
     # Like Arrow, these functions leave out NaN, which may stand in tables that others have written.
     return np.fmin.reduce(numbers).item(), np.fmax.reduce(numbers).item()
-
-
-def find_rows(column: pa.ChunkedArray, value: object) -> NDArray[np.bool_]:
-    """Find the rows in which a column has a value, shape ``(n_rows,)``."""
-    starts = range(0, len(column), _VALUES_AT_ONCE)
-    pieces = (column.slice(start, _VALUES_AT_ONCE).to_pylist() for start in starts)
-    return np.fromiter((each == value for piece in pieces for each in piece), np.bool_, len(column))
 
 
 def find_trial(trials: pa.ChunkedArray, trial: int) -> int:
@@ -113,15 +96,6 @@ def find_trial(trials: pa.ChunkedArray, trial: int) -> int:
     if 0 <= trial < len(trials) and trials[trial].as_py() == trial:
         return trial
     return int(trials.index(trial).as_py())
-
-
-def count_values(column: pa.ChunkedArray) -> Counter[Any]:
-    """Count how often each value of a column occurs; null is None."""
-    counts: Counter[Any] = Counter()
-    # As Python objects, a million values would take 60 MB.
-    for start in range(0, len(column), _VALUES_AT_ONCE):
-        counts.update(column.slice(start, _VALUES_AT_ONCE).to_pylist())
-    return counts
 
 
 def make_table(columns: Sequence[Sequence[Any] | NDArray[Any]], schema: pa.Schema) -> pa.Table:

@@ -55,7 +55,7 @@ class Plan:
     @property
     def keys(self) -> tuple[str, ...]:
         """Swept dotted keys."""
-        return self.trials.keys
+        return self.trials.points.keys
 
     def trial(self, number: int) -> Trial:
         """Return the trial of a number."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import overload
 
 import numpy as np
@@ -37,6 +36,7 @@ class Trial:
     target: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(eq=False, repr=False)
 class Trials(Sequence[Trial]):
     """Trials in order and without gaps.
 
@@ -45,32 +45,14 @@ class Trials(Sequence[Trial]):
         seeds: Seed of each trial, shape ``(n_trials,)``.
         digests: Digest of each trial, shape ``(n_trials, DIGEST_BYTES)``.
         first: Number of the first trial.
+        refused: Reasons of the trials that are not run, by their numbers and in their order.
     """
 
-    def __init__(
-        self,
-        points: Points,
-        seeds: NDArray[np.uint64],
-        digests: NDArray[np.uint8],
-        *,
-        first: int = 0,
-        refused: Mapping[int, str] = MappingProxyType({}),
-    ) -> None:
-        self.points = points
-        self.seeds = seeds
-        self.digests = digests
-        self.first = first
-        self._refused = dict(refused)
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Swept dotted keys."""
-        return self.points.keys
-
-    @property
-    def refused(self) -> Mapping[int, str]:
-        """Reasons of the trials that are not run, by their numbers and in their order."""
-        return self._refused
+    points: Points
+    seeds: NDArray[np.uint64]
+    digests: NDArray[np.uint8]
+    first: int = 0
+    refused: dict[int, str] = field(default_factory=dict)
 
     @property
     def numbers(self) -> range:
@@ -80,7 +62,7 @@ class Trials(Sequence[Trial]):
     @property
     def numbers_to_run(self) -> Iterator[int]:
         """Numbers of the trials that are not refused, in order."""
-        return (number for number in self.numbers if number not in self._refused)
+        return (number for number in self.numbers if number not in self.refused)
 
     def __len__(self) -> int:
         return len(self.seeds)
@@ -98,7 +80,7 @@ class Trials(Sequence[Trial]):
         if chosen.step != 1:
             raise ValueError(f"trials have no gaps: {which}")
         rows = slice(chosen.start - self.first, chosen.stop - self.first)
-        refused = {number: self._refused[number] for number in chosen if number in self._refused}
+        refused = {number: self.refused[number] for number in chosen if number in self.refused}
         return Trials(self.points[rows], self.seeds[rows], self.digests[rows], first=chosen.start, refused=refused)
 
     def __iter__(self) -> Iterator[Trial]:
@@ -110,31 +92,18 @@ class Trials(Sequence[Trial]):
         return (
             self.points == other.points
             and self.first == other.first
-            and self._refused == other._refused
+            and self.refused == other.refused
             and np.array_equal(self.seeds, other.seeds)
             and np.array_equal(self.digests, other.digests)
         )
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __repr__(self) -> str:
-        return f"Trials({len(self)} from {self.first}, {len(self._refused)} refused; swept: {', '.join(self.keys)})"
-
-    def add_refusal(self, number: int, reason: str) -> None:
-        """Note that a trial is not run after all."""
-        self._refused[number] = reason
-
-    def refuse(self, reasons: Sequence[str | None]) -> Trials:
-        """Make the same trials with other reasons for refusal, one for each trial in order; None if it is run."""
-        pairs = zip(self.numbers, reasons, strict=True)
-        refused = {number: reason for number, reason in pairs if reason is not None}
-        return Trials(self.points, self.seeds, self.digests, first=self.first, refused=refused)
-
     def _make_trial(self, number: int) -> Trial:
         row = number - self.first
         values, target = self.points.row(row)
         digest = self.digests[row].tobytes().hex()
-        return Trial(number, values, int(self.seeds[row]), digest, self._refused.get(number), target)
+        return Trial(number, values, int(self.seeds[row]), digest, self.refused.get(number), target)
 
 
 def choose_trials(trials: Sequence[int], *, count: int, seed: int) -> list[int]:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 from tests.unit.sweep.own_plan import make_plan
 
@@ -72,7 +73,9 @@ def check(tmp_path: Path) -> Iterator[ReplayCheck]:
 
 
 def compare(check: ReplayCheck, rows: dict[int, Row]) -> str | None:
-    return check.compare(rows, meanwhile=lambda: time.sleep(0.01))
+    empty = {"trial": pa.array([], pa.int64()), "digest": pa.array([], pa.string())}
+    throws = pa.Table.from_pylist([*rows.values()]) if rows else pa.table(empty)
+    return check.compare(throws, meanwhile=lambda: time.sleep(0.01))
 
 
 def test_a_replay_check_uses_the_trials_that_were_begun_early(check, rows, started) -> None:
@@ -136,5 +139,5 @@ def test_closing_a_replay_check_ends_its_process(check) -> None:
 def test_a_replay_check_of_no_trials_starts_no_process(tmp_path, started) -> None:
     check = ReplayCheck(tmp_path, count=0, seed=1)
     check.begin(NUMBERS)
-    assert compare(check, {1: json.dumps(1)}) is None
+    assert compare(check, {1: {"trial": 1, "digest": "d"}}) is None
     assert started == []

@@ -157,8 +157,8 @@ class Collection:
     def refuse(self, trial: int, reason: str) -> None:
         """Make the plan refuse one of its trials."""
         trials = self.plan.trials
-        reasons = trials.refused | {trial: reason}
-        self.plan = replace(self.plan, trials=trials.refuse([reasons.get(number) for number in trials.numbers]))
+        refused = dict(sorted({**trials.refused, trial: reason}.items()))
+        self.plan = replace(self.plan, trials=replace(trials, refused=refused))
 
 
 @pytest.fixture

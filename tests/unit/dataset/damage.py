@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 from mcap.opcode import Opcode
 
-from throwcollect.dataset.mcap_reader import McapRecord, StoredEpisode, open_mcap
+from throwcollect.dataset.mcap_file import MAGIC
+from throwcollect.dataset.mcap_reader import McapContents, McapRecord, StoredEpisode, open_mcap
 
 SHARD = "quick_00001.mcap"
 
@@ -23,9 +25,19 @@ def find_stored(path: Path, trial: int) -> StoredEpisode:
         return contents.episode(contents.record(offset))
 
 
+def records_of(contents: McapContents) -> Iterator[McapRecord]:
+    """The records of a file, to the footer or its end."""
+    offset = len(MAGIC)
+    while offset < len(contents):
+        yield (record := contents.record(offset))
+        if record.opcode == Opcode.FOOTER:
+            return
+        offset = record.end
+
+
 def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> McapRecord:
     with open_mcap(path) as contents:
-        found = [record for record in contents.records() if record.opcode == opcode and holding in record.data]
+        found = [record for record in records_of(contents) if record.opcode == opcode and holding in record.data]
     return found[-1] if last else found[0]
 
 

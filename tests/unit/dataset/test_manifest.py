@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.damage import records_of
 from tests.unit.dataset.mutations import SETTINGS, finish
 
 from throwcollect.dataset.manifest import (
@@ -51,7 +52,7 @@ def classes(directory: Path) -> Iterator[tuple[str, str, list[range]]]:
     size = (directory / shard).stat().st_size
     kinds: dict[str, list[range]] = {"magic": [range(8), range(size - 8, size)]}
     with open_mcap(directory / shard) as contents:
-        for record in contents.records():
+        for record in records_of(contents):
             kinds.setdefault(Opcode(record.opcode).name, []).append(range(record.offset, record.end))
     yield from ((f"MCAP {kind}", shard, places) for kind, places in kinds.items())
 

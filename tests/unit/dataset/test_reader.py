@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
-from tests.unit.dataset.damage import change_table, replace_text
+from tests.unit.dataset.damage import change_table, records_of, replace_text
 
 import throwcollect
 from throwcollect.dataset.mcap_reader import open_mcap
@@ -329,8 +329,8 @@ def test_a_file_that_is_not_an_mcap_file_is_refused(tmp_path: Path, size: int) -
 def test_a_recording_cut_within_a_record_is_an_error(dataset: Path, tmp_path: Path) -> None:
     whole = (dataset / "quick_00002.mcap").read_bytes()
     with open_mcap(dataset / "quick_00002.mcap") as contents:
-        ends = {record.end for record in contents.records()}
+        ends = {record.end for record in records_of(contents)}
     for size in set(range(9, len(whole) - 8, 997)) - ends:
         (tmp_path / "cut.mcap").write_bytes(whole[:size])
         with open_mcap(tmp_path / "cut.mcap") as contents, pytest.raises(DatasetError, match=r"cut off|beyond the end"):
-            list(contents.records())
+            list(records_of(contents))

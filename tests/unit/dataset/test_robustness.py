@@ -19,6 +19,7 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.damage import records_of
 from tests.unit.dataset.mutations import SETTINGS, Mutation, any_mutation, mutate, outcomes
 
 from throwcollect.config.loader import load
@@ -69,7 +70,7 @@ def test_a_recording_with_any_damage_is_read_or_refused(small: Path, sound: Data
 
         def read() -> None:
             with open_mcap(path) as contents:
-                for record in contents.records():
+                for record in records_of(contents):
                     harmless(lambda offset=record.offset: contents.episode(contents.record(offset)).episode.samples())
 
         harmless(read)

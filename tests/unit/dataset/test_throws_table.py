@@ -8,8 +8,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset import throws_table
-from throwcollect.dataset.throws_table import EpisodePlace, RowsByTrial, ThrowsTable, read_throws
+from throwcollect.dataset.throws_table import ThrowsTable, find_row, read_throws
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.tasks.result import Outcome
@@ -31,7 +30,7 @@ def test_results_read_back_equal_from_the_table_of_throws(collection: Collection
     outcomes = set()
     for change in (None, hold_ball, not_finite):
         result = collection.result(collection.episode(2, change))
-        row = table.row(collection.plan.trials[2], result, EpisodePlace("a.mcap", 7, 9, "d"))
+        row = table.row(collection.plan.trials[2], result, {"shard": "a.mcap"})
         (stored,) = table.table([row]).to_pylist()
         assert table.result(stored) == result
         outcomes.add(result.outcome)
@@ -98,13 +97,8 @@ def test_a_table_of_throws_without_one_of_its_columns_is_refused(collection: Col
         read_throws(directory, collection.plan)
 
 
-def test_rows_by_trial_finds_rows_across_pieces_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(throws_table, "_ROWS_A_PIECE", 2)
-    table = pa.table({"trial": [4, None, 0, 2, 4], "outcome": ["a", "b", "c", "d", "e"]})
-    rows = RowsByTrial(table)
-    # If a trial has two rows, the later one counts.
-    expected = {0: "c", 2: "d", 4: "e"}
-    assert list(rows) == list(expected)
-    for trial in (2, 4, 0, 0, 4, 2):
-        assert rows[trial] == {"trial": trial, "outcome": expected[trial]}
-    assert rows.get(1) is None
+def test_the_row_of_a_trial_is_found_wherever_it_stands() -> None:
+    table = pa.table({"trial": [4, None, 0, 2], "outcome": ["a", "b", "c", "d"]})
+    for trial, outcome in {0: "c", 2: "d", 4: "a"}.items():
+        assert find_row(table, trial) == {"trial": trial, "outcome": outcome}
+    assert find_row(table, 1) is None

@@ -10,7 +10,7 @@ import pytest
 
 import throwcollect
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.trajectory_columns import COLUMNS
+from throwcollect.dataset.trajectories import COLUMNS
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.talos import TALOS
 
@@ -56,7 +56,7 @@ def test_a_column_of_trajectories_does_not_depend_on_the_others(loaded: Dataset,
 
 def test_large_arrays_of_trajectories_equal_small_ones(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     small = loaded.trajectories()
-    monkeypatch.setattr("throwcollect.dataset.trajectory_columns._LARGE_BYTES", 1)
+    monkeypatch.setattr("throwcollect.dataset.trajectories._LARGE_BYTES", 1)
     large = loaded.trajectories()
     for name in COLUMNS:
         assert np.array_equal(large[name], small[name])

@@ -124,7 +124,7 @@ def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_sampl
     contents = encoder.encode(make_samples(20))[0].contents
     table = MessageTable(contents, 20)
     for channel in (3, 4):
-        index = MessageIndex.read(ReadDataStream(io.BytesIO(table.message_index(channel)[9:])))
+        index = MessageIndex.read(ReadDataStream(io.BytesIO(table.message_indexes[channel][9:])))
         assert index.records == [
             (message.log_time, at) for at, message in messages_of(contents) if message.channel_id == channel
         ]
@@ -207,9 +207,9 @@ def test_samples_for_joints_other_than_the_recorded_ones_are_refused(
     renamed = Episode(header, record(contents.replace(b"head_1_joint", b"neck_1_joint")))
     assert renamed.table.joints == tuple(joint.replace("head_1", "neck_1") for joint in TALOS.joints)
     assert renamed.samples().position.tolist() == make_samples(50).position.tolist()
-    with pytest.raises(DatasetError, match=r"joint 29 of the joint states is neck_1_joint\n.*head_1_joint"):
+    with pytest.raises(DatasetError, match=r"joint states of .*\n.*head_1_joint"):
         renamed.samples(TALOS.joints)
-    with pytest.raises(DatasetError, match=r"joint states of 32 joints\n.*2"):
+    with pytest.raises(DatasetError, match=r"joint states of .*\n.*shoulder_joint, elbow_joint"):
         renamed.samples(("shoulder_joint", "elbow_joint"))
 
 

@@ -13,7 +13,7 @@ from tests.foreign_arm import ARM, BOX, CORNERS, FLANGE, dae, mesh, obj, stl, wr
 
 from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.config.schema import Config
-from throwcollect.dataset.trajectory_columns import name_components
+from throwcollect.dataset.trajectories import name_components
 from throwcollect.episode.frames import read_frames
 from throwcollect.errors import ConfigError
 from throwcollect.members import load_member

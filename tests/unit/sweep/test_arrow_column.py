@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
-from throwcollect.sweep.arrow_column import count_values, find_range, make_column, make_table, read_validity
+from throwcollect.sweep.arrow_column import find_range, make_column, make_table, read_validity
 
 _COLUMNS: list[tuple[pa.DataType, list[Any]]] = [
     (pa.int64(), [3, -(2**63), 2**63 - 1, np.int64(7), 0, 1, 2, 3, 4]),
@@ -75,9 +75,3 @@ def test_find_range_covers_all_chunks_and_ignores_nan() -> None:
     column = pa.chunked_array([make_column(values, pa.float64()) for values in ([2.0, None], [], [float("nan"), -1.0])])
     assert find_range(column) == tuple(pc.min_max(column).as_py().values()) == (-1.0, 2.0)
     assert find_range(pa.chunked_array([], pa.int64())) is None
-
-
-def test_values_are_counted_over_all_chunks_of_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("throwcollect.sweep.arrow_column._VALUES_AT_ONCE", 2)
-    column = pa.chunked_array([make_column(values, pa.string()) for values in (["a", None, "b"], [], ["a", "a"])])
-    assert count_values(column) == {"a": 3, "b": 1, None: 1}

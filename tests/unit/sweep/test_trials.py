@@ -42,7 +42,3 @@ def test_trials_in_columns_are_equal_only_if_all_their_fields_are(changed: dict[
     assert in_columns([*LISTED[:4], replace(LISTED[4], values={"ball.mass_kg": 4 / 7, "task.duration_s": 2.0})]) != (
         trials()
     )
-
-
-def test_refuse_replaces_earlier_reasons() -> None:
-    assert trials().refuse(["a", None, None, "b", None]).refused == {0: "a", 3: "b"}
