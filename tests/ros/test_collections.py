@@ -152,6 +152,23 @@ def test_a_killed_simulation_gives_up_its_trial_even_if_the_router_dies_too(
         assert collected[name] == reference[name]
 
 
+APART = """
+import os, runpy, sys
+
+run_module = runpy.run_module
+
+
+def run_apart(*arguments, **options):
+    if "--name" in sys.argv:
+        os.environ["ROS_DOMAIN_ID"] = "84"
+    return run_module(*arguments, **options)
+
+
+runpy.run_module = run_apart
+"""
+"""Nodes are modules that a forked process runs."""
+
+
 def test_a_coordinator_that_sees_no_simulation_ends_the_run_with_an_error(
     records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -159,9 +176,8 @@ def test_a_coordinator_that_sees_no_simulation_ends_the_run_with_an_error(
 
     On the embedded backend: to a discovery server of Fast DDS, domains make no difference.
     """
-    apart = "import os, sys\nif '--name' in sys.orig_argv:\n    os.environ['ROS_DOMAIN_ID'] = '84'\n"
     (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text(apart)
+    (tmp_path / "site" / "sitecustomize.py").write_text(APART)
     path = os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")])
     running = start(
         write_config(tmp_path, trials=TRIALS, sim=FAST),
