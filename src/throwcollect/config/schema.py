@@ -20,6 +20,7 @@ from throwcollect.config.kinds import ContradictionError, Name, unknown_joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
+from throwcollect.config.scene import BallConfig, SceneConfig
 from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
 from throwcollect.config.task_config import TaskConfig, UntilConfig
@@ -87,35 +88,6 @@ SLOWEST, FASTEST = 0.001, 1000
 """Bounds of real-time factors: with slower ones, one step of the physics sleeps for minutes or overflows the clock."""
 _BETWEEN_TRIALS_S = 10
 """Simulated time between the slots of two trials: results of a trial's goals expire before the next one."""
-
-
-class BallConfig(Section):
-    """The ball."""
-
-    mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.045
-    """Mass."""
-    radius_m: Annotated[float, Field(ge=0.005, le=0.1)] = 0.025
-    """Radius."""
-    friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of the ball [-]; it is multiplied with the friction of the body that it touches."""
-    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Coefficient of restitution between the ball and whatever it touches [-]."""
-    drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
-    """Drag coefficient of a sphere [-]; about 0.47 in air. Quadratic drag acts during the whole trial."""
-
-
-class SceneConfig(Section):
-    """The rest of the world."""
-
-    gravity_mps2: Annotated[float, Field(gt=0, le=30)] = 9.81
-    """Gravity, downwards."""
-    landing_height_m: Annotated[float, Field(ge=0, le=2)] = 0.0
-    """Height of the landing plane: a throw lands when the ball's lowest point crosses it, downwards."""
-    air_density_kgpm3: Annotated[float, Field(ge=0, le=10)] = 1.2
-    """Density of the air, for the ball's drag."""
-    spoon_friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of all that the ball may touch, whatever the tool is [-]: the tool, the robot's links and the
-    ground. It is multiplied with `ball.friction`."""
 
 
 class SimConfig(Section):

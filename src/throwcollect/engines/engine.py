@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import BodyModel, Vector
+from throwcollect.engines.body import HERE, BodyLink, BodyModel, Placement, Vector
 
 Quaternion = tuple[float, float, float, float]
 
@@ -67,6 +67,23 @@ class ToolLink:
 
 
 @dataclass(frozen=True)
+class SceneBody:
+    """A body that stands in the world, and that the ball collides with.
+
+    Attributes:
+        link: Its name, by which contacts are recorded, and its shapes; it has no inertia, as it never moves.
+        placement: Its pose in world.
+        friction: Coulomb friction [-].
+        restitution: Coefficient of restitution [-], which is multiplied with that of the ball.
+    """
+
+    link: BodyLink
+    placement: Placement = HERE
+    friction: float = 1.0
+    restitution: float = 1.0
+
+
+@dataclass(frozen=True)
 class Scene:
     """The parts of a world; another scene needs another world.
 
@@ -77,6 +94,7 @@ class Scene:
         tool: The tool.
         ground_is_solid: Whether the ground stops the ball in all steps.
         ball_radius_m: Radius of the ball.
+        bodies: What else stands in the world.
     """
 
     robot: BodyModel
@@ -85,6 +103,11 @@ class Scene:
     tool: ToolLink
     ground_is_solid: bool
     ball_radius_m: float
+    bodies: tuple[SceneBody, ...] = ()
+
+    def has_robot_of(self, other: Scene) -> bool:
+        """Whether nothing but the ball and the bodies differs from another scene."""
+        return replace(other, ball_radius_m=self.ball_radius_m, bodies=self.bodies) == self
 
 
 @dataclass(frozen=True)
@@ -159,7 +182,7 @@ class Observer:
 
         Args:
             step: Number of the first step in which they do.
-            bodies: Their names: the tool, `GROUND`, or a link of the robot.
+            bodies: Their names: the tool, `GROUND`, a link of the robot, or a body of the scene.
         """
 
     def on_sample(self, step: int, sample: Sample) -> bool:
@@ -212,7 +235,7 @@ class Engine(ABC):
         """Make the world of a scene; the engine may keep parts that are the same as before.
 
         Raises:
-            ConfigError: If the engine does not take the robot's description.
+            ConfigError: If the engine does not take the robot's description, or bodies.
         """
 
     def describe_robot(self) -> Sequence[LoadedLink] | None:

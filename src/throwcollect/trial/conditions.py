@@ -77,5 +77,8 @@ def _get_value(config: Config, path: Sequence[str]) -> Any:
     """Look up the value of a key; for each trial, `leaves` would take ten times as long."""
     holder: Any = config
     for part in path:
-        holder = holder[part] if isinstance(holder, dict) else getattr(holder, part)
+        if isinstance(holder, list):
+            holder = holder[int(part)]
+        else:
+            holder = holder[part] if isinstance(holder, dict) else getattr(holder, part)
     return holder

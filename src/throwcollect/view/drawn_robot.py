@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.schema import BallConfig, Config
+from throwcollect.config.scene import BallConfig
+from throwcollect.config.schema import Config
 from throwcollect.episode.frames import quaternion_of
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError, DatasetError

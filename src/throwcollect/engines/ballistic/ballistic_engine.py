@@ -21,6 +21,7 @@ from throwcollect.engines.engine import (
     Steps,
     ball_of,
 )
+from throwcollect.errors import ConfigError, Problem
 from throwcollect.reproducible_math import matmul
 
 _FREE: frozenset[str] = frozenset()
@@ -59,6 +60,12 @@ class BallisticEngine(Engine):
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene."""
+        if scene.bodies:
+            names = ", ".join(body.link.name for body in scene.bodies)
+            raise ConfigError(
+                [Problem(f"should be left out, as the engine ballistic knows no contacts: {names}", "scene.bodies")],
+                hint="--set sim.engine=mujoco simulates contacts",
+            )
         self._tool_path = ToolPath(scene)
         self._opening = np.array(scene.tool.opening).reshape(3, 1)
         self._carried_by = frozenset({scene.tool.name})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterable, Sequence
 
@@ -16,6 +15,7 @@ from throwcollect.engines.bullet.scenery import (
     connect,
     describe_links,
     load_ball,
+    load_bodies,
     load_scenery,
     renew_pairs,
     set_physics,
@@ -28,6 +28,7 @@ from throwcollect.engines.engine import (
     Physics,
     Sample,
     Scene,
+    SceneBody,
     State,
     Steps,
     ball_of,
@@ -45,6 +46,8 @@ class BulletEngine(Engine):
     """
 
     _scenery: Scenery
+    _bodies: dict[int, SceneBody]
+    _names: dict[Surface, str]
     _ball: int
     _has_floor: bool
     _forces: list[float]
@@ -63,15 +66,21 @@ class BulletEngine(Engine):
         pybullet.disconnect(self._client)
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
+        """Make the world of a scene; if nothing but the ball and the bodies differs, only these are made anew."""
         # Forget the scene until the world is loaded: if loading fails, the next call must not keep anything of it.
         kept, self._scene = self._scene, None
-        if kept is None or dataclasses.replace(kept, ball_radius_m=scene.ball_radius_m) != scene:
+        if kept == scene:
+            self._scene = scene
+            return
+        if kept is None or not scene.has_robot_of(kept):
             self._scenery = load_scenery(self._client, scene)
-            self._ball = load_ball(self._client, scene.ball_radius_m)
-        elif kept.ball_radius_m != scene.ball_radius_m:
-            pybullet.removeBody(self._ball, physicsClientId=self._client)
-            self._ball = load_ball(self._client, scene.ball_radius_m)
+        else:
+            # All of them, so that they follow each other in the same order as in a new world.
+            for body in (*self._bodies, self._ball):
+                pybullet.removeBody(body, physicsClientId=self._client)
+        self._bodies = load_bodies(self._client, scene.bodies)
+        self._names = self._scenery.names | {(each, BASE): body.link.name for each, body in self._bodies.items()}
+        self._ball = load_ball(self._client, scene.ball_radius_m)
         self._scene = scene
 
     def describe_robot(self) -> list[LoadedLink]:
@@ -80,7 +89,7 @@ class BulletEngine(Engine):
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
-        set_physics(self._client, self._scenery, self._ball, physics)
+        set_physics(self._client, self._scenery, self._ball, self._bodies, physics)
         self._forces = list(physics.efforts)
         # Bullet divides the error of a position by the time step before it multiplies it by the gain.
         self._position_gains = [physics.position_gain_per_s / physics.hz] * len(physics.efforts)
@@ -175,7 +184,7 @@ class BulletEngine(Engine):
             observer.on_touch(step, touching)
 
     def _name(self, surfaces: Iterable[Surface]) -> frozenset[str]:
-        return frozenset(self._scenery.names[surface] for surface in surfaces)
+        return frozenset(self._names[surface] for surface in surfaces)
 
     def _sample(self) -> Sample:
         client, ball = self._client, self._ball

@@ -7,23 +7,28 @@ at rest, and with these few pairs the order in which Bullet solves contacts does
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import BodyModel, Vector
-from throwcollect.engines.engine import GROUND, LoadedLink, Physics, Quaternion, Scene
+from throwcollect.engines.body import HERE, BodyModel, LinkInertia, Vector
+from throwcollect.engines.engine import GROUND, LoadedLink, Physics, Quaternion, Scene, SceneBody
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.native_reading import reading_natively
 
 Surface = tuple[int, int]
 """Body and link number in Bullet."""
 
+UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
 BASE = -1
 """Link number of the first link of a body."""
+
+_ANY_INERTIA = LinkInertia(1.0, HERE, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
 
 _GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _FLOOR_GROUP = 1, 2, 4, 16
 """Bullet lets a pair collide if the mask of either one has the group of the other; the floor is a ground that is not
@@ -61,7 +66,8 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
     # By default Bullet computes inertias from the collision shapes.
-    robot = _load_robot(client, scene.robot, (0.0, 0.0, scene.base_height_m))
+    flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+    robot = _load_model(client, scene.robot, (0.0, 0.0, scene.base_height_m), flags=flags)
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
     names = {(ground, BASE): GROUND, (robot, BASE): root}
@@ -80,22 +86,27 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     return Scenery(robot=robot, joints=[joints[joint] for joint in scene.moving], tool=tool, names=names)
 
 
-def _load_robot(client: int, model: BodyModel, position: Vector) -> int:
-    """Load a robot into a world at a place in it, and return its number."""
+def _load_model(client: int, model: BodyModel, position: Vector, turn: Quaternion = UPRIGHT, *, flags: int = 0) -> int:
+    """Load a tree of links, whose root does not move, at a pose in world; return its body number."""
     # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         for name, content in model.encode_meshes().items():
             Path(directory, name).write_bytes(content)
-        return load_urdf(client, model.write_urdf(), Path(directory), position, pybullet.URDF_USE_INERTIA_FROM_FILE)
+        return load_urdf(client, model.write_urdf(), Path(directory), position, turn, flags=flags)
 
 
-def load_urdf(client: int, urdf: str, directory: Path, position: Vector, flags: int = 0) -> int:
+def load_urdf(
+    client: int, urdf: str, directory: Path, position: Vector, turn: Quaternion = UPRIGHT, *, flags: int = 0
+) -> int:
     """Load URDF text, whose paths are relative to a directory, with a fixed base; return the number of the body."""
     path = directory / "body.urdf"
     path.write_text(urdf, encoding="utf-8")
     with reading_natively():
         try:
-            return int(pybullet.loadURDF(str(path), position, useFixedBase=True, flags=flags, physicsClientId=client))
+            number = pybullet.loadURDF(
+                str(path), position, turn, useFixedBase=True, flags=flags, physicsClientId=client
+            )
+            return int(number)
         except pybullet.error as error:
             raise ConfigError(f"Bullet cannot load the description: {error}") from error
 
@@ -138,6 +149,18 @@ def _turn(quaternion: Quaternion) -> NDArray[np.float64]:
     return np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
 
 
+def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody]:
+    """Put bodies into the world, and return them by their body numbers."""
+    numbers = {}
+    for body in bodies:
+        # Bullet complains of links without a mass; that of a body that never moves does not matter.
+        model = BodyModel(body.link.name, (replace(body.link, inertia=_ANY_INERTIA),))
+        number = _load_model(client, model, body.placement.xyz, pybullet.getQuaternionFromEuler(body.placement.rpy))
+        pybullet.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _BALL_GROUP, physicsClientId=client)
+        numbers[number] = body
+    return numbers
+
+
 def load_ball(client: int, radius: float) -> int:
     """Put a ball into the world, far above everything else, and return its body number.
 
@@ -160,7 +183,7 @@ def links(client: int, body: int) -> range:
     return range(BASE, pybullet.getNumJoints(body, physicsClientId=client))
 
 
-def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> None:
+def set_physics(client: int, scenery: Scenery, ball: int, bodies: Mapping[int, SceneBody], physics: Physics) -> None:
     """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
@@ -190,6 +213,15 @@ def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> N
             link,
             lateralFriction=physics.surface_friction,
             restitution=1,
+            physicsClientId=client,
+            **undamped,
+        )
+    for number, each in bodies.items():
+        pybullet.changeDynamics(
+            number,
+            BASE,
+            lateralFriction=each.friction,
+            restitution=each.restitution,
             physicsClientId=client,
             **undamped,
         )

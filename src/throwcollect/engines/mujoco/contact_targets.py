@@ -7,6 +7,8 @@ begin to hop long before it leaves. So this module gives each contact the veloci
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import mujoco
 
 _ROWS = 3
@@ -22,7 +24,7 @@ _LEAST_BOUNCE_MPS = 0.2
 """Contacts with a lower approach speed do not bounce, as in Bullet."""
 
 
-def aim_contacts(data: mujoco.MjData, hz: float, restitution: float) -> None:
+def aim_contacts(data: mujoco.MjData, hz: float, restitution: float, bounces: Mapping[int, float]) -> None:
     """Set the targets of all contacts, between ``mj_step1`` and ``mj_step2``.
 
     - Surfaces with a gap may close it in this step, but not penetrate each other.
@@ -32,17 +34,22 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitution: float) -> None:
     Args:
         data: The world, with at least one contact.
         hz: Steps per second.
-        restitution: Restitution of the contacts, which are all contacts of the ball.
+        restitution: Restitution of the ball, which takes part in all contacts.
+        bounces: Restitution of the shapes that have another one than 1, by their number.
     """
     # The last rows are those of contacts, three for each: one along its normal, and two of friction. Contacts of shapes
     # that merely touch have no rows. There are one or two contacts, for which plain numbers take a third of the time of
     # arrays, to the same bits.
     gaps, speeds, targets = data.efc_pos.tolist(), data.efc_vel.tolist(), data.efc_aref
+    shares = {}
+    if bounces:
+        pairs = zip(data.contact.efc_address.tolist(), data.contact.geom.tolist(), strict=True)
+        shares = {row: bounces.get(one, 1.0) * bounces.get(other, 1.0) for row, (one, other) in pairs}
     for row in range(data.ne + data.nf + data.nl, len(gaps), _ROWS):
         away, speed = gaps[row] * hz, speeds[row]
         wanted = max(away, _CORRECTED * away)
         if restitution and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:
-            wanted = restitution * speed
+            wanted = restitution * shares.get(row, 1.0) * speed
         # Surfaces part at positive speeds. As the solver reaches the share `HARDNESS` of this acceleration, the speed
         # after the step is about `-wanted`.
         targets[row] = (wanted + speed) * (-hz / HARDNESS)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from itertools import compress
@@ -29,8 +28,10 @@ from throwcollect.engines.mujoco.contact_targets import aim_contacts
 from throwcollect.engines.mujoco.scenery import (
     Surface,
     describe_links,
+    find_bounces,
     let_ball_hit_floor,
     make_spec,
+    place_bodies,
     resize_ball,
     set_physics,
 )
@@ -50,6 +51,7 @@ class MujocoEngine(Engine):
     _scene: Scene
     _physics: Physics
     _surfaces: list[Surface]
+    _bounces: dict[int, float]
     _model: mujoco.MjModel
     _data: mujoco.MjData
 
@@ -64,9 +66,10 @@ class MujocoEngine(Engine):
             del self._model, self._data
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
-        if self._is_loaded and dataclasses.replace(self._scene, ball_radius_m=scene.ball_radius_m) == scene:
+        """Make the world of a scene; if nothing but numbers of the ball and the bodies differs, only these change."""
+        if self._is_loaded and scene.has_robot_of(self._scene) and _list_kinds(scene) == _list_kinds(self._scene):
             resize_ball(self._model, scene.ball_radius_m)
+            place_bodies(self._model, scene.bodies)
             self._scene = scene
             return
         self._scene, self._is_loaded = scene, False
@@ -75,6 +78,7 @@ class MujocoEngine(Engine):
             self._model = spec.compile()
         except ValueError as error:
             raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
+        place_bodies(self._model, scene.bodies)
         self._data = mujoco.MjData(self._model)
         # Joints of the robot come first in the model, but not in the order of the scene.
         names = [self._model.joint(number).name for number in range(len(scene.moving))]
@@ -89,7 +93,8 @@ class MujocoEngine(Engine):
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
         self._physics = physics
-        set_physics(self._model, physics)
+        set_physics(self._model, self._scene.bodies, physics)
+        self._bounces = find_bounces(self._model, self._scene.bodies)
         self._pick = _make_sample_picker(self._model, self._places)
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
@@ -144,7 +149,7 @@ class MujocoEngine(Engine):
         multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
         begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
-        restitution = physics.ball_restitution
+        restitution, bounces = physics.ball_restitution, self._bounces
         untouched = presses.tobytes()
         # This equals no state of the surfaces, so the first step compares what presses with what pressed before.
         last_presses, number = b"", 0
@@ -162,7 +167,7 @@ class MujocoEngine(Engine):
             maximum(minimum(work, most, out=work), least, out=torque)
             contacts = data.ncon
             if contacts:
-                aim_contacts(data, hz, restitution)
+                aim_contacts(data, hz, restitution, bounces)
             if drag:
                 self._apply_drag(drag)
             end_step(model, data)
@@ -193,7 +198,7 @@ class MujocoEngine(Engine):
         mujoco.mj_step1(model, data)
         data.qfrc_applied[:count] = data.qfrc_bias[:count]
         if data.ncon:
-            aim_contacts(data, self._physics.hz, self._physics.ball_restitution)
+            aim_contacts(data, self._physics.hz, self._physics.ball_restitution, self._bounces)
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
 
@@ -217,6 +222,11 @@ class MujocoEngine(Engine):
         velocity = self._data.qvel[first : first + 3].tolist()
         factor = -drag_kgpm * math.hypot(*velocity)
         self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
+
+
+def _list_kinds(scene: Scene) -> list[tuple[str, list[str]]]:
+    """List the names of the bodies and the kinds of their shapes, which a compiled model cannot change."""
+    return [(body.link.name, [shape.kind for shape in body.link.shapes]) for body in scene.bodies]
 
 
 def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:

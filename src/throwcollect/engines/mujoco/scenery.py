@@ -5,17 +5,26 @@ As in Bullet, nothing but the ball collides with other things.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import BodyModel
-from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene
+from throwcollect.engines.body import BodyModel, LinkShape, Placement, Vector
+from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
 from throwcollect.engines.mujoco.contact_targets import HARDNESS
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
+
+_KINDS = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+}
+"""Types of the shapes that bodies of a scene have."""
 
 BALL = "ball"
 """Name of the ball's body and shape."""
@@ -91,6 +100,9 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         conaffinity=0,
     )
     _add_ball(spec, scene.ball_radius_m)
+    for each in scene.bodies:
+        _add_body(spec, each)
+        surfaces.append(Surface(_name_body(each), each.link.name))
     for surface in surfaces:
         _watch(spec, surface)
     option = spec.option
@@ -115,6 +127,59 @@ def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
         contype=0,
         conaffinity=_BALL_HITS,
         priority=_BALL_PRIORITY,
+    )
+
+
+def _add_body(spec: mujoco.MjSpec, body: SceneBody) -> None:
+    """Put a body into the world that the ball alone collides with; `place_bodies` sets its pose and its sizes."""
+    name = _name_body(body)
+    added = spec.worldbody.add_body(name=name)
+    for number, shape in enumerate(body.link.shapes):
+        geom = f"{name}/{number}"
+        # Without a mass, nothing but the shape's own numbers depends on its size.
+        added.add_geom(name=geom, type=_KINDS[shape.kind], size=(1.0, 1.0, 1.0), mass=0.0, contype=0, conaffinity=0)
+        spec.add_pair(name=geom, geomname1=BALL, geomname2=geom, condim=3, margin=_REACH_M)
+
+
+def _name_body(body: SceneBody) -> str:
+    """Name a body of the scene in the model, where a link of the robot may have the same name."""
+    return f"scene/{body.link.name}"
+
+
+def place_bodies(model: mujoco.MjModel, bodies: Sequence[SceneBody]) -> None:
+    """Give bodies their poses and sizes, as if the model had been compiled with them."""
+    for each in bodies:
+        body = model.body(_name_body(each)).id
+        model.body_pos[body], model.body_quat[body] = each.placement.xyz, _turn(each.placement)
+        for number, shape in enumerate(each.link.shapes):
+            geom = model.geom(f"{_name_body(each)}/{number}").id
+            size, half = _size(shape)
+            model.geom_size[geom] = size
+            model.geom_aabb[geom, 3:] = half
+            model.geom_rbound[geom] = math.hypot(*half) if shape.kind != "sphere" else half[0]
+            model.geom_pos[geom], model.geom_quat[geom] = shape.placement.xyz, _turn(shape.placement)
+
+
+def _size(shape: LinkShape) -> tuple[Vector, Vector]:
+    """Size of a shape as MuJoCo has it, and half of the edges of the box around it [m]."""
+    match shape.kind, shape.size:
+        case "box", (x, y, z):
+            return (x / 2, y / 2, z / 2), (x / 2, y / 2, z / 2)
+        case "cylinder", (radius, length):
+            return (radius, length / 2, 0.0), (radius, radius, length / 2)
+        case "sphere", (radius,):
+            return (radius, 0.0, 0.0), (radius, radius, radius)
+    raise ValueError(shape.kind)
+
+
+def _turn(placement: Placement) -> tuple[float, float, float, float]:
+    """Rotation of a placement as a unit quaternion, wxyz."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in placement.rpy)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
     )
 
 
@@ -149,7 +214,7 @@ def let_ball_hit_floor(model: mujoco.MjModel, *, floor: bool) -> None:
     model.geom_conaffinity[model.geom(BALL).id] = model.body_conaffinity[model.body(BALL).id] = hits
 
 
-def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
+def set_physics(model: mujoco.MjModel, bodies: Sequence[SceneBody], physics: Physics) -> None:
     """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
     model.opt.timestep = 1 / physics.hz
     model.opt.iterations = physics.solver_iterations
@@ -165,6 +230,12 @@ def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
     # Friction stops sliding within one step if it can. `aim_contacts` replaces the targets along the normals.
     model.geom_solref[:] = (2 / physics.hz, 1.0)
     model.geom_solimp[:, :2] = HARDNESS
+    # A pair of shapes that is named in the model has numbers of its own.
+    model.pair_solref[:], model.pair_solimp[:, :2] = (2 / physics.hz, 1.0), HARDNESS
+    for each in bodies:
+        for number in range(len(each.link.shapes)):
+            pair = model.pair(f"{_name_body(each)}/{number}").id
+            model.pair_friction[pair] = (*[physics.ball_friction * each.friction] * 2, 0.0, 0.0, 0.0)
     # Recompute the numbers that the solver derives from masses, such as those by which it scales contacts.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
@@ -213,3 +284,13 @@ def describe_links(model: mujoco.MjModel, robot: BodyModel) -> list[LoadedLink]:
             )
         )
     return found
+
+
+def find_bounces(model: mujoco.MjModel, bodies: Sequence[SceneBody]) -> dict[int, float]:
+    """Map the shapes of bodies that do not leave the restitution to the ball alone to their own restitution."""
+    return {
+        model.geom(f"{_name_body(each)}/{number}").id: each.restitution
+        for each in bodies
+        if each.restitution != 1.0
+        for number in range(len(each.link.shapes))
+    }

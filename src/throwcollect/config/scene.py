@@ -1,0 +1,107 @@
+"""Keys of the world around the robot: the ball, the ground, the air, and the bodies of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from throwcollect.config.key import Effect, Key
+from throwcollect.config.kinds import Angle, match
+from throwcollect.config.section import Section, any_of
+
+_Length = Annotated[float, Field(ge=0.001, le=20)]
+_Triple = Annotated[list[Annotated[float, Field(ge=-20, le=20)]], Field(min_length=3, max_length=3)]
+_Color = Annotated[str, match(r"#[0-9a-fA-F]{6}", "# and six hexadecimal digits, such as #8a6f4d")]
+BodyName = Annotated[str, match(r"[a-z][a-z0-9_]{0,31}", "up to 32 lower-case letters, digits and _, first a letter")]
+
+
+class BallConfig(Section):
+    """The ball."""
+
+    mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.045
+    """Mass."""
+    radius_m: Annotated[float, Field(ge=0.005, le=0.1)] = 0.025
+    """Radius."""
+    friction: Annotated[float, Field(ge=0, le=2)] = 0.5
+    """Coulomb friction of the ball [-]; it is multiplied with the friction of the body that it touches."""
+    restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Coefficient of restitution between the ball and whatever it touches [-]; at a body of the scene, it is multiplied
+    with that of the body."""
+    drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
+    """Drag coefficient of a sphere [-]; about 0.47 in air. Quadratic drag acts during the whole trial."""
+
+
+class BodyConfig(Section):
+    """A body of the scene, which stays where it is."""
+
+    position_m: Annotated[_Triple, Key(swept=True)]
+    """Position of its centre in world: x, y, z."""
+    rpy_rad: Annotated[list[Angle], Field(min_length=3, max_length=3), Key(swept=True)] = [0.0, 0.0, 0.0]
+    """Rotations about the axes x, y, z of the world, in this order."""
+    friction: Annotated[float, Field(ge=0, le=2), Key(swept=True)] = 0.5
+    """Coulomb friction [-]; it is multiplied with that of what touches the body."""
+    restitution: Annotated[float, Field(ge=0, le=1), Key(swept=True)] = 1.0
+    """Coefficient of restitution [-]; it is multiplied with that of what touches the body."""
+    color: Annotated[_Color, Key(Effect.APPEARANCE, swept=False)] = "#8a6f4d"
+    """Color in pictures."""
+
+
+class BoxConfig(BodyConfig):
+    """A box."""
+
+    shape: Literal["box"]
+    """Shape of the body."""
+    size_m: Annotated[list[_Length], Field(min_length=3, max_length=3), Key(swept=True)]
+    """Lengths of its edges along its own axes x, y, z."""
+
+
+class CylinderConfig(BodyConfig):
+    """A cylinder along its own axis z."""
+
+    shape: Literal["cylinder"]
+    """Shape of the body."""
+    radius_m: Annotated[_Length, Key(swept=True)]
+    """Radius."""
+    length_m: Annotated[_Length, Key(swept=True)]
+    """Length."""
+
+
+class SphereConfig(BodyConfig):
+    """A sphere."""
+
+    shape: Literal["sphere"]
+    """Shape of the body."""
+    radius_m: Annotated[_Length, Key(swept=True)]
+    """Radius."""
+
+
+if TYPE_CHECKING:
+    AnyBody = BoxConfig | CylinderConfig | SphereConfig
+else:
+    AnyBody = any_of(
+        {"box": BoxConfig, "cylinder": CylinderConfig, "sphere": SphereConfig},
+        lambda value: value.get("shape", "box") if isinstance(value, dict) else None,
+    )
+
+
+class SceneConfig(Section):
+    """The rest of the world."""
+
+    gravity_mps2: Annotated[float, Field(gt=0, le=30)] = 9.81
+    """Gravity, downwards."""
+    landing_height_m: Annotated[float, Field(ge=0, le=2)] = 0.0
+    """Height of the landing plane: a throw lands when the ball's lowest point crosses it, downwards."""
+    air_density_kgpm3: Annotated[float, Field(ge=0, le=10)] = 1.2
+    """Density of the air, for the ball's drag."""
+    spoon_friction: Annotated[float, Field(ge=0, le=2)] = 0.5
+    """Coulomb friction of all that the ball may touch, whatever the tool is [-]: the tool, the robot's links and the
+    ground. It is multiplied with `ball.friction`."""
+    bodies: Annotated[dict[BodyName, AnyBody], Field(max_length=32)] = {}
+    """Things that stand in the world, such as a table or a wall, by name. The ball collides with them; a motion in
+    which the robot touches one is refused."""
+
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
+        if "ground" in self.bodies:
+            yield "bodies.ground", "should have another name, as contacts with the ground have this one"
