@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import LinkShape
+from throwcollect.engines.engine import SceneBody
 from throwcollect.errors import ConfigError
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clear_postures import ClearPostures, find_reaches
@@ -39,7 +41,7 @@ class Approach:
 
 
 class Clearance:
-    """Checks postures for collisions of a robot with itself and with its tool.
+    """Checks postures for collisions of a robot with itself and its tool, or of both with the bodies of a scene.
 
     Shapes are the convex hulls of the collision meshes, as the physics loads them, and the boxes of the tool. Pairs
     that the SRDF excludes are not checked, nor are links of one gripper (their mimic joints are rigid in the model),
@@ -49,7 +51,15 @@ class Clearance:
         ConfigError: If the robot's meshes cannot be read.
     """
 
-    def __init__(self, robot: Robot, model: pinocchio.Model, tool: Tool) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        model: pinocchio.Model,
+        tool: Tool,
+        *,
+        bodies: Sequence[SceneBody] = (),
+        base_height_m: float = 0.0,
+    ) -> None:
         self._robot, self._model = robot, model
         self._data = model.createData()
         # Copies share the shapes and have pairs of their own.
@@ -60,6 +70,10 @@ class Clearance:
             if any(all(name.startswith(group) for name in names) for group in robot.rigid):
                 geometry.removeCollisionPair(pair)
         self._add_tool(tool)
+        if bodies:
+            geometry.removeAllCollisionPairs()
+        for body in bodies:
+            self._add_body(body, base_height_m)
         self._distances = geometry.createData()
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
@@ -136,6 +150,20 @@ class Clearance:
             added = self.geometry.addGeometryObject(shape)
             self._links.append(tool.name)
             for other in others:
+                self.geometry.addCollisionPair(pinocchio.CollisionPair(other, added))
+
+    def _add_body(self, body: SceneBody, base_height_m: float) -> None:
+        """Add a body, which stands in the world, while the model's origin is the robot's base."""
+        place = pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -base_height_m])) * pose_of(body.placement)
+        robot = [number for number, shape in enumerate(self.geometry.geometryObjects) if shape.parentFrame]
+        for number, shape in enumerate(body.link.shapes):
+            solid = _make_solid(f"scene.bodies.{body.link.name}", shape)
+            pose = place * pose_of(shape.placement)
+            added = self.geometry.addGeometryObject(
+                pinocchio.GeometryObject(f"scene/{body.link.name}_{number}", 0, 0, pose, solid)
+            )
+            self._links.append(body.link.name)
+            for other in robot:
                 self.geometry.addCollisionPair(pinocchio.CollisionPair(other, added))
 
 

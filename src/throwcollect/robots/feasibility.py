@@ -22,6 +22,7 @@ from throwcollect.robots.joint_model import joint_model, lock_joints, mount_of
 from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.robot import Robot
+from throwcollect.robots.surroundings import bodies_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tools.tool import Tool, tool_of
 
@@ -67,6 +68,8 @@ class Feasibility:
         self._tool_config, self._tool = config.tool, tool_of(config)
         check_name_of_tool(self._robot, self._tool)
         self._clearance = Clearance(self._robot, self._model, self._tool)
+        self._key_of_around: object = None
+        self._around: Clearance | None = None
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
         """Explain why the robot cannot do a trial with a trajectory.
@@ -76,8 +79,8 @@ class Feasibility:
         are computed by inverse dynamics plus viscous friction; the tool and the ball count as part of the hand
         throughout, even after the ball has left. The effort of locked joints is not limited, because they are simulated
         as rigid. Angles are true ones (`robot.joint_offsets`), and motions have their true speed (`robot.speed_scale`).
-        Collisions are those of the robot and the tool; the task judges what the ball hits. The tool has to move if the
-        task throws, and to hold the ball in the start posture (see `Tool.way_out`).
+        Collisions are those of the robot and the tool, also with bodies of the scene; the task judges what the ball
+        hits. The tool has to move if the task throws, and to hold the ball in the start posture (see `Tool.way_out`).
 
         Returns:
             None if the trial is feasible. Otherwise one sentence with joint or links, instant, value and limit, about
@@ -93,7 +96,9 @@ class Feasibility:
             return violation
         positions = motion[0]
         rows = _choose_rows(positions)
-        if approach := self._clearance.first_approach(self._model_order(positions[rows])):
+        way = self._model_order(positions[rows])
+        around = self._find_around(config, tool)
+        if approach := self._clearance.first_approach(way) or (around and around.first_approach(way)):
             return (
                 f"{' and '.join(approach.links)} {_describe_gap(approach.distance_m)} "
                 f"at {times[rows[approach.index]]:.3f} s; they must stay {MARGIN_M * 1000:.3g} mm apart"
@@ -175,7 +180,18 @@ class Feasibility:
         if config.tool != self._tool_config:
             self._tool_config, self._tool = config.tool, tool_of(config)
             self._clearance = Clearance(self._robot, self._model, self._tool)
+            self._key_of_around = None
         return self._tool
+
+    def _find_around(self, config: Config, tool: Tool) -> Clearance | None:
+        """Return what checks the robot against the bodies of a trial's scene; None if there are none."""
+        bodies, height = bodies_of(config), config.robot.base_height_m
+        if not bodies:
+            return None
+        if (bodies, height) != self._key_of_around:
+            self._around = Clearance(self._robot, self._model, tool, bodies=bodies, base_height_m=height)
+            self._key_of_around = bodies, height
+        return self._around
 
     def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Put values of joints, along the last axis, into the order of the model."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from throwcollect.config.scene import AnyBody, BoxConfig, CylinderConfig, SphereConfig
 from throwcollect.config.schema import Config
-from throwcollect.engines.body import HERE, BodyLink, LinkShape, Placement
-from throwcollect.engines.engine import Physics, Scene, SceneBody, ToolLink
+from throwcollect.engines.engine import Physics, Scene, ToolLink
 from throwcollect.robots.description import Description, robot_of
 from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.surroundings import bodies_of
 from throwcollect.tools.tool import tool_of
 
 _OPENING = (1.0, 0.0, 0.0)
@@ -27,22 +26,8 @@ def scene_of(config: Config, description: Description) -> Scene:
         # If the landing plane is at height zero, the trial ends before the ball could touch the ground.
         ground_is_solid=config.scene.landing_height_m > 0,
         ball_radius_m=config.ball.radius_m,
-        bodies=tuple(make_body(name, body) for name, body in config.scene.bodies.items()),
+        bodies=bodies_of(config),
     )
-
-
-def make_body(name: str, body: AnyBody) -> SceneBody:
-    """Make a body of the scene from its section."""
-    match body:
-        case BoxConfig():
-            kind, size = "box", tuple(body.size_m)
-        case CylinderConfig():
-            kind, size = "cylinder", (body.radius_m, body.length_m)
-        case SphereConfig():
-            kind, size = "sphere", (body.radius_m,)
-    link = BodyLink(name, shapes=(LinkShape(kind, size, HERE),))
-    (x, y, z), (roll, pitch, yaw) = body.position_m, body.rpy_rad
-    return SceneBody(link, Placement((x, y, z), (roll, pitch, yaw)), body.friction, body.restitution)
 
 
 def physics_of(config: Config, moving: tuple[str, ...]) -> Physics:
