@@ -42,7 +42,10 @@ _OWN = MappingProxyType(
             "mujoco": "throwcollect.engines.mujoco.mujoco_engine:MujocoEngine",
             "ballistic": "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine",
         },
-        "tasks": {"throw": "throwcollect.tasks.throw.throw_config:ThrowConfig"},
+        "tasks": {
+            "throw": "throwcollect.tasks.throw.throw_config:ThrowConfig",
+            "throw_into": "throwcollect.tasks.throw_into.into_config:ThrowIntoConfig",
+        },
         "runtimes": {
             "local": "throwcollect.runtimes.local:LocalRuntime",
             "docker": "throwcollect.runtimes.docker.docker_runtime:DockerRuntime",

@@ -29,6 +29,9 @@ class BallConfig(Section):
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Coefficient of restitution between the ball and whatever it touches [-]; at a body of the scene, it is multiplied
     with that of the body."""
+    rolling_friction_m: Annotated[float, Field(ge=0, le=0.01)] = 0.0
+    """Lever arm with which a surface resists rolling; it is multiplied with the friction of that surface. A ball needs
+    some to come to rest."""
     drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
     """Drag coefficient of a sphere [-]; about 0.47 in air. Quadratic drag acts during the whole trial."""
 

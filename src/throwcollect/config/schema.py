@@ -187,6 +187,8 @@ class Config(Section):
         for joint in self.robot.posture:
             if joint in self.task.start:
                 yield f"robot.posture.{joint}", "should be left out, as task.start sets this joint"
+        for name in self.scene.bodies.keys() & self.task.bodies.keys():
+            yield f"scene.bodies.{name}", f"should have another name, as the task {self.task.name} has such a body"
         if self.until is not None and self.until.outcome() != self.task.success:
             yield f"until.{self.until.outcome()}", f"should be {self.task.success}, as the task is {self.task.name}"
         if self.sweep.target is not None and not self.task.throws:

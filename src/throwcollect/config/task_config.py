@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -11,6 +11,7 @@ from pydantic import Field
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
+from throwcollect.config.scene import AnyBody
 from throwcollect.config.section import Section
 from throwcollect.wording import join_names, suggest
 
@@ -110,6 +111,11 @@ class TaskConfig(Section):
     def success(self) -> str:
         """Outcome of a trial that succeeded."""
         return self.until.outcome()
+
+    @property
+    def bodies(self) -> Mapping[str, AnyBody]:
+        """Bodies that the task puts into the world, by name; none by default."""
+        return {}
 
     @property
     def noun(self) -> str:

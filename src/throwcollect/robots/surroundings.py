@@ -9,8 +9,9 @@ from throwcollect.engines.engine import SceneBody
 
 
 def bodies_of(config: Config) -> tuple[SceneBody, ...]:
-    """Make the bodies that stand in the world of a trial."""
-    return tuple(_make_body(name, section) for name, section in config.scene.bodies.items())
+    """Make the bodies that stand in the world of a trial: those of the scene, and those of the task."""
+    sections = {**config.scene.bodies, **config.task.bodies}
+    return tuple(_make_body(name, section) for name, section in sections.items())
 
 
 def _make_body(name: str, section: AnyBody) -> SceneBody:

@@ -13,7 +13,6 @@ from throwcollect.episode.record import Contact, Samples
 
 BALL_POSITION = slice(-13, -10)
 BALL_LINEAR_VELOCITY = slice(-6, -3)
-BALL_HEIGHT = -11
 _NUMBER_BYTES = 8
 
 

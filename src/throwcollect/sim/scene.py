@@ -41,6 +41,7 @@ def physics_of(config: Config, moving: tuple[str, ...]) -> Physics:
         ball_mass_kg=config.ball.mass_kg,
         ball_friction=config.ball.friction,
         ball_restitution=config.ball.restitution,
+        ball_rolling_friction_m=config.ball.rolling_friction_m,
         surface_friction=config.scene.spoon_friction,
         efforts=tuple(float(efforts[robot.joints.index(joint)]) for joint in moving),
         position_gain_per_s=config.robot.position_gain_per_s,

@@ -34,8 +34,9 @@ from throwcollect.robots.description import (
     start_posture,
 )
 from throwcollect.sim.motors import Motors
-from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, ContactLog, SampleLog, to_samples
+from throwcollect.sim.recording import BALL_LINEAR_VELOCITY, ContactLog, SampleLog, to_samples
 from throwcollect.sim.scene import drag_of, physics_of, scene_of
+from throwcollect.tasks.task import EndRule, task_of
 from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
 
@@ -46,7 +47,7 @@ class World(Observer):
     `reset` puts it into the start state of a trial, which is a pure function of the trial's configuration, bit for bit.
     `run` then takes physics steps until the trial ends:
 
-    - ``landed``: the ball's lowest point has crossed the landing plane downwards, out of the tool;
+    - ``landed``: what the task says (see `Task.end_rule`), by default that the ball has crossed the landing plane;
     - ``rest``: the arm has moved and stands still, and the ball has been lying on something for half a second;
     - ``timeout``: the longest duration is over.
 
@@ -71,7 +72,7 @@ class World(Observer):
     moving: tuple[str, ...]
     steps: int
     end_reason: EndReason | None
-    _tool: str
+    _ends: EndRule
     _contacts: ContactLog
     _start: Sequence[float]
     _offsets: NDArray[np.float64]
@@ -122,7 +123,11 @@ class World(Observer):
             start_ns: Simulated time of the start state [ns].
         """
         # Of `task.end`, only the names of joints count, because they say which joints are locked.
-        key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
+        bodies = trial.task.bodies
+        key = (
+            *(trial.robot, trial.tool, trial.ball, trial.scene, trial.sim),
+            *(trial.task.start, tuple(trial.task.end), bodies),
+        )
         if key != self._start_key:
             # If settling fails, the next trial must not take the present state for its start state.
             self._start_key = None
@@ -131,12 +136,12 @@ class World(Observer):
             self._start_key = key
         with explain_failure("engines", self._name, "begin a trial"):
             self.engine.reset(self._settled)
-        sim, ball = trial.sim, trial.ball
+        sim = trial.sim
         self._base_height = trial.robot.base_height_m
         self._hz = sim.physics_hz
         self._stride = sim.physics_hz // trial.record.rate_hz
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
-        self._landing_height = trial.scene.landing_height_m + ball.radius_m
+        self._ends = task_of(trial).end_rule()
         self._drag = drag_of(trial)
         self._motors = self._make_motors(trial)
         self._touching = self._settled.touching
@@ -270,7 +275,6 @@ class World(Observer):
         self._offsets = np.array([offsets[joint] for joint in self.moving])
         self._start = [posture[joint] + offsets[joint] for joint in self.moving]
         tool = tool_of(trial)
-        self._tool = tool.name
         seat = tool.ball_seat(trial.ball.radius_m)
         self.engine.configure(physics_of(trial, self.moving))
         self.engine.rest(self._start, seat)
@@ -314,8 +318,8 @@ class World(Observer):
         lies = stands_still and self._touching
         if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < REST_SPEED_MPS):
             self._resting_since = self.steps
-        if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and self._tool not in self._contacts.bodies:
-            return "landed"
+        if (reason := self._ends(before[-BALL_NUMBERS:], now[-BALL_NUMBERS:], self._contacts.bodies)) is not None:
+            return reason
         if self._has_moved and self.rests:
             return "rest"
         return "timeout" if self.steps >= self._last_step else None

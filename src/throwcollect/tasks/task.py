@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic
 
 from throwcollect.config.motion import MinimumJerk
 from throwcollect.config.schema import Config
-from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.record import EndReason, EpisodeHeader, Samples
 from throwcollect.members import explain_failure, load_part
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.trajectory import JointTrajectory
@@ -24,6 +25,11 @@ from throwcollect.tasks.result import (
     Outcome,
     ResultColumns,
 )
+
+EndRule = Callable[[Sequence[float], Sequence[float], Collection[str]], EndReason | None]
+"""Gets the ball in one sample and in the next one, each as the last numbers of an engine's `Sample`, and the names of
+what presses on it; returns why the trial ends with the later sample, None if it goes on."""
+_HEIGHT = 2
 
 
 @dataclass(frozen=True)
@@ -115,6 +121,21 @@ class Task(ABC, Generic[AnyResult]):
         if failure:
             result = replace(result, outcome=failure.outcome, reason=failure.reason)
         return result
+
+    def end_rule(self) -> EndRule:
+        """Make the rule by which a trial ends as ``landed``; trials also end when all is at rest, or time is over.
+
+        By default, the ball's lowest point has crossed the landing plane downwards, while neither the tool nor a body
+        of the scene pressed on it: a ball that hits a thin body at speed gets into it for a moment.
+        """
+        config = self.config
+        plane_m = config.scene.landing_height_m + config.ball.radius_m
+        holders = {config.tool.name, *config.scene.bodies, *config.task.bodies}
+
+        def has_landed(before: Sequence[float], now: Sequence[float], touching: Collection[str]) -> EndReason | None:
+            return "landed" if now[_HEIGHT] < plane_m <= before[_HEIGHT] and holders.isdisjoint(touching) else None
+
+        return has_landed
 
     @abstractmethod
     def assess(self, result: AnyResult, samples: Samples, header: EpisodeHeader) -> tuple[AnyResult, Failure | None]:

@@ -203,6 +203,8 @@ def set_physics(client: int, scenery: Scenery, ball: int, bodies: Mapping[int, S
         mass=physics.ball_mass_kg,
         lateralFriction=physics.ball_friction,
         restitution=physics.ball_restitution,
+        rollingFriction=physics.ball_rolling_friction_m,
+        spinningFriction=physics.ball_rolling_friction_m,
         physicsClientId=client,
         **undamped,
     )

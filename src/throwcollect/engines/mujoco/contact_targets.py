@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 import mujoco
 
-_ROWS = 3
-"""Rows of a contact with sliding friction alone, without rolling and torsional friction."""
+SLIDING_ROWS, ROLLING_ROWS = 3, 6
+"""Rows of a contact: one along its normal and two of sliding friction; with rolling friction, three more."""
 
 HARDNESS = 0.9
 """Share of its target acceleration that a contact reaches; the higher it is, the longer the solver takes."""
@@ -24,7 +24,9 @@ _LEAST_BOUNCE_MPS = 0.2
 """Contacts with a lower approach speed do not bounce, as in Bullet."""
 
 
-def aim_contacts(data: mujoco.MjData, hz: float, restitution: float, bounces: Mapping[int, float]) -> None:
+def aim_contacts(
+    data: mujoco.MjData, hz: float, restitution: float, bounces: Mapping[int, float], rows: int = SLIDING_ROWS
+) -> None:
     """Set the targets of all contacts, between ``mj_step1`` and ``mj_step2``.
 
     - Surfaces with a gap may close it in this step, but not penetrate each other.
@@ -36,16 +38,17 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitution: float, bounces: Ma
         hz: Steps per second.
         restitution: Restitution of the ball, which takes part in all contacts.
         bounces: Restitution of the shapes that have another one than 1, by their number.
+        rows: Rows of each contact.
     """
-    # The last rows are those of contacts, three for each: one along its normal, and two of friction. Contacts of shapes
-    # that merely touch have no rows. There are one or two contacts, for which plain numbers take a third of the time of
-    # arrays, to the same bits.
+    # The last rows are those of contacts, the first of each along its normal. Contacts of shapes that merely touch have
+    # no rows. There are one or two contacts, for which plain numbers take a third of the time of arrays, to the same
+    # bits.
     gaps, speeds, targets = data.efc_pos.tolist(), data.efc_vel.tolist(), data.efc_aref
     shares = {}
     if bounces:
         pairs = zip(data.contact.efc_address.tolist(), data.contact.geom.tolist(), strict=True)
         shares = {row: bounces.get(one, 1.0) * bounces.get(other, 1.0) for row, (one, other) in pairs}
-    for row in range(data.ne + data.nf + data.nl, len(gaps), _ROWS):
+    for row in range(data.ne + data.nf + data.nl, len(gaps), rows):
         away, speed = gaps[row] * hz, speeds[row]
         wanted = max(away, _CORRECTED * away)
         if restitution and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:

@@ -24,7 +24,7 @@ from throwcollect.engines.engine import (
     Steps,
     ball_of,
 )
-from throwcollect.engines.mujoco.contact_targets import aim_contacts
+from throwcollect.engines.mujoco.contact_targets import ROLLING_ROWS, SLIDING_ROWS, aim_contacts
 from throwcollect.engines.mujoco.scenery import (
     Surface,
     describe_links,
@@ -52,6 +52,7 @@ class MujocoEngine(Engine):
     _physics: Physics
     _surfaces: list[Surface]
     _bounces: dict[int, float]
+    _rows: int
     _model: mujoco.MjModel
     _data: mujoco.MjData
 
@@ -94,6 +95,7 @@ class MujocoEngine(Engine):
         """Set all numbers of the physics."""
         self._physics = physics
         set_physics(self._model, self._scene.bodies, physics)
+        self._rows = ROLLING_ROWS if physics.ball_rolling_friction_m else SLIDING_ROWS
         self._bounces = find_bounces(self._model, self._scene.bodies)
         self._pick = _make_sample_picker(self._model, self._places)
 
@@ -149,7 +151,7 @@ class MujocoEngine(Engine):
         multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
         begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
-        restitution, bounces = physics.ball_restitution, self._bounces
+        restitution, bounces, rows = physics.ball_restitution, self._bounces, self._rows
         untouched = presses.tobytes()
         # This equals no state of the surfaces, so the first step compares what presses with what pressed before.
         last_presses, number = b"", 0
@@ -167,7 +169,7 @@ class MujocoEngine(Engine):
             maximum(minimum(work, most, out=work), least, out=torque)
             contacts = data.ncon
             if contacts:
-                aim_contacts(data, hz, restitution, bounces)
+                aim_contacts(data, hz, restitution, bounces, rows)
             if drag:
                 self._apply_drag(drag)
             end_step(model, data)
@@ -198,7 +200,7 @@ class MujocoEngine(Engine):
         mujoco.mj_step1(model, data)
         data.qfrc_applied[:count] = data.qfrc_bias[:count]
         if data.ncon:
-            aim_contacts(data, self._physics.hz, self._physics.ball_restitution, self._bounces)
+            aim_contacts(data, self._physics.hz, self._physics.ball_restitution, self._bounces, self._rows)
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
 

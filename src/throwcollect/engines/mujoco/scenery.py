@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from throwcollect.engines.body import BodyModel, LinkShape, Placement, Vector
 from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
-from throwcollect.engines.mujoco.contact_targets import HARDNESS
+from throwcollect.engines.mujoco.contact_targets import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 
@@ -225,7 +225,13 @@ def set_physics(model: mujoco.MjModel, bodies: Sequence[SceneBody], physics: Phy
     model.body_inertia[ball] = 0.4 * physics.ball_mass_kg * model.geom_size[sphere, 0] ** 2
     # Frictions are multiplied, as in Bullet. There is no rolling and no torsional friction.
     model.geom_friction[:] = (physics.surface_friction**2, 0.0, 0.0)
-    model.geom_friction[sphere, 0] = physics.ball_friction * physics.surface_friction
+    rolling = physics.ball_rolling_friction_m
+    model.geom_friction[sphere] = (
+        physics.ball_friction * physics.surface_friction,
+        *[rolling * physics.surface_friction] * 2,
+    )
+    # All contacts are contacts of the ball. Those that resist rolling have rows for it.
+    model.geom_condim[sphere] = model.pair_dim[:] = ROLLING_ROWS if rolling else SLIDING_ROWS
     model.geom_margin[sphere] = _REACH_M
     # Friction stops sliding within one step if it can. `aim_contacts` replaces the targets along the normals.
     model.geom_solref[:] = (2 / physics.hz, 1.0)
@@ -235,7 +241,7 @@ def set_physics(model: mujoco.MjModel, bodies: Sequence[SceneBody], physics: Phy
     for each in bodies:
         for number in range(len(each.link.shapes)):
             pair = model.pair(f"{_name_body(each)}/{number}").id
-            model.pair_friction[pair] = (*[physics.ball_friction * each.friction] * 2, 0.0, 0.0, 0.0)
+            model.pair_friction[pair] = (*[physics.ball_friction * each.friction] * 2, *[rolling * each.friction] * 3)
     # Recompute the numbers that the solver derives from masses, such as those by which it scales contacts.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 

@@ -19,34 +19,14 @@ class UntilLanded(UntilConfig):
     """Number of throws that should land: the last of them is the last trial of the dataset."""
 
 
-class ThrowConfig(TaskConfig):
-    """The task `throw`: the arm swings from `start` to `end`; the ball leaves the spoon when the spoon brakes."""
+class SwingConfig(TaskConfig):
+    """Keys of every task that throws: the arm swings from `start` to `end`, and the spoon brakes."""
 
-    implementation: ClassVar[str] = "throwcollect.tasks.throw.throw_task:ThrowTask"
     until: ClassVar[type[UntilConfig]] = UntilLanded
     throws: ClassVar[bool] = True
     targets: ClassVar[tuple[str, ...]] = ("landing_x_m", "landing_y_m")
-    given: ClassVar[tuple[str, ...]] = ("scene.landing_height_m",)
-    target_columns: ClassVar[tuple[TargetColumn, ...]] = (
-        TargetColumn(
-            "target_x_m", "landing_x_m", "miss_m", "x", "Where the ball should land: x in world [m].", required=True
-        ),
-        TargetColumn(
-            "target_y_m", "landing_y_m", "miss_m", "y", "Where the ball should land: y in world [m].", required=True
-        ),
-        TargetColumn(
-            "target_z_m", "scene.landing_height_m", "miss_m", "z", "Height at which the ball should land [m]."
-        ),
-        TargetColumn(
-            "target_hit_angle_rad",
-            "hit_angle_rad",
-            "miss_hit_angle_rad",
-            "hit angle",
-            "Direction of flight below the horizontal with which the ball should land [rad].",
-        ),
-    )
 
-    name: Literal["throw"] = "throw"
+    name: str
     """Task."""
     start: Annotated[dict[Joint, Angle], Key(Effect.PHYSICS, swept=True)] = {
         "torso_1_joint": 0.0,
@@ -72,8 +52,36 @@ class ThrowConfig(TaskConfig):
     """The ball counts as released when it has been out of the spoon for this long."""
 
 
-def throw_section(task: TaskConfig) -> ThrowConfig:
-    """Return the section of a task, which has to be a throw."""
-    if not isinstance(task, ThrowConfig):
+class ThrowConfig(SwingConfig):
+    """The task `throw`: the arm swings from `start` to `end`; the ball leaves the spoon when the spoon brakes."""
+
+    implementation: ClassVar[str] = "throwcollect.tasks.throw.throw_task:ThrowTask"
+    given: ClassVar[tuple[str, ...]] = ("scene.landing_height_m",)
+    target_columns: ClassVar[tuple[TargetColumn, ...]] = (
+        TargetColumn(
+            "target_x_m", "landing_x_m", "miss_m", "x", "Where the ball should land: x in world [m].", required=True
+        ),
+        TargetColumn(
+            "target_y_m", "landing_y_m", "miss_m", "y", "Where the ball should land: y in world [m].", required=True
+        ),
+        TargetColumn(
+            "target_z_m", "scene.landing_height_m", "miss_m", "z", "Height at which the ball should land [m]."
+        ),
+        TargetColumn(
+            "target_hit_angle_rad",
+            "hit_angle_rad",
+            "miss_hit_angle_rad",
+            "hit angle",
+            "Direction of flight below the horizontal with which the ball should land [rad].",
+        ),
+    )
+
+    name: Literal["throw"] = "throw"
+    """Task."""
+
+
+def throw_section(task: TaskConfig) -> SwingConfig:
+    """Return the section of a task, which has to throw."""
+    if not isinstance(task, SwingConfig):
         raise ConfigError([Problem(f"should be 'throw', got {task.name!r}", key="task.name")])
     return task

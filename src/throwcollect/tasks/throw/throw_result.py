@@ -22,6 +22,8 @@ class ThrowOutcome(Outcome):
     """The tool touched the ball again after its release."""
     SELF_HIT = "self_hit"
     """The ball touched a link of the robot after its release."""
+    BODY_HIT = "body_hit"
+    """The ball touched a body of the scene before it landed."""
     LIMIT_VIOLATED = "limit_violated"
     """The ball landed, but a joint left its position or velocity limits or saturated its effort."""
     TIMEOUT = "timeout"

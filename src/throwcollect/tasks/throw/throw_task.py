@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
+from throwcollect.engines.engine import GROUND
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.result import Outcome
 from throwcollect.tasks.task import Failure, Task
 from throwcollect.tasks.throw.drop import explain_drop, find_early_loss
 from throwcollect.tasks.throw.flight import (
@@ -34,14 +38,15 @@ class ThrowTask(Task[ThrowResult]):
        `explain_drop`).
     4. ``self_hit`` or ``recaught``: between release and landing the ball touched a link of the robot, or the tool
        again; the first touch decides.
-    5. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
+    5. ``body_hit``: the ball touched a body of the scene before it landed.
+    6. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
 
     Release, apex and landing are interpolated between samples: positions are on the cubic through the positions and
     velocities of both neighbours, and velocities are linear between them. If the landing plane is low, the ground may
     press on the ball before the sample after the landing; then a computed state of free flight replaces that sample.
     """
 
-    outcomes = ThrowOutcome
+    outcomes: ClassVar[type[Outcome]] = ThrowOutcome
     results = ThrowResult
     reasons = "Why the throw did not simply land; null if it did."
     report = "throwcollect.report.throw.throw_sections:report_throws"
@@ -53,11 +58,13 @@ class ThrowTask(Task[ThrowResult]):
         config = self.config
         release_ns = release_of(header.contacts, tool=config.tool.name, gap_s=throw_section(config.task).recatch_gap_s)
         touched: list[Contact] = []
+        impacts: list[Contact] = []
         if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
             flight = flight_after(samples, start_ns=header.start_ns, release_ns=release_ns)
-            if impacts := [contact.start_ns for contact in header.contacts if contact.body == "ground"]:
-                flight = without_impact(flight, header.seconds_at(min(impacts)), config=config)
-            result = self._measure_flight(result, flight)
+            impacts = [each for each in header.contacts if each.start_ns >= release_ns and self._stands(each.body)]
+            if impacts:
+                flight = without_impact(flight, header.seconds_at(impacts[0].start_ns), config=config)
+            result = self.measure_flight(result, flight)
             touched = self._list_touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
             result = replace(
                 result,
@@ -65,34 +72,66 @@ class ThrowTask(Task[ThrowResult]):
                 release_spin=spin_after(samples, release_ns),
                 ballistic_residual_m=flight_residual(samples, header, config=config),
             )
-        return result, self._find_failure(result, samples, header, touched)
+        failure = self._find_failure(result, samples, header, touched)
+        result, miss = self.judge_flight(result, samples, header, impacts)
+        return result, failure or miss
+
+    @property
+    def landing_height_m(self) -> float:
+        """Height of the plane on which the ball lands [m]."""
+        return self.config.scene.landing_height_m
+
+    def judge_flight(
+        self,
+        result: ThrowResult,
+        samples: Samples,  # noqa: ARG002 - where the ball ended counts for other tasks
+        header: EpisodeHeader,
+        impacts: Sequence[Contact],
+    ) -> tuple[ThrowResult, Failure | None]:
+        """Measure where the ball of a throw ended, and find why that is no success.
+
+        Args:
+            result: The result, with the measures of the flight.
+            samples: The recorded trial.
+            header: Contacts, goals and start of the trial.
+            impacts: Contacts after the release with the ground and the bodies of the scene, by time.
+        """
+        if result.landing is None and impacts and impacts[0].body != GROUND:
+            at = f"the ball touched {impacts[0].body} at {header.seconds_at(impacts[0].start_ns):.3f} s"
+            return result, Failure(ThrowOutcome.BODY_HIT, at)
+        if result.landing is None:
+            reason = f"the ball did not reach the landing plane; the trial ended as {header.end_reason}"
+            return result, Failure(ThrowOutcome.TIMEOUT, reason)
+        return result, None
+
+    def _stands(self, body: str) -> bool:
+        """Whether a name in contacts is that of the ground, or of a body of the scene."""
+        return body == GROUND or body in self.config.scene.bodies or body in self.config.task.bodies
 
     def _find_failure(
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader, touched: list[Contact]
     ) -> Failure | None:
-        tool = self.config.tool.name
+        """Find why the ball was not thrown, or touched the robot."""
+        tool, outcome = self.config.tool.name, self.outcomes
         if reason := find_early_loss(samples, header, config=self.config):
-            return Failure(ThrowOutcome.DROPPED, reason)
+            return Failure(outcome("dropped"), reason)
         if result.release is None:
-            return Failure(ThrowOutcome.NOT_RELEASED, f"the ball stayed in the {tool}")
+            return Failure(outcome("not_released"), f"the ball stayed in the {tool}")
         if reason := explain_drop(samples, header, result.release, config=self.config):
-            return Failure(ThrowOutcome.DROPPED, reason)
+            return Failure(outcome("dropped"), reason)
         if touched:
             first = touched[0]
             time_s = header.seconds_at(first.start_ns)
             if first.body == tool:
-                return Failure(ThrowOutcome.RECAUGHT, f"the {tool} touched the ball again at {time_s:.3f} s")
-            return Failure(ThrowOutcome.SELF_HIT, f"the ball touched {first.body} at {time_s:.3f} s")
-        if result.landing is None:
-            reason = f"the ball did not reach the landing plane; the trial ended as {header.end_reason}"
-            return Failure(ThrowOutcome.TIMEOUT, reason)
+                return Failure(outcome("recaught"), f"the {tool} touched the ball again at {time_s:.3f} s")
+            return Failure(outcome("self_hit"), f"the ball touched {first.body} at {time_s:.3f} s")
         return None
 
     def _list_touches(self, header: EpisodeHeader, release_ns: int, end_s: float) -> list[Contact]:
         """List the contacts with the robot between release and landing; contacts with the tool must have begun then."""
 
         def counts(contact: Contact) -> bool:
-            if contact.body == "ground" or header.seconds_at(contact.start_ns) >= end_s:
+            if self._stands(contact.body) or header.seconds_at(contact.start_ns) >= end_s:
                 return False
             if contact.body == self.config.tool.name:
                 return contact.start_ns >= release_ns
@@ -100,9 +139,10 @@ class ThrowTask(Task[ThrowResult]):
 
         return sorted(filter(counts, header.contacts), key=lambda contact: contact.start_ns)
 
-    def _measure_flight(self, result: ThrowResult, flight: Flight) -> ThrowResult:
+    def measure_flight(self, result: ThrowResult, flight: Flight) -> ThrowResult:
+        """Add the measures of a flight to a result."""
         release = flight.knot_state(0)
-        crossing = flight.landing(self.config.scene.landing_height_m + self.config.ball.radius_m)
+        crossing = flight.landing(self.landing_height_m + self.config.ball.radius_m)
         last, landing = crossing or (len(flight.times) - 1, None)
         speed, elevation = _compute_direction(release)
         return replace(
