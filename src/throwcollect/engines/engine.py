@@ -121,8 +121,8 @@ class Physics:
         ball_mass_kg: Mass of the ball.
         ball_friction: Coulomb friction of the ball [-].
         ball_restitution: Coefficient of restitution between the ball and everything that it touches [-].
-        ball_rolling_friction_m: Lever arm with which a surface resists the rolling of the ball [m], over the friction of
-            that surface.
+        ball_rolling_friction_m: Lever arm with which a surface resists the rolling of the ball [m], over the friction
+            of that surface.
         surface_friction: Coulomb friction of robot, tool and ground [-].
         efforts: Largest torque of each moving joint [Nm].
         position_gain_per_s: Velocity that a motor adds per radian of position error.

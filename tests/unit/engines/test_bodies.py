@@ -1,0 +1,143 @@
+"""Bodies of the scene, on every engine that knows contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import pytest
+from tests.unit.engines.test_engine_contract import PHYSICS, SCENE, SEAT, START, Watcher, begin, still, swing
+
+from throwcollect.engines.body import HERE, BodyLink, LinkShape, Placement
+from throwcollect.engines.engine import BodyState, Engine, Observer, SceneBody, ball_of
+from throwcollect.errors import ConfigError
+from throwcollect.extras import ENGINE_PACKAGES
+from throwcollect.members import load_member
+
+RADIUS = SCENE.ball_radius_m
+ROLLING = replace(PHYSICS, ball_rolling_friction_m=0.002)
+
+
+def body(kind: str, size: Sequence[float], xyz: Sequence[float], *, rpy=(0.0, 0.0, 0.0), **surface: float) -> SceneBody:
+    shape = LinkShape(kind, tuple(size), HERE)
+    return SceneBody(BodyLink(f"some_{kind}", shapes=(shape,)), Placement(tuple(xyz), tuple(rpy)), **surface)
+
+
+BOX = body("box", (0.6, 0.5, 0.1), (1.0, 0.0, 0.75))
+CYLINDER = body("cylinder", (0.3, 0.1), (1.0, 0.0, 0.75))
+SPHERE = body("sphere", (0.3,), (1.0, 0.0, 0.5))
+
+
+@pytest.fixture(params=["bullet", "mujoco"])
+def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
+    pytest.importorskip(ENGINE_PACKAGES[request.param].module)
+    made = load_member("engines", request.param)()
+    yield made
+    made.close()
+
+
+def drop(engine: Engine, *bodies: SceneBody, physics=PHYSICS, height_m: float = 1.2, steps: int = 500) -> Watcher:
+    """Let the ball fall over the middle of the bodies, at rest at first."""
+    engine.load(replace(SCENE, bodies=bodies))
+    engine.configure(physics)
+    engine.rest(START.tolist(), SEAT)
+    engine.place_ball(BodyState((1.0, 0.0, height_m)))
+    seen = Watcher()
+    engine.run(still(engine, steps), seen)
+    return seen
+
+
+@pytest.mark.parametrize("standing", [BOX, CYLINDER, SPHERE], ids=lambda each: each.link.name)
+def test_a_ball_that_falls_on_a_body_rests_on_top_of_it(engine: Engine, standing: SceneBody) -> None:
+    seen = drop(engine, standing, physics=ROLLING)
+    assert ball_of(seen.samples[-1][1]).position == pytest.approx((1.0, 0.0, 0.8 + RADIUS), abs=2e-3)
+    assert seen.touches[-1][1] == {standing.link.name}
+
+
+def test_a_ball_slides_down_a_body_that_is_turned(engine: Engine) -> None:
+    tilted = replace(BOX, placement=Placement((1.0, 0.0, 0.75), (0.0, 0.5, 0.0)), friction=0.0)
+    x, y, z = ball_of(drop(engine, tilted, steps=250).samples[-1][1]).position
+    # A positive turn about y lowers the side at higher x.
+    assert x > 1.05
+    assert z < 0.8
+    assert y == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_restitution_of_a_body_is_multiplied_with_that_of_the_ball(engine: Engine) -> None:
+    bouncy = replace(PHYSICS, ball_restitution=0.8)
+    heights = []
+    for restitution in (1.0, 0.5, 0.0):
+        seen = drop(engine, replace(BOX, restitution=restitution), physics=bouncy, steps=400)
+        first = seen.touches[0][0]
+        heights.append(max(ball_of(sample).position[2] for step, sample in seen.samples if step > first + 5))
+    assert heights[0] > heights[1] + 0.05 > heights[2] + 0.1
+    assert heights[2] < 0.85
+
+
+def test_friction_with_a_body_is_the_product_of_both(engine: Engine) -> None:
+    def slide(ball: float, surface: float) -> float:
+        engine.load(replace(SCENE, bodies=(replace(BOX, friction=surface),)))
+        engine.configure(replace(PHYSICS, ball_friction=ball))
+        engine.rest(START.tolist(), SEAT)
+        engine.place_ball(BodyState((0.8, 0.0, 0.8 + RADIUS), linear_velocity=(1.0, 0.0, 0.0)))
+        engine.run(still(engine, 100), Observer())
+        return ball_of(engine.state.sample).linear_velocity[0]
+
+    assert slide(1.0, 0.0) == pytest.approx(1.0, abs=1e-3)
+    # A ball that rolls without sliding keeps 5/7 of the speed at which it slid.
+    assert slide(0.5, 1.0) == pytest.approx(5 / 7, abs=0.02)
+    # 0.2 s of sliding at 0.02 g.
+    assert slide(0.2, 0.1) == pytest.approx(1.0 - 0.2 * 0.02 * 9.81, abs=5e-3)
+
+
+def test_rolling_friction_stops_a_ball_after_the_way_that_it_implies(engine: Engine) -> None:
+    lever, speed = 0.002, 0.5
+    engine.load(replace(SCENE, bodies=(replace(BOX, friction=1.0, link=replace(BOX.link)),)))
+    engine.configure(replace(PHYSICS, ball_friction=1.0, ball_rolling_friction_m=lever))
+    engine.rest(START.tolist(), SEAT)
+    spin = (0.0, speed / RADIUS, 0.0)
+    engine.place_ball(BodyState((0.75, 0.0, 0.8 + RADIUS), linear_velocity=(speed, 0.0, 0.0), angular_velocity=spin))
+    engine.run(still(engine, 750), Observer())
+    ball = ball_of(engine.state.sample)
+    # Rolling takes 7/5 of the energy of sliding, and loses weight times lever over radius on each metre.
+    assert ball.position[0] - 0.75 == pytest.approx(0.7 * speed**2 / (9.81 * lever / RADIUS), rel=0.05)
+    assert math.hypot(*ball.linear_velocity) < 1e-3
+
+
+def test_a_changed_body_gives_the_same_bits_as_a_new_world(engine: Engine) -> None:
+    others = (
+        replace(BOX, placement=Placement((1.1, 0.1, 0.6), (0.2, 0.1, 0.3))),
+        body("cylinder", (0.2, 0.3), (1.0, 0.05, 0.5), friction=0.9, restitution=0.4),
+        body("sphere", (0.1,), (1.02, 0.0, 0.9)),
+    )
+    smaller = tuple(
+        replace(each, link=replace(each.link, shapes=(replace(shape, size=tuple(0.8 * s for s in shape.size)),)))
+        for each in others
+        for shape in each.link.shapes
+    )
+    bouncy = replace(PHYSICS, ball_restitution=0.5)
+    drop(engine, BOX, CYLINDER, SPHERE)
+    kept = [drop(engine, *others, physics=bouncy), drop(engine, *smaller), drop(engine, *others, physics=bouncy)]
+    fresh = type(engine)()
+    assert drop(fresh, *others, physics=bouncy) == kept[0] == kept[2]
+    assert kept[0].touches != kept[1].touches
+    fresh.close()
+
+
+def test_throws_do_not_depend_on_bodies_that_nothing_touches(engine: Engine) -> None:
+    begin(engine)
+    alone, beside = Watcher(), Watcher()
+    engine.run(swing(600), alone)
+    engine.load(replace(SCENE, bodies=(replace(BOX, placement=Placement((-2.0, 0.0, 0.5))),)))
+    engine.configure(PHYSICS)
+    engine.rest(START.tolist(), SEAT)
+    engine.run(still(engine, 25), Observer())
+    engine.reset(engine.state)
+    engine.run(swing(600), beside)
+    assert beside == alone
+
+
+def test_the_ballistic_engine_refuses_bodies() -> None:
+    with pytest.raises(ConfigError, match="no contacts: some_box"):
+        load_member("engines", "ballistic")().load(replace(SCENE, bodies=(BOX,)))
