@@ -78,7 +78,7 @@ def fit(
         typer.echo(model.model_dump_json(include={"kind", "targets", "axes", "trained_on"}, indent=2))
         return
     typer.echo(
-        f"learned from {format_count(trained.throws, 'throw')}, {trained.ignored} ignored as they did not succeed"
+        f"learned from {format_count(trained.throws, 'throw')}, {trained.ignored} ignored as they show no target"
     )
     typer.echo(f"parameters: {', '.join(model.parameters)}")
     for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
@@ -278,9 +278,10 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
 
 
 def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[list[float]]:
-    """Read the throws of a dataset that succeeded: the keys and the targets of each."""
+    """Read the throws of a dataset that a model can learn from: the keys and the targets of each."""
     from throwcollect.config.values import column_of
     from throwcollect.dataset.reader import Dataset
+    from throwcollect.learning.fitting import keep_informative
 
     dataset = Dataset.open(directory)
     trained, config = model.trained_on, dataset.config
@@ -289,7 +290,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[li
             f"{directory}: the task {config.task.name} of the robot {config.robot.name}",
             expected=f"{trained.task} of {trained.robot}, as the model has it",
         )
-    throws = dataset.select(f"outcome == '{dataset.config.task.success}'").throws
+    throws = keep_informative(config.task, dataset.throws, model.targets)
     names = [*keys, *model.targets]
     if missing := [name for name in names if column_of(name) not in throws.column_names]:
         raise ConfigError(

@@ -77,6 +77,7 @@ class TaskConfig(Section):
         targets: Columns of its results that say where a trial ended, and that can be aimed at; none if there is
             nothing to aim at.
         given: Keys whose values belong to a target, in the order in which they follow it: aiming does not choose them.
+        informative: Outcomes besides the success of trials that also show where a motion leads: models learn from them.
         target_columns: Columns of targets that lists of its trials may have, in the order of the table of throws; none
             if its trials have no targets.
     """
@@ -86,6 +87,7 @@ class TaskConfig(Section):
     throws: ClassVar[bool] = False
     targets: ClassVar[tuple[str, ...]] = ()
     given: ClassVar[tuple[str, ...]] = ()
+    informative: ClassVar[tuple[str, ...]] = ()
     target_columns: ClassVar[tuple[TargetColumn, ...]] = ()
 
     name: str
@@ -111,6 +113,10 @@ class TaskConfig(Section):
     def success(self) -> str:
         """Outcome of a trial that succeeded."""
         return self.until.outcome()
+
+    def shows_target(self, row: Mapping[str, Any], targets: Collection[str]) -> bool:
+        """Whether a row of the table of throws shows where its motion leads, in these columns of targets."""
+        return row["outcome"] in (self.success, *self.informative) and all(row[name] is not None for name in targets)
 
     @property
     def bodies(self) -> Mapping[str, AnyBody]:

@@ -10,6 +10,7 @@ import pyarrow.compute as pc
 
 from throwcollect.arguments import read_word, refuse_argument
 from throwcollect.config.schema import Config
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.carried_robot import config_text, find_files
 from throwcollect.dataset.reader import Dataset
@@ -62,7 +63,7 @@ def fit(
         raise ConfigError(
             f"the task {config.task.name} names no targets", expected="columns of the table of throws as targets"
         )
-    throws = selected.throws.filter(pc.equal(selected.throws["outcome"], config.task.success))
+    throws = keep_informative(config.task, selected.throws, columns)
     axes = _find_axes(selected, throws, parameters, given)
     _check_amount(selected, throws, axes)
     outputs = np.column_stack([_read_numbers(throws, column, dataset) for column in columns])
@@ -95,6 +96,17 @@ def fit(
         config=config_text(config),
         robot=find_files(config),
     )
+
+
+def keep_informative(task: TaskConfig, throws: pa.Table, targets: Sequence[str]) -> pa.Table:
+    """Keep the rows of a table of throws that show where their motions lead, in these columns of targets."""
+    outcomes = pa.array([task.success, *task.informative])
+    throws = throws.filter(pc.is_in(throws["outcome"], outcomes))
+    for name in targets:
+        # A column that does not exist is reported later.
+        if name in throws.column_names:
+            throws = throws.filter(pc.is_valid(throws[name]))
+    return throws
 
 
 def _check_names(targets: Sequence[str], parameters: Sequence[str], given: Sequence[str]) -> None:

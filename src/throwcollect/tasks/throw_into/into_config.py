@@ -127,6 +127,8 @@ class ThrowIntoConfig(SwingConfig):
 
     implementation: ClassVar[str] = "throwcollect.tasks.throw_into.into_task:ThrowIntoTask"
     until: ClassVar[type[UntilConfig]] = UntilInBin
+    given: ClassVar[tuple[str, ...]] = ("task.bin.x_m", "task.bin.y_m", "task.bin.height_m", "task.bin.depth_m")
+    informative: ClassVar[tuple[str, ...]] = ("short", "beyond", "bounced_out")
     target_columns: ClassVar[tuple[TargetColumn, ...]] = tuple(
         each for each in ThrowConfig.target_columns if each.name != "target_z_m"
     )
