@@ -118,8 +118,9 @@ def _describe(details: ErrorDetails, location: Location, section: type[Section])
         yield location, "missing"
     elif kind == "union_tag_not_found" and isinstance(value, Mapping):
         # The key that chooses between sections takes a word of each.
-        tag = "family" if "family" in value else "name"
-        words = [word for each in _list_kinds(section, (*location, tag)) for word in get_args(each)]
+        tag = next((each for each in ("family", "shape") if each in value), "name")
+        # Sections of several tasks have the same motions.
+        words = list(dict.fromkeys(word for each in _list_kinds(section, (*location, tag)) for word in get_args(each)))
         expected = join_names([repr(word) for word in words], "or")
         yield (*location, tag), _write_expectation(f"should be {expected}", value.get(tag), words)
     elif kind in _NO_KEYS:

@@ -47,7 +47,8 @@ class ValueShape:
     @property
     def choices(self) -> list[str]:
         """The words that are allowed; empty if any text is."""
-        return [word for shape in self.alternatives for word in _list_words(shape.node)]
+        words = [word for shape in self.alternatives for word in _list_words(shape.node)]
+        return list(dict.fromkeys(words))
 
     def child(self, part: str | int) -> ValueShape:
         """Find the shape of the value under a key or an index; it allows anything if there should be no value."""

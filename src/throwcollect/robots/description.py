@@ -20,7 +20,7 @@ from throwcollect.engines.body import (
     LinkShape,
     to_text,
 )
-from throwcollect.errors import ConfigError, MemberError
+from throwcollect.errors import ConfigError, MemberError, Problem
 from throwcollect.extras import MissingExtraError, is_installed
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.described import find_robot
@@ -126,7 +126,7 @@ def physics_description(config: Config) -> Description:
     in the robot's URDF, and mass, inertia and collision shapes of all of these links.
     """
     robot, tool = robot_of(config), tool_of(config)
-    check_name_of_tool(robot, tool)
+    check_names(config, robot, tool)
     locked = find_locked_joints(config)
     source = robot.description
     model = lock_joints(joint_model(robot), locked)
@@ -147,8 +147,12 @@ def physics_description(config: Config) -> Description:
     return Description(model=whole, moving=moving, locked=locked)
 
 
-def check_name_of_tool(robot: Robot, tool: Tool) -> None:
-    """Make sure that a contact with the tool is not taken for one with the ground or a part of the robot."""
+def check_names(config: Config, robot: Robot, tool: Tool) -> None:
+    """Make sure that what the ball touches is told apart: tool, ground, bodies of the scene, and links of the robot."""
+    for name in {**config.scene.bodies, **config.task.bodies}:
+        if name in (tool.name, tool.link, *robot.description.links):
+            what = "the tool" if name in (tool.name, tool.link) else f"a link of {robot.title}"
+            raise ConfigError([Problem(f"should have another name, as {what} has this one", f"scene.bodies.{name}")])
     if taken := {tool.name, tool.link} & {"ground", *robot.description.links}:
         raise ConfigError(
             f"tool.name: the tool is recorded as {tool.name}, with the link {tool.link}; the ground or a link of "

@@ -12,7 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import (
-    check_name_of_tool,
+    check_names,
     find_locked_joints,
     joint_offsets,
     robot_of,
@@ -66,7 +66,7 @@ class Feasibility:
         self._locked: Mapping[str, float] = {}
         self._free_dynamics = self._dynamics
         self._tool_config, self._tool = config.tool, tool_of(config)
-        check_name_of_tool(self._robot, self._tool)
+        check_names(config, self._robot, self._tool)
         self._clearance = Clearance(self._robot, self._model, self._tool)
         self._key_of_around: object = None
         self._around: Clearance | None = None

@@ -60,7 +60,7 @@ class LobConfig(ThrowConfig):
 
 def test_two_tasks_may_name_their_success_alike(monkeypatch):
     tasks = {"throw": ThrowConfig, "lob": LobConfig}
-    monkeypatch.setattr(schema, "names_of", lambda _: tuple(tasks))
+    monkeypatch.setattr(schema, "usable_names", lambda _: tuple(tasks))
     monkeypatch.setattr(schema, "load_member", lambda _, name: tasks[name])
     until = TypeAdapter(schema._make_until_type()).validate_python({"landed": 3})
     assert type(until) is UntilLanded

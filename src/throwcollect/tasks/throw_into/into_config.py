@@ -133,7 +133,7 @@ class ThrowIntoConfig(SwingConfig):
         each for each in ThrowConfig.target_columns if each.name != "target_z_m"
     )
 
-    name: Literal["throw_into"]
+    name: Literal["throw_into"] = "throw_into"
     """Task."""
     bin: Annotated[BinConfig, Key(Effect.PHYSICS, swept=True)] = BinConfig()
     """The bin."""
