@@ -37,16 +37,19 @@ class BallConfig(Section):
 
 
 class BodyConfig(Section):
-    """A body of the scene, which stays where it is."""
+    """A body of the scene."""
 
     position_m: Annotated[_Triple, Key(swept=True)]
-    """Position of its centre in world: x, y, z."""
+    """Position of its centre in world at the start: x, y, z."""
     rpy_rad: Annotated[list[Angle], Field(min_length=3, max_length=3), Key(swept=True)] = [0.0, 0.0, 0.0]
     """Rotations about the axes x, y, z of the world, in this order."""
+    mass_kg: Annotated[Annotated[float, Field(gt=0, le=100)] | None, Key(swept=True)] = None
+    """Mass of a body that moves when it is pushed; null for one that stays where it is. Only the first is recorded."""
     friction: Annotated[float, Field(ge=0, le=2), Key(swept=True)] = 0.5
     """Coulomb friction [-]; it is multiplied with that of what touches the body."""
-    restitution: Annotated[float, Field(ge=0, le=1), Key(swept=True)] = 1.0
-    """Coefficient of restitution [-]; it is multiplied with that of what touches the body."""
+    restitution: Annotated[Annotated[float, Field(ge=0, le=1)] | None, Key(swept=True)] = None
+    """Coefficient of restitution [-]; it is multiplied with that of what touches the body, which is 1 for the ground
+    and the robot. Null: 0 for a body that moves, otherwise 1."""
     color: Annotated[_Color, Key(Effect.APPEARANCE, swept=False)] = "#8a6f4d"
     """Color in pictures."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -59,6 +59,19 @@ class LinkShape:
     size: tuple[float, ...]
     placement: Placement
     mesh: Mesh | None = None
+
+
+def moments_of(kind: str, size: Sequence[float], mass_kg: float) -> tuple[float, float, float]:
+    """Moments of inertia of a solid box, cylinder or sphere about its centre, along its own axes [kg m²]."""
+    match kind, tuple(size):
+        case "box", (x, y, z):
+            moments = (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12
+        case "cylinder", (radius, length):
+            across = radius * radius / 4 + length * length / 12
+            moments = across, across, radius * radius / 2
+        case _, (radius,):
+            moments = (0.4 * radius * radius,) * 3
+    return mass_kg * moments[0], mass_kg * moments[1], mass_kg * moments[2]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ Frames and units: world with x forward, y left, z up; metres, radians, seconds, 
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,12 +24,12 @@ Box = tuple[Vector, Vector]
 """Lowest and highest corner [m]."""
 
 Sample = tuple[float, ...]
-"""Robot and ball at one instant: positions [rad], velocities [rad/s] and motor torques [Nm] of all moving joints, then
-position, orientation, linear and angular velocity of the ball. These are bare numbers, as an engine makes a sample
-every few steps and objects would slow it down."""
+"""The world at one instant: positions [rad], velocities [rad/s] and motor torques [Nm] of all moving joints, then
+position, orientation, linear and angular velocity of each body of the scene that moves, and of the ball. These are bare
+numbers, as an engine makes a sample every few steps and objects would slow it down."""
 
-BALL_NUMBERS = 13
-"""How many numbers at the end of a sample belong to the ball."""
+BODY_NUMBERS = 13
+"""How many numbers of a sample belong to a body; the last ones belong to the ball."""
 
 GROUND = "ground"
 """Name of the ground in contacts of the ball."""
@@ -68,19 +69,32 @@ class ToolLink:
 
 @dataclass(frozen=True)
 class SceneBody:
-    """A body that stands in the world, and that the ball collides with.
+    """A body of the world. The ball collides with it; one that moves collides with everything.
 
     Attributes:
-        link: Its name, by which contacts are recorded, and its shapes; it has no inertia, as it never moves.
-        placement: Its pose in world.
-        friction: Coulomb friction [-].
-        restitution: Coefficient of restitution [-], which is multiplied with that of the ball.
+        link: Its name, by which contacts are recorded, its shapes, and its inertia; without an inertia it never moves.
+        placement: Its pose in world, at the start.
+        friction: Coulomb friction [-], which is multiplied with that of what it touches.
+        restitution: Coefficient of restitution [-], which is multiplied likewise.
     """
 
     link: BodyLink
     placement: Placement = HERE
     friction: float = 1.0
     restitution: float = 1.0
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves when it is pushed."""
+        return self.link.inertia is not None
+
+    @property
+    def start(self) -> Sample:
+        """The numbers of a sample for its pose at the start, at rest."""
+        (sr, cr), (sp, cp), (sy, cy) = ((math.sin(turn / 2), math.cos(turn / 2)) for turn in self.placement.rpy)
+        x, y = sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy
+        z, w = cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy
+        return (*self.placement.xyz, x, y, z, w, *(0.0,) * 6)
 
 
 @dataclass(frozen=True)
@@ -104,6 +118,11 @@ class Scene:
     ground_is_solid: bool
     ball_radius_m: float
     bodies: tuple[SceneBody, ...] = ()
+
+    @property
+    def moving_bodies(self) -> tuple[SceneBody, ...]:
+        """The bodies that samples hold, in their order there."""
+        return tuple(body for body in self.bodies if body.moves)
 
     def has_robot_of(self, other: Scene) -> bool:
         """Whether nothing but the ball and the bodies differs from another scene."""
@@ -255,7 +274,7 @@ class Engine(ABC):
 
     @abstractmethod
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints into positions [rad] and the ball at its seat in the frame of the tool's link [m], at rest."""
+        """Put joints [rad], the ball at its seat in the tool's frame [m], and bodies at their start, all at rest."""
 
     @abstractmethod
     def reset(self, state: State) -> None:
@@ -286,5 +305,15 @@ class Engine(ABC):
 
 def ball_of(sample: Sample) -> BodyState:
     """Read the ball from a sample."""
-    x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = sample[-BALL_NUMBERS:]
+    return body_of(sample[-BODY_NUMBERS:])
+
+
+def body_of(numbers: Sample) -> BodyState:
+    """Read a body from its numbers in a sample."""
+    x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = numbers
     return BodyState((x, y, z), (qx, qy, qz, qw), (vx, vy, vz), (wx, wy, wz))
+
+
+def split_bodies(sample: Sample, joints: int) -> list[Sample]:
+    """Split off the numbers of each body of the scene that moves, in a sample with some number of moving joints."""
+    return [sample[at : at + BODY_NUMBERS] for at in range(3 * joints, len(sample) - BODY_NUMBERS, BODY_NUMBERS)]

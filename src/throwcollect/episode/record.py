@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Literal
 
 import numpy as np
@@ -31,6 +31,7 @@ class Samples:
         ball_orientation_xyzw: Unit quaternion, ball to world, shape ``(n_samples, 4)``.
         ball_linear_velocity: In world [m/s], shape ``(n_samples, 3)``.
         ball_angular_velocity: In world [rad/s], shape ``(n_samples, 3)``.
+        bodies: The same four of each body of the scene that moves, side by side, shape ``(n_samples, n_bodies, 13)``.
     """
 
     stamps_ns: NDArray[np.int64]
@@ -41,6 +42,7 @@ class Samples:
     ball_orientation_xyzw: NDArray[np.float64]
     ball_linear_velocity: NDArray[np.float64]
     ball_angular_velocity: NDArray[np.float64]
+    bodies: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 13)))
 
     def __len__(self) -> int:
         return len(self.stamps_ns)
@@ -139,9 +141,9 @@ class EpisodeHeader:
 
 def find_infinite_columns(samples: Samples) -> Iterator[str]:
     """Find columns with numbers that are not finite, and make a sentence for each."""
-    for field in fields(samples):
-        finite = np.isfinite(getattr(samples, field.name))
+    for each in fields(samples):
+        finite = np.isfinite(getattr(samples, each.name))
         if not finite.all():
             # `argmin` finds the first False.
             row = int(np.argmin(finite.reshape(len(samples), -1).all(axis=1)))
-            yield f"{field.name} holds numbers that are not finite, first in sample {row}"
+            yield f"{each.name} holds numbers that are not finite, first in sample {row}"

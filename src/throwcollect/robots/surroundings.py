@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from throwcollect.config.scene import AnyBody, BoxConfig, CylinderConfig
 from throwcollect.config.schema import Config
-from throwcollect.engines.body import HERE, BodyLink, LinkShape, Placement
+from throwcollect.engines.body import HERE, BodyLink, LinkInertia, LinkShape, Placement, moments_of
 from throwcollect.engines.engine import SceneBody
 
 
@@ -18,6 +18,11 @@ def _make_body(name: str, section: AnyBody) -> SceneBody:
     size: tuple[float, ...] = (section.radius_m,) if not isinstance(section, BoxConfig) else tuple(section.size_m)
     if isinstance(section, CylinderConfig):
         size = (section.radius_m, section.length_m)
-    link = BodyLink(name, shapes=(LinkShape(section.shape, size, HERE),))
+    inertia = None
+    if section.mass_kg is not None:
+        x, y, z = moments_of(section.shape, size, section.mass_kg)
+        inertia = LinkInertia(section.mass_kg, HERE, (x, 0.0, 0.0, y, 0.0, z))
+    link = BodyLink(name, inertia, (LinkShape(section.shape, size, HERE),))
     (x, y, z), (roll, pitch, yaw) = section.position_m, section.rpy_rad
-    return SceneBody(link, Placement((x, y, z), (roll, pitch, yaw)), section.friction, section.restitution)
+    restitution = (1.0 if inertia is None else 0.0) if section.restitution is None else section.restitution
+    return SceneBody(link, Placement((x, y, z), (roll, pitch, yaw)), section.friction, restitution)

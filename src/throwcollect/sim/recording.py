@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence, Set
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.engine import BALL_NUMBERS, Sample
+from throwcollect.engines.engine import BODY_NUMBERS, Sample
 from throwcollect.episode.record import Contact, Samples
 
 BALL_POSITION = slice(-13, -10)
@@ -104,7 +104,8 @@ def to_samples(
     position, velocity, effort = np.zeros((3, len(table), len(joints)))
     position[:, [joints.index(joint) for joint in locked]] = list(locked.values())
     columns = [joints.index(joint) for joint in moving]
-    for array, values in zip((position, velocity, effort), np.split(table[:, :-BALL_NUMBERS], 3, axis=1), strict=True):
+    joint_columns, others = np.split(table, [3 * len(moving)], axis=1)
+    for array, values in zip((position, velocity, effort), np.split(joint_columns, 3, axis=1), strict=True):
         array[:, columns] = values
     if offsets.any():
         position[:, columns] -= offsets
@@ -117,4 +118,5 @@ def to_samples(
         ball_orientation_xyzw=table[:, -10:-6],
         ball_linear_velocity=table[:, BALL_LINEAR_VELOCITY],
         ball_angular_velocity=table[:, -3:],
+        bodies=others[:, :-BODY_NUMBERS].reshape(len(table), -1, BODY_NUMBERS),
     )

@@ -12,7 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.as_described import check_loaded
 from throwcollect.engines.body import BodyModel
 from throwcollect.engines.engine import (
-    BALL_NUMBERS,
+    BODY_NUMBERS,
     BodyState,
     Engine,
     Observer,
@@ -256,7 +256,7 @@ class World(Observer):
         self._start_ns = start_ns
         self.steps = 0
         self._first_step = 0
-        self._start_joints = present[:-BALL_NUMBERS]
+        self._start_joints = present[:-BODY_NUMBERS]
         self._record_start()
         self._contacts = ContactLog()
         self._contacts.update(self._touching, 0)
@@ -305,7 +305,7 @@ class World(Observer):
 
     def _record_start(self) -> None:
         # The motor torques are taken from the settled state, because engines have none before the first step.
-        self._log = SampleLog((*self._start_joints, *self.engine.state.sample[-BALL_NUMBERS:]))
+        self._log = SampleLog((*self._start_joints, *self.engine.state.sample[-BODY_NUMBERS:]))
 
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * NS_PER_S // self._hz
@@ -318,7 +318,7 @@ class World(Observer):
         lies = stands_still and self._touching
         if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < REST_SPEED_MPS):
             self._resting_since = self.steps
-        if (reason := self._ends(before[-BALL_NUMBERS:], now[-BALL_NUMBERS:], self._contacts.bodies)) is not None:
+        if (reason := self._ends(before[-BODY_NUMBERS:], now[-BODY_NUMBERS:], self._contacts.bodies)) is not None:
             return reason
         if self._has_moved and self.rests:
             return "rest"

@@ -9,8 +9,8 @@ from dataclasses import replace
 import pytest
 from tests.unit.engines.test_engine_contract import PHYSICS, SCENE, SEAT, START, Watcher, begin, still, swing
 
-from throwcollect.engines.body import HERE, BodyLink, LinkShape, Placement
-from throwcollect.engines.engine import BodyState, Engine, Observer, SceneBody, ball_of
+from throwcollect.engines.body import HERE, BodyLink, LinkInertia, LinkShape, Placement, moments_of
+from throwcollect.engines.engine import BodyState, Engine, Observer, SceneBody, ball_of, body_of, split_bodies
 from throwcollect.errors import ConfigError
 from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member
@@ -136,6 +136,88 @@ def test_throws_do_not_depend_on_bodies_that_nothing_touches(engine: Engine) -> 
     engine.reset(engine.state)
     engine.run(swing(600), beside)
     assert beside == alone
+
+
+def moving(standing: SceneBody, mass_kg: float, name: str, *, xyz: Sequence[float]) -> SceneBody:
+    (shape,) = standing.link.shapes
+    x, y, z = moments_of(shape.kind, shape.size, mass_kg)
+    link = replace(standing.link, name=name, inertia=LinkInertia(mass_kg, HERE, (x, 0.0, 0.0, y, 0.0, z)))
+    return replace(standing, link=link, placement=Placement(tuple(xyz)), restitution=0.0)
+
+
+CUBE = body("box", (0.1, 0.1, 0.1), (0.0, 0.0, 0.0))
+LOWER = moving(CUBE, 0.2, "lower", xyz=(1.0, 0.0, 0.9))
+UPPER = moving(CUBE, 0.1, "upper", xyz=(1.01, 0.01, 1.1))
+
+
+def bodies_after(seen: Watcher) -> list[BodyState]:
+    return [body_of(numbers) for numbers in split_bodies(seen.samples[-1][1], len(START))]
+
+
+def test_bodies_that_fall_come_to_rest_on_each_other(engine: Engine) -> None:
+    seen = drop(engine, BOX, LOWER, UPPER, height_m=3.0, steps=300)
+    lower, upper = bodies_after(seen)
+    assert lower.position == pytest.approx((1.0, 0.0, 0.85), abs=3e-3)
+    assert upper.position == pytest.approx((1.01, 0.01, 0.95), abs=5e-3)
+    assert math.hypot(*upper.linear_velocity) < 0.01
+    assert seen.touches == []
+
+
+def test_a_body_rests_on_the_ground_even_if_that_does_not_stop_the_ball(engine: Engine) -> None:
+    engine.load(replace(SCENE, bodies=(LOWER,), ground_is_solid=False))
+    engine.configure(PHYSICS)
+    engine.rest(START.tolist(), SEAT)
+    engine.place_ball(BodyState((2.0, 0.0, 1.0)))
+    seen = Watcher()
+    engine.run(still(engine, 500), seen)
+    assert bodies_after(seen)[0].position[2] == pytest.approx(0.05, abs=3e-3)
+    assert ball_of(seen.samples[-1][1]).position[2] < -1.0
+
+
+def test_a_ball_pushes_a_body_that_it_hits_and_keeps_the_momentum(engine: Engine) -> None:
+    light = replace(moving(CUBE, 0.05, "light", xyz=(1.0, 0.0, 0.85)), friction=0.0)
+    engine.load(replace(SCENE, bodies=(replace(BOX, friction=0.0), light)))
+    engine.configure(replace(PHYSICS, ball_mass_kg=0.05))
+    engine.rest(START.tolist(), SEAT)
+    engine.place_ball(BodyState((0.8, 0.0, 0.86), linear_velocity=(2.0, 0.0, 0.0)))
+    seen = Watcher()
+    engine.run(still(engine, 75), seen)
+    (hit,), ball = bodies_after(seen), ball_of(seen.samples[-1][1])
+    assert "light" in {name for _, names in seen.touches for name in names}
+    assert hit.linear_velocity[0] > 0.8
+    assert hit.linear_velocity[0] + ball.linear_velocity[0] == pytest.approx(2.0, abs=0.05)
+
+
+def test_the_robot_pushes_a_body(engine: Engine) -> None:
+    engine.load(SCENE)
+    engine.configure(PHYSICS)
+    engine.rest(START.tolist(), SEAT)
+    x, y, z = ball_of(engine.state.sample).position
+    # In the way of the spoon, whose swing goes forwards.
+    engine.load(replace(SCENE, bodies=(moving(CUBE, 0.1, "box", xyz=(x + 0.25, y, z + 0.2)),)))
+    engine.configure(replace(PHYSICS, gravity_mps2=0.01))
+    engine.rest(START.tolist(), SEAT)
+    seen = Watcher()
+    engine.run(swing(500), seen)
+    assert math.hypot(*bodies_after(seen)[0].linear_velocity) > 0.2
+
+
+def test_a_state_with_bodies_is_restored_with_all_its_bits(engine: Engine) -> None:
+    before = drop(engine, BOX, LOWER, UPPER, height_m=1.4, steps=120)
+    state = engine.state
+    once, again = Watcher(), Watcher()
+    engine.reset(state)
+    engine.run(still(engine, 300), once)
+    engine.reset(state)
+    engine.run(still(engine, 300), again)
+    assert once == again
+    fresh = type(engine)()
+    assert drop(fresh, BOX, LOWER, UPPER, height_m=1.4, steps=120) == before
+    fresh.reset(state)
+    other = Watcher()
+    fresh.run(still(fresh, 300), other)
+    assert other == once
+    fresh.close()
 
 
 def test_the_ballistic_engine_refuses_bodies() -> None:

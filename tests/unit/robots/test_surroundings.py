@@ -32,8 +32,8 @@ def test_a_motion_through_a_body_is_refused_and_one_beside_it_is_not() -> None:
 
 
 def test_the_base_of_the_robot_has_its_height() -> None:
-    # At the height of the ankles, in front of the toes.
-    config = scene(size_m=[0.05, 0.4, 0.05], position_m=[0.15, 0.0, 0.05])
+    # At the height of the feet.
+    config = scene(size_m=[0.05, 0.4, 0.05], position_m=[0.05, 0.0, 0.05])
     assert "leg" in (refusal(Feasibility(config), config) or "")
     lifted = with_values(config, {"robot.base_height_m": 1.5})
     assert refusal(Feasibility(lifted), lifted) is None

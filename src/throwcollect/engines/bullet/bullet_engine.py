@@ -17,6 +17,7 @@ from throwcollect.engines.bullet.scenery import (
     load_ball,
     load_bodies,
     load_scenery,
+    renew_moving,
     renew_pairs,
     set_physics,
 )
@@ -32,6 +33,8 @@ from throwcollect.engines.engine import (
     State,
     Steps,
     ball_of,
+    body_of,
+    split_bodies,
 )
 
 _ANY_BODY, _ANY_LINK = -1, -2
@@ -47,6 +50,7 @@ class BulletEngine(Engine):
 
     _scenery: Scenery
     _bodies: dict[int, SceneBody]
+    _moving: list[int]
     _names: dict[Surface, str]
     _ball: int
     _has_floor: bool
@@ -57,6 +61,7 @@ class BulletEngine(Engine):
     def __init__(self) -> None:
         self._client = connect()
         self._scene: Scene | None = None
+        self._placed: Sample = ()
         self._touching: frozenset[str] = frozenset()
         # The surfaces that pressed on the ball in the last step; None if there was no step since the last reset.
         self._pressing: set[Surface] | None = None
@@ -81,7 +86,8 @@ class BulletEngine(Engine):
         self._bodies = load_bodies(self._client, scene.bodies)
         self._names = self._scenery.names | {(each, BASE): body.link.name for each, body in self._bodies.items()}
         self._ball = load_ball(self._client, scene.ball_radius_m)
-        self._scene = scene
+        self._moving = [number for number, body in self._bodies.items() if body.moves]
+        self._scene, self._placed = scene, tuple(part for body in scene.moving_bodies for part in body.start)
 
     def describe_robot(self) -> list[LoadedLink]:
         """Describe the robot's links as Bullet has them."""
@@ -104,7 +110,7 @@ class BulletEngine(Engine):
         # Fields 4 and 5 are the pose of the link's frame. Those before are of its centre of mass.
         centre, _ = pybullet.multiplyTransforms(tool[4], tool[5], seat, _UPRIGHT)
         still = (0.0,) * len(joints)
-        self.reset(State((*joints, *still, *still, *centre, *_UPRIGHT, *(0.0,) * 6), frozenset()))
+        self.reset(State((*joints, *still, *still, *self._placed, *centre, *_UPRIGHT, *(0.0,) * 6), frozenset()))
 
     def reset(self, state: State) -> None:
         """Put robot and ball into a state, and leave no trace of earlier ones in the world.
@@ -119,7 +125,10 @@ class BulletEngine(Engine):
             pybullet.resetJointState(self._scenery.robot, joint, position, velocity, physicsClientId=client)
         renew_pairs(client, self._ball)
         self._has_floor = False
-        self.place_ball(ball_of(state.sample))
+        self._place(self._ball, ball_of(state.sample))
+        for number, numbers in zip(self._moving, split_bodies(state.sample, len(joints)), strict=True):
+            renew_moving(client, number)
+            self._place(number, body_of(numbers))
         self._touching, self._pressing = state.touching, None
 
     @property
@@ -169,12 +178,12 @@ class BulletEngine(Engine):
 
     def place_ball(self, ball: BodyState) -> None:
         """Set pose and velocity of the ball."""
-        pybullet.resetBasePositionAndOrientation(
-            self._ball, ball.position, ball.orientation_xyzw, physicsClientId=self._client
-        )
-        pybullet.resetBaseVelocity(
-            self._ball, ball.linear_velocity, ball.angular_velocity, physicsClientId=self._client
-        )
+        self._place(self._ball, ball)
+
+    def _place(self, number: int, body: BodyState) -> None:
+        place, turn, client = body.position, body.orientation_xyzw, self._client
+        pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
+        pybullet.resetBaseVelocity(number, body.linear_velocity, body.angular_velocity, physicsClientId=client)
 
     def _report_touch(self, step: int, observer: Observer) -> None:
         """Tell the observer which bodies press on the ball now, unless only other surfaces of the same bodies do."""
@@ -187,13 +196,15 @@ class BulletEngine(Engine):
         return frozenset(self._names[surface] for surface in surfaces)
 
     def _sample(self) -> Sample:
-        client, ball = self._client, self._ball
+        client = self._client
         joints = pybullet.getJointStates(self._scenery.robot, self._scenery.joints, client)
         # Each joint has four values here, so nothing has to be strict. Adding tuples is the fastest way to join them.
         positions, velocities, _, torques = zip(*joints)  # noqa: B905
-        place, turn = pybullet.getBasePositionAndOrientation(ball, client)
-        linear, angular = pybullet.getBaseVelocity(ball, client)
-        sample: Sample = positions + velocities + torques + place + turn + linear + angular
+        sample: Sample = positions + velocities + torques
+        for body in (*self._moving, self._ball):
+            place, turn = pybullet.getBasePositionAndOrientation(body, client)
+            linear, angular = pybullet.getBaseVelocity(body, client)
+            sample += place + turn + linear + angular
         return sample
 
     def _apply_drag(self, drag_kgpm: float) -> None:

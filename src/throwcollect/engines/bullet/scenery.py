@@ -16,7 +16,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import HERE, BodyModel, LinkInertia, Vector
-from throwcollect.engines.engine import GROUND, LoadedLink, Physics, Quaternion, Scene, SceneBody
+from throwcollect.engines.engine import GROUND, LoadedLink, Physics, Quaternion, Scene, SceneBody, body_of
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.native_reading import reading_natively
 
@@ -30,7 +30,7 @@ BASE = -1
 
 _ANY_INERTIA = LinkInertia(1.0, HERE, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
 
-_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _FLOOR_GROUP = 1, 2, 4, 16
+_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _MOVING_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
 """Bullet lets a pair collide if the mask of either one has the group of the other; the floor is a ground that is not
 solid."""
 
@@ -66,8 +66,7 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
     # By default Bullet computes inertias from the collision shapes.
-    flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-    robot = _load_model(client, scene.robot, (0.0, 0.0, scene.base_height_m), flags=flags)
+    robot = _load_model(client, scene.robot, (0.0, 0.0, scene.base_height_m))
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
     names = {(ground, BASE): GROUND, (robot, BASE): root}
@@ -86,27 +85,35 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     return Scenery(robot=robot, joints=[joints[joint] for joint in scene.moving], tool=tool, names=names)
 
 
-def _load_model(client: int, model: BodyModel, position: Vector, turn: Quaternion = UPRIGHT, *, flags: int = 0) -> int:
-    """Load a tree of links, whose root does not move, at a pose in world; return its body number."""
+def _load_model(
+    client: int, model: BodyModel, position: Vector, turn: Quaternion = UPRIGHT, *, moves: bool = False
+) -> int:
+    """Load a tree of links at a pose in world, whose root does not move by default; return its body number."""
     # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         for name, content in model.encode_meshes().items():
             Path(directory, name).write_bytes(content)
-        return load_urdf(client, model.write_urdf(), Path(directory), position, turn, flags=flags)
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+        return load_urdf(client, model.write_urdf(), Path(directory), position, turn, flags=flags, moves=moves)
 
 
 def load_urdf(
-    client: int, urdf: str, directory: Path, position: Vector, turn: Quaternion = UPRIGHT, *, flags: int = 0
+    client: int,
+    urdf: str,
+    directory: Path,
+    position: Vector,
+    turn: Quaternion = UPRIGHT,
+    *,
+    flags: int = 0,
+    moves: bool = False,
 ) -> int:
-    """Load URDF text, whose paths are relative to a directory, with a fixed base; return the number of the body."""
+    """Load URDF text, whose paths are relative to a directory; return the number of the body."""
     path = directory / "body.urdf"
     path.write_text(urdf, encoding="utf-8")
     with reading_natively():
         try:
-            number = pybullet.loadURDF(
-                str(path), position, turn, useFixedBase=True, flags=flags, physicsClientId=client
-            )
-            return int(number)
+            fixed = not moves
+            return int(pybullet.loadURDF(str(path), position, turn, 0, fixed, flags, physicsClientId=client))
         except pybullet.error as error:
             raise ConfigError(f"Bullet cannot load the description: {error}") from error
 
@@ -154,11 +161,20 @@ def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody
     numbers = {}
     for body in bodies:
         # Bullet complains of links without a mass; that of a body that never moves does not matter.
-        model = BodyModel(body.link.name, (replace(body.link, inertia=_ANY_INERTIA),))
-        number = _load_model(client, model, body.placement.xyz, pybullet.getQuaternionFromEuler(body.placement.rpy))
-        pybullet.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _BALL_GROUP, physicsClientId=client)
+        link = body.link if body.moves else replace(body.link, inertia=_ANY_INERTIA)
+        at = body_of(body.start)
+        model = BodyModel(link.name, (link,))
+        number = _load_model(client, model, at.position, at.orientation_xyzw, moves=body.moves)
+        if not body.moves:
+            pybullet.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _BALL_GROUP, physicsClientId=client)
         numbers[number] = body
     return numbers
+
+
+def renew_moving(client: int, body: int) -> None:
+    """Let a body that moves collide with everything; Bullet then forgets all contacts that it had."""
+    everything = _GROUND_GROUP | _ROBOT_GROUP | _BALL_GROUP | _MOVING_GROUP | _FLOOR_GROUP
+    pybullet.setCollisionFilterGroupMask(body, BASE, _MOVING_GROUP, everything, physicsClientId=client)
 
 
 def load_ball(client: int, radius: float) -> int:

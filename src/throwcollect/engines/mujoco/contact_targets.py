@@ -36,23 +36,23 @@ def aim_contacts(
     Args:
         data: The world, with at least one contact.
         hz: Steps per second.
-        restitution: Restitution of the ball, which takes part in all contacts.
-        bounces: Restitution of the shapes that have another one than 1, by their number.
-        rows: Rows of each contact.
+        restitution: Restitution of all contacts, if `bounces` is empty.
+        bounces: Restitution of the shapes that have another one than 1, by their number; a contact has the product.
+        rows: Rows of each contact, if `bounces` is empty.
     """
     # The last rows are those of contacts, the first of each along its normal. Contacts of shapes that merely touch have
     # no rows. There are one or two contacts, for which plain numbers take a third of the time of arrays, to the same
     # bits.
     gaps, speeds, targets = data.efc_pos.tolist(), data.efc_vel.tolist(), data.efc_aref
-    shares = {}
+    contacts = dict.fromkeys(range(data.ne + data.nf + data.nl, len(gaps), rows), restitution)
     if bounces:
         pairs = zip(data.contact.efc_address.tolist(), data.contact.geom.tolist(), strict=True)
-        shares = {row: bounces.get(one, 1.0) * bounces.get(other, 1.0) for row, (one, other) in pairs}
-    for row in range(data.ne + data.nf + data.nl, len(gaps), rows):
+        contacts = {row: bounces.get(one, 1.0) * bounces.get(other, 1.0) for row, (one, other) in pairs if row >= 0}
+    for row, bounce in contacts.items():
         away, speed = gaps[row] * hz, speeds[row]
         wanted = max(away, _CORRECTED * away)
-        if restitution and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:
-            wanted = restitution * shares.get(row, 1.0) * speed
+        if bounce and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:
+            wanted = bounce * speed
         # Surfaces part at positive speeds. As the solver reaches the share `HARDNESS` of this acceleration, the speed
         # after the step is about `-wanted`.
         targets[row] = (wanted + speed) * (-hz / HARDNESS)

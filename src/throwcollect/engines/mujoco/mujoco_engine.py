@@ -12,6 +12,7 @@ import numpy as np
 
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import (
+    BODY_NUMBERS,
     BodyState,
     Engine,
     LoadedLink,
@@ -23,6 +24,8 @@ from throwcollect.engines.engine import (
     State,
     Steps,
     ball_of,
+    body_of,
+    split_bodies,
 )
 from throwcollect.engines.mujoco.contact_targets import ROLLING_ROWS, SLIDING_ROWS, aim_contacts
 from throwcollect.engines.mujoco.scenery import (
@@ -96,8 +99,10 @@ class MujocoEngine(Engine):
         self._physics = physics
         set_physics(self._model, self._scene.bodies, physics)
         self._rows = ROLLING_ROWS if physics.ball_rolling_friction_m else SLIDING_ROWS
-        self._bounces = find_bounces(self._model, self._scene.bodies)
-        self._pick = _make_sample_picker(self._model, self._places)
+        self._bounces = find_bounces(self._model, self._scene.bodies, physics.ball_restitution)
+        moving, first = len(self._scene.moving_bodies), 3 * len(self._places)
+        self._pick = _make_sample_picker(self._model, self._places, moving)
+        self._ends_of_bodies = [first + BODY_NUMBERS * number for number in range(1, moving + 1)]
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
         """Put the joints into positions and the ball into the tool, all at rest."""
@@ -107,7 +112,8 @@ class MujocoEngine(Engine):
         tool = data.body(self._scene.tool.link)
         centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
         still = (0.0,) * len(joints)
-        self.reset(State((*joints, *still, *still, *centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), frozenset()))
+        placed = [part for body in self._scene.moving_bodies for part in body.start]
+        self.reset(State((*joints, *still, *still, *placed, *centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), frozenset()))
 
     def reset(self, state: State) -> None:
         """Put robot and ball into a state, and leave no trace of earlier ones in the world."""
@@ -117,6 +123,8 @@ class MujocoEngine(Engine):
         positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
         data.qpos[:count], data.qvel[:count] = positions[self._columns], velocities[self._columns]
         self.place_ball(ball_of(state.sample))
+        for number, numbers in enumerate(split_bodies(state.sample, count), start=1):
+            self._place(number, body_of(numbers))
         self._touching = state.touching
         self._compute_contact_forces()
 
@@ -188,11 +196,15 @@ class MujocoEngine(Engine):
 
     def place_ball(self, ball: BodyState) -> None:
         """Set pose and velocity of the ball."""
-        first = len(self._columns)
-        x, y, z, w = ball.orientation_xyzw
-        self._data.qpos[first : first + 7] = (*ball.position, w, x, y, z)
-        spin = _turn_back(ball.orientation_xyzw, ball.angular_velocity)
-        self._data.qvel[first : first + 6] = (*ball.linear_velocity, *spin)
+        self._place(0, ball)
+
+    def _place(self, number: int, body: BodyState) -> None:
+        """Set pose and velocity of the ball, number 0, or of a body of the scene that moves, by its number from 1."""
+        at, by = len(self._columns) + 7 * number, len(self._columns) + 6 * number
+        x, y, z, w = body.orientation_xyzw
+        self._data.qpos[at : at + 7] = (*body.position, w, x, y, z)
+        spin = _turn_back(body.orientation_xyzw, body.angular_velocity)
+        self._data.qvel[by : by + 6] = (*body.linear_velocity, *spin)
 
     def _compute_contact_forces(self) -> None:
         """Compute the contact forces on the robot that motors need in the first step, as if they had held it before."""
@@ -217,6 +229,8 @@ class MujocoEngine(Engine):
     def _sample(self) -> Sample:
         data = self._data
         row = self._pick(data.qpos.tolist() + data.qvel.tolist() + data.qfrc_applied.tolist())
+        for end in self._ends_of_bodies:
+            row = row[: end + _SPIN] + _turn(row[end - 10 : end - 6], row[end + _SPIN : end]) + row[end:]
         return row[:_SPIN] + _turn(row[_ORIENTATION], row[_SPIN:])
 
     def _apply_drag(self, drag_kgpm: float) -> None:
@@ -226,22 +240,23 @@ class MujocoEngine(Engine):
         self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
 
 
-def _list_kinds(scene: Scene) -> list[tuple[str, list[str]]]:
+def _list_kinds(scene: Scene) -> list[tuple[str, bool, list[str]]]:
     """List the names of the bodies and the kinds of their shapes, which a compiled model cannot change."""
-    return [(body.link.name, [shape.kind for shape in body.link.shapes]) for body in scene.bodies]
+    return [(body.link.name, body.moves, [shape.kind for shape in body.link.shapes]) for body in scene.bodies]
 
 
-def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:
+def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int], bodies: int) -> Callable[[list[float]], Sample]:
     """Make a function that picks a sample from all positions, velocities and forces.
 
-    The function leaves the ball's angular velocity in the frame of the ball. `order` is the place of each moving joint
-    among the joints of the model.
+    The function leaves angular velocities in the frames of their bodies. `order` is the place of each moving joint
+    among the joints of the model, behind which are those of the ball and of some moving bodies.
     """
-    ball = len(order)
-    x, y, z, w, i, j, k = range(ball, ball + 7)
     velocities, forces = model.nq, model.nq + model.nv
-    joints = [first + place for first in (0, velocities, forces) for place in order]
-    places = [*joints, x, y, z, i, j, k, w, *range(velocities + ball, velocities + ball + 6)]
+    places = [first + place for first in (0, velocities, forces) for place in order]
+    for number in (*range(1, bodies + 1), 0):
+        x, y, z, w, i, j, k = range(len(order) + 7 * number, len(order) + 7 * number + 7)
+        first = velocities + len(order) + 6 * number
+        places += [x, y, z, i, j, k, w, *range(first, first + 6)]
     pick: Callable[[list[float]], Sample] = itemgetter(*places)
     return pick
 

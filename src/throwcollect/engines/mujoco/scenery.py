@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import BodyModel, LinkShape, Placement, Vector
+from throwcollect.engines.body import INERTIA, BodyModel, LinkShape, Placement, Vector
 from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
 from throwcollect.engines.mujoco.contact_targets import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
 from throwcollect.errors import ConfigError
@@ -25,6 +25,8 @@ _KINDS = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
 }
 """Types of the shapes that bodies of a scene have."""
+
+_DIAGONAL = [number for number, (row, column) in enumerate(INERTIA.values()) if row == column]
 
 BALL = "ball"
 """Name of the ball's body and shape."""
@@ -100,7 +102,11 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         conaffinity=0,
     )
     _add_ball(spec, scene.ball_radius_m)
-    for each in scene.bodies:
+    if scene.moving_bodies:
+        for number, geom in enumerate(spec.geoms):
+            geom.name = geom.name or f"robot/{number}"
+    # Those that move are last, so that their pairs with all others can be named.
+    for each in sorted(scene.bodies, key=lambda body: body.moves):
         _add_body(spec, each)
         surfaces.append(Surface(_name_body(each), each.link.name))
     for surface in surfaces:
@@ -131,14 +137,21 @@ def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
 
 
 def _add_body(spec: mujoco.MjSpec, body: SceneBody) -> None:
-    """Put a body into the world that the ball alone collides with; `place_bodies` sets its pose and its sizes."""
+    """Put a body into the world; `place_bodies` sets its pose, its sizes and its mass.
+
+    Pairs of shapes that collide are named one by one, as they have numbers of their own: the ball with every body, and
+    a body that moves with everything that is in the world already.
+    """
     name = _name_body(body)
+    others = [geom.name for geom in spec.geoms] if body.moves else [BALL]
     added = spec.worldbody.add_body(name=name)
+    if body.moves:
+        added.add_freejoint(name=name)
     for number, shape in enumerate(body.link.shapes):
         geom = f"{name}/{number}"
-        # Without a mass, nothing but the shape's own numbers depends on its size.
-        added.add_geom(name=geom, type=_KINDS[shape.kind], size=(1.0, 1.0, 1.0), mass=0.0, contype=0, conaffinity=0)
-        spec.add_pair(name=geom, geomname1=BALL, geomname2=geom, condim=3, margin=_REACH_M)
+        added.add_geom(name=geom, type=_KINDS[shape.kind], size=(1.0, 1.0, 1.0), mass=1.0, contype=0, conaffinity=0)
+        for other in others:
+            spec.add_pair(geomname1=other, geomname2=geom, condim=SLIDING_ROWS, margin=_REACH_M)
 
 
 def _name_body(body: SceneBody) -> str:
@@ -151,6 +164,10 @@ def place_bodies(model: mujoco.MjModel, bodies: Sequence[SceneBody]) -> None:
     for each in bodies:
         body = model.body(_name_body(each)).id
         model.body_pos[body], model.body_quat[body] = each.placement.xyz, _turn(each.placement)
+        if (inertia := each.link.inertia) is not None:
+            model.body_mass[body] = inertia.mass_kg
+            model.body_inertia[body] = [inertia.moments_kgm2[number] for number in _DIAGONAL]
+            model.body_ipos[body], model.body_iquat[body] = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
         for number, shape in enumerate(each.link.shapes):
             geom = model.geom(f"{_name_body(each)}/{number}").id
             size, half = _size(shape)
@@ -231,17 +248,22 @@ def set_physics(model: mujoco.MjModel, bodies: Sequence[SceneBody], physics: Phy
         *[rolling * physics.surface_friction] * 2,
     )
     # All contacts are contacts of the ball. Those that resist rolling have rows for it.
-    model.geom_condim[sphere] = model.pair_dim[:] = ROLLING_ROWS if rolling else SLIDING_ROWS
+    model.geom_condim[sphere] = ROLLING_ROWS if rolling else SLIDING_ROWS
     model.geom_margin[sphere] = _REACH_M
     # Friction stops sliding within one step if it can. `aim_contacts` replaces the targets along the normals.
     model.geom_solref[:] = (2 / physics.hz, 1.0)
     model.geom_solimp[:, :2] = HARDNESS
     # A pair of shapes that is named in the model has numbers of its own.
     model.pair_solref[:], model.pair_solimp[:, :2] = (2 / physics.hz, 1.0), HARDNESS
-    for each in bodies:
-        for number in range(len(each.link.shapes)):
-            pair = model.pair(f"{_name_body(each)}/{number}").id
-            model.pair_friction[pair] = (*[physics.ball_friction * each.friction] * 2, *[rolling * each.friction] * 3)
+    frictions = dict.fromkeys(range(model.ngeom), physics.surface_friction)
+    frictions |= {geom: each.friction for each in bodies for geom in _list_geoms(model, each)}
+    for pair, (one, other) in enumerate(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)):
+        if sphere in (one, other):
+            friction = frictions[one if other == sphere else other]
+            model.pair_friction[pair] = (*[physics.ball_friction * friction] * 2, *[rolling * friction] * 3)
+            model.pair_dim[pair] = model.geom_condim[sphere]
+        else:
+            model.pair_friction[pair, :2] = frictions[one] * frictions[other]
     # Recompute the numbers that the solver derives from masses, such as those by which it scales contacts.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
@@ -292,11 +314,11 @@ def describe_links(model: mujoco.MjModel, robot: BodyModel) -> list[LoadedLink]:
     return found
 
 
-def find_bounces(model: mujoco.MjModel, bodies: Sequence[SceneBody]) -> dict[int, float]:
-    """Map the shapes of bodies that do not leave the restitution to the ball alone to their own restitution."""
-    return {
-        model.geom(f"{_name_body(each)}/{number}").id: each.restitution
-        for each in bodies
-        if each.restitution != 1.0
-        for number in range(len(each.link.shapes))
-    }
+def _list_geoms(model: mujoco.MjModel, body: SceneBody) -> list[int]:
+    return [model.geom(f"{_name_body(body)}/{number}").id for number in range(len(body.link.shapes))]
+
+
+def find_bounces(model: mujoco.MjModel, bodies: Sequence[SceneBody], ball_restitution: float) -> dict[int, float]:
+    """Map shapes to their restitution, by number; it is 1 for all others. The map is empty without bodies."""
+    found = {geom: each.restitution for each in bodies for geom in _list_geoms(model, each)}
+    return {**found, model.geom(BALL).id: ball_restitution} if found else {}
