@@ -12,6 +12,7 @@ from throwcollect.episode.frames import FrameTree, read_frames
 from throwcollect.episode.topics import (
     Topic,
     ball_odometry,
+    body_odometry,
     clock,
     controller_state,
     joint_states,
@@ -19,6 +20,7 @@ from throwcollect.episode.topics import (
     transforms,
 )
 from throwcollect.robots.description import robot_of
+from throwcollect.robots.surroundings import bodies_of
 
 ROBOT_DESCRIPTION_ID = 1
 TF_STATIC_ID = 2
@@ -27,6 +29,8 @@ BALL_ODOMETRY_ID = 4
 _CLOCK_ID = 5
 _TF_ID = 6
 _FIRST_CONTROLLER_ID = 7
+FIRST_BODY_ID = 200
+"""Bodies of the scene that move follow from this number on."""
 
 _INFINITE_S, _INFINITE_NS = 9223372036, 854775807
 """An infinite duration in rmw: 2^63 - 1 ns."""
@@ -134,6 +138,8 @@ class Channels:
 def _make_topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     chosen, robot = config.record.topics, robot_of(config)
     topics = {JOINT_STATES_ID: joint_states(robot.joints), BALL_ODOMETRY_ID: ball_odometry()}
+    moving = [body.link.name for body in bodies_of(config) if body.moves]
+    topics |= {FIRST_BODY_ID + number: body_odometry(name, number) for number, name in enumerate(moving)}
     if "clock" in chosen:
         topics[_CLOCK_ID] = clock()
     if "tf" in chosen:

@@ -16,7 +16,7 @@ import zstandard
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID, Channels
+from throwcollect.episode.channels import BALL_ODOMETRY_ID, FIRST_BODY_ID, JOINT_STATES_ID, Channels
 from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, Chunk, encode_message_index
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.episode.topics import (
@@ -24,6 +24,7 @@ from throwcollect.episode.topics import (
     Rows,
     ball_odometry,
     joint_states,
+    read_body,
     read_joint_names,
     read_stamps,
     rotate,
@@ -177,7 +178,9 @@ class MessageTable:
         columns = {name: np.asfortranarray(read_column(rows, name)) for name in rows.dtype.names or ()}
         velocities = ("ball_linear_velocity", "ball_angular_velocity")
         turned = rotate(columns["ball_orientation_xyzw"], *(columns[name] for name in velocities), inverse=False)
-        return Samples(**{**columns, **dict(zip(velocities, turned, strict=True))})
+        samples = Samples(**{**columns, **dict(zip(velocities, turned, strict=True))})
+        bodies = [read_body(self.messages(channel))[1] for channel in sorted(self.columns) if channel >= FIRST_BODY_ID]
+        return replace(samples, bodies=np.stack(bodies, axis=1)) if bodies else samples
 
 
 class ChunkEncoder:

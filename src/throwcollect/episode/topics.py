@@ -22,6 +22,9 @@ BALL = "ball"
 """Name of the ball's frame, fixed to the ball and at its centre."""
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
+_ODOMETRY = "nav_msgs/msg/Odometry"
+_BODY_PARTS = (3, 7, 10)
+"""Where orientation, linear and angular velocity of a body begin, behind its position."""
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _MOST_ROBOTS = 8
 """Most robots with cached layouts; there has to be a limit, as files may name any number of robots."""
@@ -129,10 +132,56 @@ def _fill_joint_states(rows: Rows, samples: Samples, _: SetPoints) -> None:
 @cache
 def ball_odometry() -> Topic:
     """``/ball/odometry``: nav_msgs/Odometry; pose in world, twist in the ball's own frame, covariances 0 (unknown)."""
-    kind = "nav_msgs/msg/Odometry"
-    message = get_message(kind)(header=make_header(WORLD), child_frame_id=BALL)
+
+    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
+        turn, linear, angular = (
+            samples.ball_orientation_xyzw,
+            samples.ball_linear_velocity,
+            samples.ball_angular_velocity,
+        )
+        _fill_odometry(rows, samples.stamps_ns, samples.ball_position, turn, linear, angular)
+
+    return Topic("/ball/odometry", _ODOMETRY, _lay_odometry_out(BALL), fill)
+
+
+@lru_cache(maxsize=64)
+def body_odometry(name: str, number: int) -> Topic:
+    """``/bodies/<name>/odometry``: as that of the ball, of the body with some number among those that move."""
+
+    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
+        position, turn, linear, angular = np.split(samples.bodies[:, number], _BODY_PARTS, axis=1)
+        _fill_odometry(rows, samples.stamps_ns, position, turn, linear, angular)
+
+    return Topic(f"/bodies/{name}/odometry", _ODOMETRY, _lay_odometry_out(name), fill)
+
+
+def read_body(messages: NDArray[np.uint8]) -> tuple[str, NDArray[np.float64]]:
+    """Read the messages of `body_odometry`: name, and the numbers as in samples, shape ``(n_samples, 13)``."""
+    try:
+        name = str(deserialize(messages[0].tobytes(), get_message(_ODOMETRY)).child_frame_id)
+    except ValueError as error:
+        raise DatasetError(f"chunk: {error}") from error
+    layout = _lay_odometry_out(name)
+    if not layout.describes_message(messages[0].tobytes()):
+        raise DatasetError(f"chunk: the messages of the body {name} have another layout than {_ODOMETRY} written here")
+    rows = np.ascontiguousarray(messages).view(layout.dtype)[:, 0]
+    turn = rows["pose.pose.orientation"]
+    turned = rotate(turn, rows["twist.twist.linear"], rows["twist.twist.angular"], inverse=False)
+    return name, np.hstack([rows["pose.pose.position"], turn, *turned])
+
+
+def _lay_odometry_out(frame: str) -> MessageLayout:
+    message = get_message(_ODOMETRY)(header=make_header(WORLD), child_frame_id=frame)
     variable = [*_STAMP, "pose.pose.position", "pose.pose.orientation", "twist.twist.linear", "twist.twist.angular"]
-    return Topic("/ball/odometry", kind, MessageLayout(message, variable), _fill_ball_odometry)
+    return MessageLayout(message, variable)
+
+
+def _fill_odometry(rows: Rows, stamps_ns: NDArray[np.int64], *columns: NDArray[np.float64]) -> None:
+    """Write position, orientation, and the velocities in world, which are turned into the body's own frame."""
+    put_stamps(rows, "header.stamp", stamps_ns)
+    rows["pose.pose.position"], rows["pose.pose.orientation"], linear, angular = columns
+    turned = rotate(columns[1], linear, angular, inverse=True)
+    rows["twist.twist.linear"], rows["twist.twist.angular"] = turned
 
 
 def make_header(frame: str, stamp_ns: int = 0) -> Any:
@@ -140,15 +189,6 @@ def make_header(frame: str, stamp_ns: int = 0) -> Any:
     sec, nanosec = divmod(stamp_ns, NS_PER_S)
     stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     return get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=frame)
-
-
-def _fill_ball_odometry(rows: Rows, samples: Samples, _: SetPoints) -> None:
-    put_stamps(rows, "header.stamp", samples.stamps_ns)
-    rows["pose.pose.position"] = samples.ball_position
-    rows["pose.pose.orientation"] = orientation = samples.ball_orientation_xyzw
-    rows["twist.twist.linear"], rows["twist.twist.angular"] = rotate(
-        orientation, samples.ball_linear_velocity, samples.ball_angular_velocity, inverse=True
-    )
 
 
 @cache
