@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ball:
-    """The ball during a throw; world frame: x forward, y left, z up.
+    """The ball, or another body that moves, during a throw; world frame: x forward, y left, z up.
 
     Attributes:
         time_s: Time since the start of the trial [s], shape ``(n_samples,)``.
         stamps_ns: Simulated time [ns], shape ``(n_samples,)``; as in the messages.
         position: Centre [m], shape ``(n_samples, 3)``.
-        orientation_xyzw: Unit quaternion, ball to world, shape ``(n_samples, 4)``.
+        orientation_xyzw: Unit quaternion, body to world, shape ``(n_samples, 4)``.
         velocity: Of the centre [m/s], shape ``(n_samples, 3)``.
         angular_velocity: [rad/s], shape ``(n_samples, 3)``.
     """

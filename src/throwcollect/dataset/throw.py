@@ -22,6 +22,7 @@ from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.dataset.trajectories import (
     ATTRIBUTES,
     BALL_COLUMNS,
+    BALL_COMPONENTS,
     JOINT_COLUMNS,
     STAMPS,
     TIMES,
@@ -30,9 +31,11 @@ from throwcollect.dataset.trajectories import (
 )
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.topics import BODY_PARTS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.robots.description import robot_of
+from throwcollect.robots.surroundings import bodies_of
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
@@ -274,6 +277,19 @@ class Throw:
         """
         return Joints(robot_of(self._config).joints, *self._copy_columns(JOINT_COLUMNS))
 
+    @cached_property
+    def bodies(self) -> dict[str, Ball]:
+        """The bodies of the scene that move, over time, by name; empty if there are none.
+
+        Raises:
+            DatasetError: If the throw has no episode, or it is damaged.
+        """
+        header, samples = self.read_samples()
+        times = samples.seconds_since(header.start_ns)
+        moving = [body.link.name for body in bodies_of(self._config) if body.moves]
+        parts = (np.split(samples.bodies[:, number], BODY_PARTS, axis=1) for number in range(len(moving)))
+        return {name: Ball(times, samples.stamps_ns, *each) for name, each in zip(moving, parts, strict=True)}
+
     def _copy_columns(self, names: Iterable[str]) -> list[Column]:
         """Copy columns of the samples into arrays that belong to the caller, after those of times and stamps."""
         header, samples = self.read_samples()
@@ -281,7 +297,7 @@ class Throw:
         return [samples.seconds_since(header.start_ns), *(np.array(column, order="C") for column in columns)]
 
     def to_pandas(self) -> DataFrame:
-        """Make a DataFrame of the motion of ball and joints: one row a sample, by time since the start of the trial.
+        """Make a DataFrame of the motion of ball, joints and moving bodies: one row a sample, by time since the start of the trial.
 
         Columns are named as those of `throwcollect dataset export --to parquet`, such as ``ball_x_m`` and
         ``arm_right_4_joint_position_rad``.
@@ -296,4 +312,8 @@ class Throw:
             series, _, quantity = name.partition("_")
             values = getattr(getattr(self, series), quantity)
             columns |= dict(zip(name_components(name, self.joints.names, sliding), values.T, strict=True))
+        for body, motion in self.bodies.items():
+            for quantity, components in BALL_COMPONENTS.items():
+                names = (f"{body}_{component}" for component in components)
+                columns |= dict(zip(names, getattr(motion, quantity).T, strict=True))
         return pd.DataFrame(columns, index=pd.Index(self.ball.time_s, name=TIMES))

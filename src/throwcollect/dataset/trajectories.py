@@ -42,7 +42,7 @@ JOINT_COLUMNS, BALL_COLUMNS = COLUMNS[2:5], COLUMNS[5:]
 _ORIENTATION, *_VELOCITIES = COLUMNS[6:]
 
 _JOINT_COMPONENTS = {"position": "position_rad", "velocity": "velocity_radps", "effort": "effort_nm"}
-_BALL_COMPONENTS = {
+BALL_COMPONENTS = {
     "position": ("x_m", "y_m", "z_m"),
     "orientation_xyzw": ("qx", "qy", "qz", "qw"),
     "velocity": ("vx_mps", "vy_mps", "vz_mps"),
@@ -69,7 +69,7 @@ def name_components(column: str, joints: Sequence[str], sliding: Collection[str]
     if series == "joints":
         names = {joint: f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints}
         return tuple(name_sliding(name) if joint in sliding else name for joint, name in names.items())
-    return tuple(f"ball_{component}" for component in _BALL_COMPONENTS[quantity])
+    return tuple(f"ball_{component}" for component in BALL_COMPONENTS[quantity])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

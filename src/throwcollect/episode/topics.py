@@ -23,7 +23,7 @@ BALL = "ball"
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 _ODOMETRY = "nav_msgs/msg/Odometry"
-_BODY_PARTS = (3, 7, 10)
+BODY_PARTS = (3, 7, 10)
 """Where orientation, linear and angular velocity of a body begin, behind its position."""
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _MOST_ROBOTS = 8
@@ -149,7 +149,7 @@ def body_odometry(name: str, number: int) -> Topic:
     """``/bodies/<name>/odometry``: as that of the ball, of the body with some number among those that move."""
 
     def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
-        position, turn, linear, angular = np.split(samples.bodies[:, number], _BODY_PARTS, axis=1)
+        position, turn, linear, angular = np.split(samples.bodies[:, number], BODY_PARTS, axis=1)
         _fill_odometry(rows, samples.stamps_ns, position, turn, linear, angular)
 
     return Topic(f"/bodies/{name}/odometry", _ODOMETRY, _lay_odometry_out(name), fill)
