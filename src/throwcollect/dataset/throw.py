@@ -297,7 +297,7 @@ class Throw:
         return [samples.seconds_since(header.start_ns), *(np.array(column, order="C") for column in columns)]
 
     def to_pandas(self) -> DataFrame:
-        """Make a DataFrame of the motion of ball, joints and moving bodies: one row a sample, by time since the start of the trial.
+        """Make a DataFrame of the motion of joints and bodies: one row a sample, by time since the start of the trial.
 
         Columns are named as those of `throwcollect dataset export --to parquet`, such as ``ball_x_m`` and
         ``arm_right_4_joint_position_rad``.
