@@ -57,6 +57,7 @@ _OWN = MappingProxyType(
             "lerobot": "throwcollect.export.lerobot:LEROBOT",
             "hdf5": "throwcollect.export.hdf5:HDF5",
             "mat": "throwcollect.export.mat:MAT",
+            "motions": "throwcollect.export.motions:MOTIONS",
         },
     }
 )

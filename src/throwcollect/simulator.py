@@ -24,6 +24,7 @@ from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
+from throwcollect.sweep.chosen_motions import complete_point
 from throwcollect.sweep.plan import make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.trials import Trial
@@ -103,7 +104,7 @@ class Simulator:
         """
         self._require_open()
         check_bounds("trial", trial, least=0, most=MOST_TRIALS - 1)
-        point = dict(values or {})
+        point = complete_point(values or {}, self.config)
         wrong = self.config.task.find_wrong_targets(target or {})
         wrong |= {
             name: f"should be from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {value}"
@@ -126,6 +127,7 @@ class Simulator:
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
         """
+        values = complete_point(values, self.config)
         wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
         if wrong:
             raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])

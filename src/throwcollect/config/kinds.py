@@ -37,6 +37,11 @@ def complete_robot(section: Any) -> Any:
     return import_own("throwcollect.robots.described:complete")(section)
 
 
+def complete_motions(section: Any, robot: Any, **given: Any) -> Any:
+    """Complete the keys of a task whose motions are in a file (see `throwcollect.tasks.motions.complete`)."""
+    return import_own("throwcollect.tasks.motions:complete")(section, robot, **given)
+
+
 def unknown_joint(name: str, robot: Any) -> str:
     """Make the sentence for a name that is no joint of a robot."""
     return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"

@@ -14,7 +14,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from throwcollect.config.document import Document, Plain
-from throwcollect.config.kinds import complete_robot
+from throwcollect.config.kinds import complete_motions, complete_robot
+from throwcollect.config.motion import MotionFile
 from throwcollect.config.problems import PARAMETERS, Location
 from throwcollect.config.robot_config import AnyRobot, DescribedRobotConfig, RobotConfig
 from throwcollect.config.schema import Config, Range
@@ -58,6 +59,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     for override in overrides:
         document.override(override, find_default=partial(_find_default, document.values))
     robot = _find_robot(document, path.parent)
+    _find_motions(document, path.parent, robot)
     config = document.validate(Config, context=robot)
     if wrong := [document.problem(*each) for each in _find_sweep_problems(config)]:
         raise ConfigError(wrong)
@@ -130,6 +132,33 @@ def _find_robot(document: Document, directory: Path) -> Any:
     if isinstance(section, DescribedRobotConfig):
         document.values["robot"] = section
     return section.find()
+
+
+def _find_motions(document: Document, directory: Path, robot: Any) -> None:
+    """Read the motions of a file, and complete the keys of the task that follow from them; nothing if keys are wrong.
+
+    A relative path starts at the directory.
+    """
+    task = document.values.get("task")
+    given = task.get("trajectory") if isinstance(task, dict) else None
+    if robot is None or not isinstance(task, dict) or not isinstance(given, dict) or given.get("family") != "file":
+        return
+    try:
+        section = MotionFile.model_validate(given, strict=True, context=robot)
+    except ValidationError:
+        return
+    section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
+    keys: dict[str, Any] = {"trajectory": section}
+    if section.sha256 is None:
+        ends = {name: task[name] for name in ("start", "end") if isinstance(task.get(name), dict)}
+        default = {} if "start" in ends else _find_default(document.values, ("task", "start"))
+        default = {joint: angle for joint, angle in default.items() if joint in robot.joints}
+        try:
+            keys = complete_motions(section, robot, default=default, given=ends)
+        except ConfigError as error:
+            problems = [document.place(problem) for problem in error.problems]
+            raise ConfigError(problems, expected=error.expected, hint=error.hint) from error
+    document.values["task"] = task | keys
 
 
 def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> RobotConfig:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, PositiveFloat
+from typing_extensions import Self
 
+from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Joint
 from throwcollect.config.section import Section, any_of
 
@@ -43,10 +46,33 @@ class DynamicMovementPrimitive(Section):
                 )
 
 
+class MotionFile(Section):
+    """Motions of a file, as quintics between its points; each begins and ends at rest."""
+
+    family: Literal["file"]
+    """Trajectory family."""
+    file: Annotated[str, Key(Effect.RUN, swept=False, operator=True)]
+    """CSV, Parquet, npz, HDF5 or MCAP file, a directory of CSV or HDF5 files, or a LeRobot dataset (docs/motions.md); a
+    relative path starts at the directory of the configuration file."""
+    motion: Annotated[float, Field(ge=0, multiple_of=1)] | str | None = None
+    """The motion, by its number in the file, from 0, or by its name; null: each trial has the next one, and after the
+    last one the first one again."""
+    joints: Annotated[list[Joint | None], Key(Effect.RUN, swept=False)] = []
+    """Joints of the columns of an array that names none, in their order; null leaves a column out."""
+    rate_hz: Annotated[PositiveFloat | None, Key(Effect.RUN, swept=False)] = None
+    """Points per second of a file that has no times."""
+    sha256: str | None = None
+    """Digest of the motions; it is written with a dataset."""
+
+    def placed(self, file: Path) -> Self:
+        """Make the section of motions that have been read: their copy is in `file`, which has joints and times."""
+        return self.model_copy(update={"file": str(file), "joints": [], "rate_hz": None})
+
+
 if TYPE_CHECKING:
-    Trajectory = MinimumJerk | DynamicMovementPrimitive
+    Trajectory = MinimumJerk | DynamicMovementPrimitive | MotionFile
 else:
     Trajectory = any_of(
-        {"minimum_jerk": MinimumJerk, "dmp": DynamicMovementPrimitive},
+        {"minimum_jerk": MinimumJerk, "dmp": DynamicMovementPrimitive, "file": MotionFile},
         lambda value: value.get("family", "minimum_jerk") if isinstance(value, dict) else None,
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PositiveInt
@@ -17,7 +18,7 @@ from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import ContradictionError, Name, unknown_joint
-from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
+from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile
 from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.scene import BallConfig, SceneConfig
@@ -84,6 +85,8 @@ else:
     AnyTask = _make_section_type("tasks")
     AnyUntil = _make_until_type()
 
+MOTIONS = "motions.parquet"
+"""Name of the file of motions in a dataset."""
 SLOWEST, FASTEST = 0.001, 1000
 """Bounds of real-time factors: with slower ones, one step of the physics sleeps for minutes or overflows the clock."""
 _BETWEEN_TRIALS_S = 10
@@ -220,7 +223,7 @@ class Config(Section):
 
     def without_run(self) -> Config:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""
-        return self.model_copy(
+        return self.with_motions_in(Path(MOTIONS)).model_copy(
             update={
                 "run": RunConfig(),
                 "containers": ContainersConfig(),
@@ -228,6 +231,13 @@ class Config(Section):
                 "robot": self.robot.without_place(),
             }
         )
+
+    def with_motions_in(self, file: Path) -> Config:
+        """Make a copy of this configuration whose motions, if it has them from a file, are in another file."""
+        if not isinstance(self.task.trajectory, MotionFile):
+            return self
+        task = self.task.model_copy(update={"trajectory": self.task.trajectory.placed(file)})
+        return self.model_copy(update={"task": task})
 
     def run_as(self, other: Config) -> Config:
         """Make a copy of this configuration that takes all keys that do not change the dataset from another one."""

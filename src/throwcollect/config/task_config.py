@@ -10,7 +10,7 @@ from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
-from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
+from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile, Trajectory
 from throwcollect.config.scene import AnyBody
 from throwcollect.config.section import Section
 from throwcollect.wording import join_names, suggest
@@ -162,3 +162,7 @@ class TaskConfig(Section):
             for joint in self.trajectory.weights:
                 if joint not in self.end:
                     yield f"trajectory.weights.{joint}", "end does not name this joint, so it does not move"
+        elif isinstance(self.trajectory, MotionFile):
+            for name in ("duration_s", "points_hz"):
+                if getattr(self, name) != type(self).model_fields[name].default:
+                    yield name, "should be left out, as the file of motions has times"

@@ -121,7 +121,8 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
         return "cannot vary from trial to trial"
     if isinstance(leaf.value, int) and not isinstance(leaf.value, bool):
         return "cannot be swept, as it is a whole number; the values of a sweep have decimals"
-    if not isinstance(leaf.value, float):
+    # A number that a file has may be null.
+    if not isinstance(leaf.value, float | None):
         return "cannot be swept, as it is not a number"
     joint = leaf.name.removeprefix("task.start.")
     if joint != leaf.name and joint not in config.task.end:

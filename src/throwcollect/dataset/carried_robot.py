@@ -1,4 +1,4 @@
-"""Copies the files of a described robot into the directory of a dataset, which then needs no other files."""
+"""Copies the files of a described robot, and motions, into the directory of a dataset, which needs no other files."""
 
 from __future__ import annotations
 
@@ -10,22 +10,26 @@ import zipfile
 from pathlib import Path
 
 from throwcollect.config.loader import dump_yaml
+from throwcollect.config.motion import MotionFile
 from throwcollect.config.robot_config import DescribedRobotConfig
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.dataset.directory import CONFIG, ROBOT
 from throwcollect.files import write_file
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.imported import SRDF, URDF, list_files
+from throwcollect.sweep.parquet_file import encode_table
+from throwcollect.tasks.motions import motions_of
 
 
 def write_config(directory: Path, config: Config) -> None:
-    """Write the configuration of a dataset, and the files of its robot in a directory next to it."""
+    """Write the configuration of a dataset, and next to it the files of its robot and its motions."""
     carry_robot(config, directory)
     write_file(directory / CONFIG, config_text(config).encode())
 
 
 def config_text(config: Config) -> str:
-    """Write the text of a configuration as a dataset has it, which carries the files of its robot."""
-    return dump_yaml(_place_robot(config, Path(ROBOT)))
+    """Write the text of a configuration as a dataset has it, which carries the files of its robot and its motions."""
+    return dump_yaml(_place_robot(config, Path(ROBOT)).with_motions_in(Path(MOTIONS)))
 
 
 def _place_robot(config: Config, directory: Path) -> Config:
@@ -38,10 +42,20 @@ def _place_robot(config: Config, directory: Path) -> Config:
 
 
 def carry_robot(config: Config, directory: Path) -> Config:
-    """Copy the files of a robot into the directory of a dataset; return the configuration that names them there."""
+    """Copy robot and motions into the directory of a dataset; return the configuration that names their files there."""
     if (source := find_files(config)) is not None:
         copy_robot(source, directory)
-    return _place_robot(config, directory / ROBOT)
+    family, target = config.task.trajectory, directory / MOTIONS
+    if isinstance(family, MotionFile) and Path(family.file).resolve() not in (
+        Path(MOTIONS).resolve(),
+        target.resolve(),
+    ):
+        write_file(target, _encode_motions(family, config))
+    return _place_robot(config, directory / ROBOT).with_motions_in(target)
+
+
+def _encode_motions(family: MotionFile, config: Config) -> bytes:
+    return encode_table(motions_of(family, robot_of(config)).table())
 
 
 def copy_robot(source: Path, directory: Path) -> None:
@@ -65,13 +79,20 @@ def find_files(config: Config) -> Path | None:
     return Path(config.robot.urdf).parent if isinstance(config.robot, DescribedRobotConfig) else None
 
 
+def _list_robot(config: Config) -> list[Path]:
+    return [] if (source := find_files(config)) is None else list_files(source)
+
+
 def pack_robot(config: Config) -> str:
-    """Write the files of a robot as a text, a zip archive in base64; it is empty if the robot is installed."""
+    """Write the files of a robot and of motions as a text, a zip archive in base64; it is empty if there are none."""
+    files = {f"{ROBOT}/{path.name}": path.read_bytes() for path in _list_robot(config)}
+    if isinstance(family := config.task.trajectory, MotionFile):
+        files[MOTIONS] = _encode_motions(family, config)
     packed = io.BytesIO()
-    if (source := find_files(config)) is not None:
+    if files:
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-            for path in list_files(source):
-                archive.write(path, path.name)
+            for name, content in files.items():
+                archive.writestr(name, content)
     return base64.b64encode(packed.getvalue()).decode()
 
 
@@ -79,7 +100,7 @@ def unpack_robot(text: str, directory: Path) -> None:
     """Write the files of `pack_robot` into the directory of a dataset."""
     if text:
         with zipfile.ZipFile(io.BytesIO(base64.b64decode(text))) as archive:
-            archive.extractall(directory / ROBOT)
+            archive.extractall(directory)
 
 
 def list_carried(directory: Path) -> list[str]:

@@ -6,7 +6,7 @@ import shutil
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.dataset.bag import MOST_FILES
 from throwcollect.dataset.carried_robot import write_config
 from throwcollect.dataset.directory import CONFIG, PLAN, ROBOT, TRIALS
@@ -72,7 +72,7 @@ def remove_plan(directory: Path, *, made: bool) -> None:
     Files that are gone already, or that cannot be removed, are no error, because this cleans up after one.
     """
     with suppress(OSError):
-        for name in (CONFIG, PLAN, TRIALS):
+        for name in (CONFIG, PLAN, TRIALS, MOTIONS):
             (directory / name).unlink(missing_ok=True)
         shutil.rmtree(directory / ROBOT, ignore_errors=True)
         if made:

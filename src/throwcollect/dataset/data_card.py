@@ -6,7 +6,7 @@ import math
 
 import pyarrow as pa
 
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.config.values import keys_by_column
 from throwcollect.dataset.bag import to_yaml
@@ -57,6 +57,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "- `plan.parquet`: the trials, each as it was drawn before it ran.",
         "- `config.yaml`: the configuration; collecting with it again yields the same data.",
         *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
+        *([f"- `{MOTIONS}`: the motions of the trials."] if config.task.trajectory.family == "file" else []),
         "",
         *_list_ranges(config, throws),
         *_list_targets(config, throws),

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -86,7 +86,7 @@ class LeftOfShard:
 
 def remove_unfinished(directory: Path) -> None:
     """Remove half-written files that a killed process left beside the recordings; the files themselves stay."""
-    for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
+    for name in (CONFIG, PLAN, TRIALS, MOTIONS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
         remove(directory / f"{name}.new")
 
 

@@ -15,7 +15,8 @@ import numpy as np
 import pyarrow as pa
 
 from throwcollect.config.loader import load
-from throwcollect.config.schema import Config
+from throwcollect.config.motion import MotionFile
+from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.dataset.bag import read_bag_metadata, refuse_other_directory
 from throwcollect.dataset.directory import (
     CARD,
@@ -40,11 +41,13 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import read_text
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import is_available as robot_is_available
+from throwcollect.robots.description import robot_of
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
+from throwcollect.tasks.motions import motions_of
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
@@ -131,6 +134,9 @@ def _read_tables(directory: Path) -> _Tables:
         tables.config = config = load(config_path(directory))
         file = PLAN
         tables.plan = plan = Plan.read(directory / PLAN, config)
+        if isinstance(family := config.task.trajectory, MotionFile):
+            file = MOTIONS
+            motions_of(family, robot_of(config))
         if config.sweep.file == TRIALS:
             file = TRIALS
             read_list(directory, plan)

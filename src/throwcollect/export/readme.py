@@ -8,7 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.config.task_config import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
@@ -57,6 +57,7 @@ def render_card(source: ExportSource, layout: Layout) -> str:
         *(f"- `{name}`: {text}" for name, text in layout.files.items()),
         f"- `{CONFIG}`: the configuration of the collection; collecting with it again yields the same data.",
         *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
+        *([f"- `{MOTIONS}`: the motions of the trials."] if config.task.trajectory.family == "file" else []),
         "",
         f"```{layout.language}",
         layout.loading,

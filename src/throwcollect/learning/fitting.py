@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from throwcollect.arguments import read_word, refuse_argument
+from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.values import column_of, leaves
@@ -58,6 +59,11 @@ def fit(
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
     config, selected = dataset.config, _select(dataset, where)
+    if isinstance(config.task.trajectory, MotionFile):
+        raise ConfigError(
+            f"{dataset.directory}: its motions are those of a file, and there is nothing between them to aim with",
+            hint="sweep parameters of a motion; throwcollect fit-dmp finds those of a motion of a file",
+        )
     columns = tuple(targets) or config.task.targets
     if not columns:
         raise ConfigError(

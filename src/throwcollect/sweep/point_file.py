@@ -16,6 +16,7 @@ from throwcollect.config.task_config import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import suggest_path
+from throwcollect.sweep.chosen_motions import add_motions
 from throwcollect.sweep.csv_file import MOST_PROBLEMS, read_csv
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.points import Points
@@ -52,7 +53,7 @@ def read_points(path: Path, config: Config, *, key: str = "sweep.file") -> Point
     problems = [*_find_value_problems(points, rows, path, config), *_find_target_problems(points, rows, path, config)]
     if problems:
         raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)[:MOST_PROBLEMS])
-    return points
+    return add_motions(points, config)
 
 
 def encode_points(points: Points) -> bytes:

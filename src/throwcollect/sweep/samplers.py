@@ -14,6 +14,7 @@ from throwcollect.config.schema import Config, Parameter, Range, Values
 from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.errors import PlanError, Problem
 from throwcollect.reproducible_math import exp
+from throwcollect.sweep.chosen_motions import add_motions, count_motions
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.sobol import MOST_DIMENSIONS, draw_sobol
@@ -35,13 +36,16 @@ def draw_points(config: Config, *, directory: Path) -> Points:
     if sweep.file is not None:
         points = read_points(directory / sweep.file, config)
         return points[: _check_count(config.trials, len(points.values))]
+    if not sweep.parameters and (motions := count_motions(config)) is not None:
+        count = _check_count(config.trials, motions)
+        return add_motions(Points((), np.empty((count, 0))), config)
     if not sweep.parameters:
         raise PlanError(
             [Problem("nothing is swept", key="sweep.parameters")],
             expected="at least one key, such as task.duration_s: {min: 0.9, max: 1.3}",
         )
     if sweep.sampler == "grid":
-        return _draw_grid(sweep.parameters, config.trials)
+        return add_motions(_draw_grid(sweep.parameters, config.trials), config)
     trials = config.trials
     if trials is None and config.until is not None:
         trials = _TRIALS_PER_SUCCESS * config.until.wanted
@@ -50,7 +54,7 @@ def draw_points(config: Config, *, directory: Path) -> Points:
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed))
     unit = UNIT_SAMPLERS[sweep.sampler](trials, len(sweep.parameters), randomness)
     columns = [spread(parameter, unit[:, i]) for i, parameter in enumerate(sweep.parameters.values())]
-    return Points(tuple(sweep.parameters), np.column_stack(columns))
+    return add_motions(Points(tuple(sweep.parameters), np.column_stack(columns)), config)
 
 
 def _draw_uniform(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:

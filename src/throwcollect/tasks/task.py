@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic
 
-from throwcollect.config.motion import MinimumJerk
+from throwcollect.config.motion import MinimumJerk, MotionFile
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EndReason, EpisodeHeader, Samples
 from throwcollect.members import explain_failure, load_part
@@ -17,6 +17,7 @@ from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
+from throwcollect.tasks.motions import file_trajectory
 from throwcollect.tasks.result import (
     LIMIT_VIOLATED,
     LOST,
@@ -82,11 +83,14 @@ class Task(ABC, Generic[AnyResult]):
             `task.start`, the last one at rest and exactly at `task.end`.
 
         Raises:
-            ConfigError: If the family has no usable motion for these parameters, such as a DMP that does not settle.
+            ConfigError: If the family has no usable motion for these parameters, such as a DMP that does not settle, or
+                a motion of a file that begins elsewhere.
         """
-        task = self.config.task
-        end = {joint: task.end[joint] for joint in robot_of(self.config).joints if joint in task.end}
+        task, robot = self.config.task, robot_of(self.config)
+        end = {joint: task.end[joint] for joint in robot.joints if joint in task.end}
         family = task.trajectory
+        if isinstance(family, MotionFile):
+            return file_trajectory(task.start, end, family=family, robot=robot)
         if isinstance(family, MinimumJerk):
             return minimum_jerk_trajectory(
                 task.start, end, duration_s=task.duration_s, family=family, points_hz=task.points_hz

@@ -4,6 +4,7 @@ import pytest
 
 from throwcollect.config import values
 from throwcollect.config.key import Effect, Key
+from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section, any_of
 from throwcollect.config.values import leaves, list_operator_keys, sweepable_keys
@@ -12,7 +13,10 @@ WEIGHTS = {joint: [0.0, 1.0] for joint in Config().task.end}
 LEARNED = Config().task.model_copy(
     update={"trajectory": DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=WEIGHTS)}
 )
-KEYS = {leaf.name: leaf for config in (Config(), Config(task=LEARNED)) for leaf in leaves(config)}
+OF_A_FILE = Config().task.model_copy(update={"trajectory": MotionFile(family="file", file="motions.csv")})
+KEYS = {
+    leaf.name: leaf for config in (Config(), Config(task=LEARNED), Config(task=OF_A_FILE)) for leaf in leaves(config)
+}
 
 
 def test_every_key_declares_its_effect():
@@ -59,7 +63,7 @@ def test_sweepable_keys_are_those_with_an_effect_on_physics_or_task():
 def test_keys_that_name_files_or_resources_of_a_machine_are_operator_keys():
     assert list_operator_keys() == (
         *("robot.urdf", "robot.packages", "robot.srdf"),
-        *("sweep.file", "run", "containers", "cluster"),
+        *("task.trajectory.file", "sweep.file", "run", "containers", "cluster"),
     )
 
 

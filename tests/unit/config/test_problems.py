@@ -19,7 +19,7 @@ from throwcollect.errors import ConfigError, PlanError, Problem
         ),
         (
             "task: {trajectory: {family: dmp, gamma: 1}}",
-            ["task.trajectory.gamma: unknown key; known: family, basis_functions, weights, alpha_z and alpha_x"],
+            ["task.trajectory.gamma: unknown key; known: family, basis_functions, weights, alpha_z, alpha_x and"],
         ),
         ("task: {end: {<<: 1}}", ["task.end.<<: Talos has no joint '<<'; known: arm_left_1_joint,"]),
         ("ball: {mass_kg: heavy}", ["ball.mass_kg: should be a valid number, got 'heavy'"]),
@@ -33,7 +33,7 @@ from throwcollect.errors import ConfigError, PlanError, Problem
         (f"seed: {'9' * 400}", ["seed: should be less than 4294967296, got 999"]),
         (
             "task: {trajectory: {family: dpm}}",
-            ["task.trajectory.family: should be 'minimum_jerk' or 'dmp', got 'dpm'; did you mean 'dmp'?"],
+            ["task.trajectory.family: should be 'minimum_jerk', 'dmp' or 'file', got 'dpm'; did you mean 'dmp'?"],
         ),
         ("tool: {name: gripper}", ["tool.name: should be 'spoon', got 'gripper'"]),
         (
