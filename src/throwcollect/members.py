@@ -57,7 +57,6 @@ _OWN = MappingProxyType(
             "lerobot": "throwcollect.export.lerobot:LEROBOT",
             "hdf5": "throwcollect.export.hdf5:HDF5",
             "mat": "throwcollect.export.mat:MAT",
-            "motions": "throwcollect.export.motions:MOTIONS",
         },
     }
 )

@@ -37,9 +37,9 @@ def complete_robot(section: Any) -> Any:
     return import_own("throwcollect.robots.described:complete")(section)
 
 
-def complete_motions(section: Any, robot: Any, **given: Any) -> Any:
+def complete_motions(*given: Any) -> Any:
     """Complete the keys of a task whose motions are in a file (see `throwcollect.tasks.motions.complete`)."""
-    return import_own("throwcollect.tasks.motions:complete")(section, robot, **given)
+    return import_own("throwcollect.tasks.motions:complete")(*given)
 
 
 def unknown_joint(name: str, robot: Any) -> str:

@@ -63,10 +63,17 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     config = document.validate(Config, context=robot)
     if wrong := [document.problem(*each) for each in _find_sweep_problems(config)]:
         raise ConfigError(wrong)
-    try:
+    with _placing(document):
         yield config
+
+
+@contextmanager
+def _placing(document: Document, key: str = "") -> Iterator[None]:
+    """Add lines of the file to a `ConfigError` of the block, whose problems concern `key` if they name none."""
+    try:
+        yield
     except ConfigError as error:
-        problems = [document.place(problem) for problem in error.problems]
+        problems = [document.place(replace(problem, key=problem.key or key)) for problem in error.problems]
         raise type(error)(problems, expected=error.expected, hint=error.hint) from error
 
 
@@ -124,41 +131,29 @@ def _find_robot(document: Document, directory: Path) -> Any:
         return None
     if isinstance(section, DescribedRobotConfig):
         section = section.below(directory)
-    try:
+    with _placing(document, "robot"):
         section = complete_robot(section)
-    except ConfigError as error:
-        placed = [document.place(replace(problem, key=problem.key or "robot")) for problem in error.problems]
-        raise ConfigError(placed, expected=error.expected, hint=error.hint) from error
     if isinstance(section, DescribedRobotConfig):
         document.values["robot"] = section
     return section.find()
 
 
 def _find_motions(document: Document, directory: Path, robot: Any) -> None:
-    """Read the motions of a file, and complete the keys of the task that follow from them; nothing if keys are wrong.
-
-    A relative path starts at the directory.
-    """
+    """Complete the keys of a task whose motions are in a file, which may be relative to the directory."""
     task = document.values.get("task")
     given = task.get("trajectory") if isinstance(task, dict) else None
     if robot is None or not isinstance(task, dict) or not isinstance(given, dict) or given.get("family") != "file":
         return
-    try:
+    with suppress(ValidationError):
         section = MotionFile.model_validate(given, strict=True, context=robot)
-    except ValidationError:
-        return
-    section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
-    keys: dict[str, Any] = {"trajectory": section}
-    if section.sha256 is None:
-        ends = {name: task[name] for name in ("start", "end") if isinstance(task.get(name), dict)}
-        default = {} if "start" in ends else _find_default(document.values, ("task", "start"))
-        default = {joint: angle for joint, angle in default.items() if joint in robot.joints}
-        try:
-            keys = complete_motions(section, robot, default=default, given=ends)
-        except ConfigError as error:
-            problems = [document.place(problem) for problem in error.problems]
-            raise ConfigError(problems, expected=error.expected, hint=error.hint) from error
-    document.values["task"] = task | keys
+        section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
+        default = _find_default(document.values, ("task", "start"))
+        start = task.get("start", {joint: angle for joint, angle in default.items() if joint in robot.joints})
+        keys = {"trajectory": section}
+        if section.sha256 is None:
+            with _placing(document):
+                keys = complete_motions(section, robot, start, task.get("end", {}))
+        document.values["task"] = task | keys
 
 
 def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> RobotConfig:

@@ -46,10 +46,7 @@ def carry_robot(config: Config, directory: Path) -> Config:
     if (source := find_files(config)) is not None:
         copy_robot(source, directory)
     family, target = config.task.trajectory, directory / MOTIONS
-    if isinstance(family, MotionFile) and Path(family.file).resolve() not in (
-        Path(MOTIONS).resolve(),
-        target.resolve(),
-    ):
+    if isinstance(family, MotionFile) and family.file not in (MOTIONS, str(target.absolute())):
         write_file(target, _encode_motions(family, config))
     return _place_robot(config, directory / ROBOT).with_motions_in(target)
 

@@ -12,7 +12,10 @@ from throwcollect.dataset.directory import THROWS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import ExportSource, ThrowSeries
+from throwcollect.robots.description import robot_of
+from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sweep.parquet_file import encode_table
+from throwcollect.tasks.motions import Motions
 
 PATH = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 FILES_PER_CHUNK = 1000
@@ -62,7 +65,7 @@ class ParquetSeries:
         self._tables += 1
 
 
-_TRAJECTORIES = "trajectories"
+_TRAJECTORIES, _MOTIONS = "trajectories", "motions"
 _ROWS_PER_GROUP = 30_000
 """Rows of a row group: enough for columns to compress, few enough to be read for one throw and held in memory."""
 
@@ -75,6 +78,8 @@ def describe(source: ExportSource) -> Layout:
             THROWS: f"one row a trial: swept values, outcome, {measures}.",
             f"{_TRAJECTORIES}/": "one row a sample, throw after throw; `trial` says of which. No throw is divided "
             "between files or row groups.",
+            f"{_MOTIONS}/": "one row a point of the trajectories that controllers were sent, as `task.trajectory` with "
+            "`family: file` reads them.",
         },
         loading=f"""\
 import pandas as pd
@@ -103,17 +108,22 @@ def write(source: ExportSource, directory: Path) -> None:
     (directory / THROWS).write_bytes(encode_table(table))
     schema = _make_schema(source).with_metadata(facts)
     (directory / _TRAJECTORIES).mkdir()
+    (directory / _MOTIONS).mkdir()
     for shard, throws in source.shards.items():
         path = directory / _TRAJECTORIES / f"{shard}.parquet"
         with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
             group: list[pa.RecordBatch] = []
+            sent: dict[str, JointTrajectory] = {}
             for throw in source.read(throws):
+                sent[str(throw.throw.trial)] = throw.trajectory
                 group.append(_make_batch(throw, source, schema))
                 if sum(map(len, group)) >= _ROWS_PER_GROUP:
                     writer.write_table(pa.Table.from_batches(group))
                     group = []
             if group:
                 writer.write_table(pa.Table.from_batches(group))
+        motions = Motions.of(sent, robot_of(source.dataset.config))
+        (directory / _MOTIONS / f"{shard}.parquet").write_bytes(encode_table(motions.table()))
 
 
 def _make_schema(source: ExportSource) -> pa.Schema:

@@ -10,15 +10,7 @@ from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.motions import KEY, motions_of
-
-
-def count_motions(config: Config) -> int | None:
-    """Count the motions that trials without swept keys have, one each; None if motions are not those of a file."""
-    family = config.task.trajectory
-    if not isinstance(family, MotionFile):
-        return None
-    return len(motions_of(family, robot_of(config))) if family.motion is None else 1
+from throwcollect.tasks.motions import KEY, SAME, motions_of
 
 
 def complete_point(values: Mapping[str, float], config: Config) -> dict[str, float]:
@@ -39,14 +31,16 @@ def add_motions(points: Points, config: Config) -> Points:
         return points
     motions = motions_of(family, robot_of(config))
     columns = dict(zip(points.keys, points.values.T, strict=True))
+    first = motions.number_of(family.motion)
     if KEY not in columns:
         turn = np.arange(len(points.values)) % len(motions)
-        columns[KEY] = (turn if family.motion is None else np.full_like(turn, motions.number_of(family.motion))) * 1.0
+        columns[KEY] = (turn if family.motion is None else np.full_like(turn, first)) * 1.0
     # A number that no motion has is a reason to refuse its trial.
     chosen = np.clip(columns[KEY], 0, len(motions) - 1).astype(np.int64)
     for name, positions in motions.ends().items():
-        configured = getattr(config.task, name)
         for joint, values in positions.items():
-            if (values[chosen] != configured[joint]).any():
+            # Where the configuration has another value than the first motion, the user has set it.
+            configured = getattr(config.task, name)[joint]
+            if (values[chosen] != configured).any() and abs(values[first] - configured) <= SAME:
                 columns.setdefault(f"task.{name}.{joint}", values[chosen])
     return Points(tuple(columns), np.column_stack(list(columns.values())), points.targets)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -24,24 +24,26 @@ h5py = lazily("h5py")
 
 MOTION, TIME = "motion", "time_s"
 """Columns of the name of a point's motion, and of the time since the motion's start."""
-_FILE, _JOINTS, _RATE = "task.trajectory.file", "task.trajectory.joints", "task.trajectory.rate_hz"
-_KINDS = "a .csv, .parquet, .npz, .hdf5, .h5 or .mcap file, a directory of .csv or .hdf5 files, or a LeRobot dataset"
+_FILE = "task.trajectory.file"
+_KINDS = "a .csv, .parquet, .npz, .hdf5, .h5 or .mcap file, a directory of such files, or a LeRobot dataset"
 
 
 class _Motion(NamedTuple):
-    """One motion of a file of arrays: its name, times, and positions, possibly with their derivatives, by column."""
+    """One motion of a file of arrays: its name, times, and positions, possibly with derivatives, ``(n_points, n)``."""
 
     name: str
     times: NDArray[np.float64]
     orders: Sequence[NDArray[np.float64]]
 
 
-def columns_of(joint: str, robot: Robot) -> tuple[str, str, str]:
+_Arrays = tuple[Sequence[str | None], list[_Motion]]
+"""Joints of the columns, without those that are left out, and the motions."""
+
+
+def columns_of(joint: str, robot: Robot) -> list[str]:
     """Name the columns of a joint's position, velocity and acceleration, with their units."""
-    position, velocity, acceleration = (f"{joint}{suffix}" for suffix in ("_rad", "_radps", "_radps2"))
-    if joint in robot.sliding:
-        return name_sliding(position), name_sliding(velocity), name_sliding(acceleration)
-    return position, velocity, acceleration
+    names = [f"{joint}{suffix}" for suffix in ("_rad", "_radps", "_radps2")]
+    return [*map(name_sliding, names)] if joint in robot.sliding else names
 
 
 def read_motion_table(family: MotionFile, robot: Robot) -> Any:
@@ -51,16 +53,19 @@ def read_motion_table(family: MotionFile, robot: Robot) -> Any:
     path = Path(family.file)
     try:
         if not path.exists():
-            raise ConfigError([Problem(f"there is no file {path}{'' if family.sha256 else suggest_path(path)}", _FILE)])
-        if not path.is_dir():
-            files = [path]
-        elif (path / "meta" / "info.json").is_file():
-            return _read_lerobot(path, family, robot)
+            near = "" if family.sha256 else suggest_path(path)
+            raise ConfigError([Problem(f"there is no file {path}{near}", _FILE)])
+        found: list[Any] = []
+        if (path / "meta" / "info.json").is_file():
+            found.append(_read_lerobot(path, family))
         else:
-            files = sorted((each for each in path.iterdir() if each.suffix in (".csv", ".hdf5", ".h5")), key=_by_number)
-        if not files or files[0].suffix not in _READERS:
+            files = sorted(path.iterdir(), key=_by_number) if path.is_dir() else [path]
+            found += [_READERS[file.suffix](file, family) for file in files if file.suffix in _READERS]
+        if not found:
             raise ConfigError([Problem(f"should be {_KINDS}, got {path}", _FILE)])
-        return pa.concat_tables(_READERS[each.suffix](each, family, robot) for each in files)
+        return pa.concat_tables(
+            each if isinstance(each, pa.Table) else _tabulate(each[0], each[1], robot) for each in found
+        )
     except (OSError, ValueError, KeyError, pa.ArrowException) as error:
         raise ConfigError([Problem(f"cannot be read: {str(error).partition(chr(10))[0]}", _FILE, path)]) from error
 
@@ -70,60 +75,49 @@ def _by_number(path: Path) -> list[str | int]:
     return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", path.stem)]
 
 
-def _read_csv(path: Path, _family: MotionFile, _robot: Robot) -> Any:
+def _read_table(path: Path, _family: MotionFile) -> Any:
+    """Read a table of CSV or Parquet; a motion without a name gets that of the file."""
     import pyarrow as pa
-    from pyarrow import csv
-
-    table = csv.read_csv(path, convert_options=csv.ConvertOptions(column_types={MOTION: pa.string()}))
-    return _name_motion(table.rename_columns([name.strip() for name in table.column_names]), path)
-
-
-def _read_parquet(path: Path, _family: MotionFile, _robot: Robot) -> Any:
+    import pyarrow.csv as pc
     import pyarrow.parquet as pq
 
-    return _name_motion(pq.ParquetFile(path).read(), path)
-
-
-def _name_motion(table: Any, path: Path) -> Any:
-    """Give points without the name of a motion that of their file."""
-    import pyarrow as pa
-
+    if path.suffix == ".csv":
+        table = pc.read_csv(path, convert_options=pc.ConvertOptions(column_types={MOTION: pa.string()}))
+        table = table.rename_columns([name.strip() for name in table.column_names])
+    else:
+        table = pq.ParquetFile(path).read()
     if MOTION in table.column_names:
         return table
     return table.append_column(MOTION, pa.repeat(pa.scalar(path.stem), len(table)))
 
 
-def _read_npz(path: Path, _family: MotionFile, robot: Robot) -> Any:
+def _read_npz(path: Path, _family: MotionFile) -> _Arrays:
     with np.load(path) as archive:
         orders = [
             archive[name] for name in ("position_rad", "velocity_radps", "acceleration_radps2") if name in archive
         ]
-        count, points, _ = orders[0].shape if orders else (0, 0, 0)
+        count, points, _ = orders[0].shape
         lengths = archive["length"].tolist() if "length" in archive else [points] * count
-        times, joints = np.broadcast_to(archive[TIME], (count, points)), archive["joints"].tolist()
-    motions = (
-        _Motion(str(number), times[number, :length], [order[number, :length] for order in orders])
-        for number, length in enumerate(lengths)
-    )
-    return _tabulate(motions, joints, robot, path)
+        times = np.broadcast_to(archive[TIME], (count, points))
+        return archive["joints"].tolist(), [
+            _Motion(str(number), times[number, :length], [order[number, :length] for order in orders])
+            for number, length in enumerate(lengths)
+        ]
 
 
-def _read_hdf5(path: Path, family: MotionFile, robot: Robot) -> Any:
+def _read_hdf5(path: Path, family: MotionFile) -> _Arrays:
     with h5py.File(path) as file:
-        if "data" in file:
-            demos = sorted(file["data"], key=lambda name: _by_number(Path(name)))
-            actions = {name: file[f"data/{name}/actions"][:] for name in demos}
-        else:
-            actions = {path.stem: file["action"][:]}
+        demos = sorted(file.get("data", ()), key=lambda name: _by_number(Path(name)))
+        places = {name: f"data/{name}/actions" for name in demos} or {path.stem: "action"}
         rate_hz = family.rate_hz or file.attrs.get("rate_hz")
-    if rate_hz is None or not family.joints:
-        key, what = (_RATE, "how many points a second") if rate_hz is None else (_JOINTS, "which joints")
-        raise ConfigError([Problem(f"missing; {path.name} does not say {what} it has", key)])
-    motions = (_Motion(name, np.arange(len(values)) / rate_hz, [values]) for name, values in actions.items())
-    return _tabulate(motions, family.joints, robot, path)
+        for key, value in (("rate_hz", rate_hz), ("joints", family.joints)):
+            if not value:
+                raise ConfigError([Problem(f"missing; {path.name} does not have it", f"task.trajectory.{key}")])
+        actions = {name: file[place][:] for name, place in places.items()}
+    return family.joints, [_Motion(name, np.arange(len(rows)) / rate_hz, [rows]) for name, rows in actions.items()]
 
 
-def _read_lerobot(path: Path, family: MotionFile, robot: Robot) -> Any:
+def _read_lerobot(path: Path, family: MotionFile) -> _Arrays:
     import pyarrow.parquet as pq
 
     info = json.loads((path / "meta" / "info.json").read_text(encoding="utf-8"))
@@ -135,38 +129,30 @@ def _read_lerobot(path: Path, family: MotionFile, robot: Robot) -> Any:
     episodes = np.concatenate([part["episode_index"].to_numpy() for part in parts])
     actions = np.concatenate([np.stack(part["action"].to_numpy()) for part in parts])
     starts = np.append(0, np.flatnonzero(np.diff(episodes)) + 1)
-    motions = (
-        _Motion(str(episodes[start]), np.arange(len(rows)) / (family.rate_hz or info["fps"]), [rows])
+    rate_hz = family.rate_hz or info["fps"]
+    return family.joints or [name.removesuffix(".pos") for name in names], [
+        _Motion(str(episodes[start]), np.arange(len(rows)) / rate_hz, [rows])
         for start, rows in zip(starts, np.split(actions, starts[1:]), strict=True)
-    )
-    return _tabulate(motions, family.joints or [name.removesuffix(".pos") for name in names], robot, path)
+    ]
 
 
-def _read_mcap(path: Path, _family: MotionFile, robot: Robot) -> Any:
-    tables = []
-    for number, message in enumerate(read_trajectory_messages(path)):
-        motion = _Motion(str(number), message.times, message.orders)
-        tables.append(_tabulate(iter([motion]), message.joints, robot, path))
-    if not tables:
-        raise ConfigError([Problem("has no message of trajectory_msgs/msg/JointTrajectory", path=path)])
-    if any({*each.column_names} != {*tables[0].column_names} for each in tables):
-        raise ConfigError([Problem("its messages should have the same joints and derivatives", path=path)])
-    import pyarrow as pa
-
-    return pa.concat_tables(each.select(tables[0].column_names) for each in tables)
+def _read_mcap(path: Path, _family: MotionFile) -> _Arrays:
+    messages = list(read_trajectory_messages(path))
+    if not messages or any(message.joints != messages[0].joints for message in messages):
+        raise ValueError("should have messages of trajectory_msgs/msg/JointTrajectory, all with the same joints")
+    return messages[0].joints, [_Motion(str(n), each.times, each.orders) for n, each in enumerate(messages)]
 
 
-def _tabulate(motions: Iterator[_Motion], joints: Sequence[str | None], robot: Robot, path: Path) -> Any:
-    """Make the table of motions whose columns are those of some joints; those of None are left out."""
+def _tabulate(joints: Sequence[str | None], motions: list[_Motion], robot: Robot) -> Any:
     import pyarrow as pa
 
     names, times, orders = zip(*motions, strict=True)
     blocks = [np.concatenate(each) for each in zip(*orders, strict=True)]
-    if any(block.ndim != 2 or block.shape[1] != len(joints) for block in blocks):
-        raise ConfigError([Problem(f"there are {blocks[0].shape[-1]} columns, got {len(joints)}", _JOINTS, path)])
-    numbers = np.repeat(np.arange(len(names), dtype=np.int32), [len(each) for each in times])
+    if any(block.shape[1:] != (len(joints),) for block in blocks):
+        problem = f"should name {blocks[0].shape[-1]} columns, names {len(joints)}"
+        raise ConfigError([Problem(problem, "task.trajectory.joints")])
     columns: dict[str, Any] = {
-        MOTION: pa.DictionaryArray.from_arrays(numbers, names).cast(pa.string()),
+        MOTION: pa.DictionaryArray.from_arrays(np.repeat(np.arange(len(names)), [*map(len, times)]), names),
         TIME: np.concatenate(times),
     }
     for column, joint in enumerate(joints):
@@ -175,13 +161,11 @@ def _tabulate(motions: Iterator[_Motion], joints: Sequence[str | None], robot: R
     return pa.table(columns)
 
 
-_READERS: Mapping[str, Callable[[Path, MotionFile, Robot], Any]] = MappingProxyType(
+_READERS = MappingProxyType[str, Callable[[Path, MotionFile], Any]](
     {
-        ".csv": _read_csv,
-        ".parquet": _read_parquet,
+        **dict.fromkeys((".csv", ".parquet"), _read_table),
+        **dict.fromkeys((".hdf5", ".h5"), _read_hdf5),
         ".npz": _read_npz,
-        ".hdf5": _read_hdf5,
-        ".h5": _read_hdf5,
         ".mcap": _read_mcap,
     }
 )

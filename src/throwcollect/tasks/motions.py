@@ -19,11 +19,11 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.motion_files import MOTION, TIME, columns_of, read_motion_table
-from throwcollect.wording import format_count
+from throwcollect.wording import format_count, join_names
 
 KEY = "task.trajectory.motion"
 """Dotted key with the number of a trial's motion."""
-_SAME = 1e-6
+SAME = 1e-6
 """Positions that differ by less are one [rad; m]."""
 _MOST_KEPT = 2
 _KEPT: dict[str | None, Motions] = {}
@@ -46,6 +46,17 @@ class Motions:
     offsets: NDArray[np.int64]
     columns: Mapping[str, NDArray[np.float64]]
 
+    @classmethod
+    def of(cls, trajectories: Mapping[str, JointTrajectory], robot: Robot) -> Motions:
+        """Make the motions of trajectories of the same joints, by their names."""
+        each = list(trajectories.values())
+        columns = {TIME: np.concatenate([one.times for one in each])}
+        for order, name in enumerate(("positions", "velocities", "accelerations")):
+            rows = np.vstack([getattr(one, name) for one in each])
+            columns |= {columns_of(joint, robot)[order]: rows[:, n] for n, joint in enumerate(each[0].joints)}
+        offsets = np.cumsum([0, *(len(one.times) for one in each)])
+        return cls(tuple(trajectories), each[0].joints, offsets, columns)
+
     def __len__(self) -> int:
         return len(self.names)
 
@@ -67,13 +78,16 @@ class Motions:
 
     def number_of(self, motion: float | str | None) -> int:
         """Find the number of a motion; without a number or a name, it is the first one."""
-        if isinstance(motion, str) and motion in self.names:
-            return self.names.index(motion)
-        if isinstance(motion, str) or (motion or 0) >= len(self):
-            problem = f"there is no motion {motion if isinstance(motion, str) else int(motion or 0)!r}"
-            there = f"the file has {format_count(len(self), 'motion')}: {', '.join(self.names[:5])}"
-            raise ConfigError([Problem(f"{problem}; {there}{', ...' if len(self) > 5 else ''}", KEY)])
-        return int(motion or 0)
+        if isinstance(motion, str):
+            number = self.names.index(motion) if motion in self.names else len(self)
+        else:
+            number = int(motion or 0)
+        if number >= len(self):
+            there = f"the file has {format_count(len(self), 'motion')}: {', '.join(self.names[:5])}, ..."
+            raise ConfigError(
+                [Problem(f"there is no motion {motion if isinstance(motion, str) else number}; {there}", KEY)]
+            )
+        return number
 
     def ends(self) -> dict[str, dict[str, NDArray[np.float64]]]:
         """Return the positions of each joint at the ``start`` and at the ``end`` of all motions, ``(n_motions,)``."""
@@ -116,47 +130,19 @@ def motions_of(family: MotionFile, robot: Robot) -> Motions:
     return _KEPT.setdefault(motions.digest, motions)
 
 
-def complete(
-    family: MotionFile, robot: Robot, *, default: Mapping[str, float], given: Mapping[str, Mapping[str, float]]
-) -> dict[str, Any]:
-    """Read a file of motions, and make the keys of a task that follow from it.
+def complete(family: MotionFile, robot: Robot, start: Mapping[str, float], end: Mapping[str, float]) -> dict[str, Any]:
+    """Make the keys of a task that follow from its file of motions: ``trajectory``, and ``start`` and ``end``.
 
-    Args:
-        family: The section, whose file has an absolute path.
-        robot: The robot.
-        default: The start of the task for joints that the file does not move.
-        given: The keys ``start`` and ``end`` that the user has set.
-
-    Returns:
-        ``trajectory``, ``start`` and ``end``, the latter two of the first motion if the user has not set them.
+    The latter are those of the first motion, but for joints that the given ones name.
     """
     motions = motions_of(family, robot)
     first = motions.number_of(family.motion)
-    chosen = slice(None) if family.motion is None else slice(first, first + 1)
-    ends = motions.ends()
-    problems = []
-    for name, positions in given.items():
-        for joint, values in ends[name].items():
-            wrong = np.flatnonzero(~(np.abs(values[chosen] - positions.get(joint, np.nan)) <= _SAME))
-            if len(wrong):
-                number = first + wrong[0]
-                sentence = (
-                    f"should be {values[number]:.6g}, the {name} of motion {motions.names[number]!r}, or left out"
-                )
-                problems.append(Problem(f"{sentence}; got {positions.get(joint)}", f"task.{name}.{joint}"))
-    problems += [
-        Problem("should be left out, as the file does not move this joint", f"task.end.{joint}")
-        for joint in given.get("end", {})
-        if joint not in motions.joints
-    ]
-    if problems:
-        raise ConfigError(problems)
-    keys = {name: {joint: float(values[first]) for joint, values in ends[name].items()} for name in ends}
-    return {
-        "start": {**default, **keys["start"], **given.get("start", {})},
-        "end": {**keys["end"], **given.get("end", {})},
-        "trajectory": family.model_copy(update={"sha256": motions.digest}),
+    ends = {
+        name: {joint: float(positions[first]) for joint, positions in found.items()}
+        for name, found in motions.ends().items()
     }
+    section = family.model_copy(update={"sha256": motions.digest})
+    return {"trajectory": section, "start": ends["start"] | {**start}, "end": ends["end"] | {**end}}
 
 
 def file_trajectory(
@@ -165,35 +151,34 @@ def file_trajectory(
     """Return the points of a motion of a file, which has to lead from the start to the end of the trial."""
     motions = motions_of(family, robot)
     number = motions.number_of(family.motion)
-    trajectory = motions.trajectory(number)
-    for name, wanted, row in (("start", start, 0), ("end", end, -1)):
-        for joint, position in zip(trajectory.joints, trajectory.positions[row].tolist(), strict=True):
-            if not abs(position - wanted.get(joint, np.nan)) <= _SAME:
-                sentence = f"should be {position:.6g}, the {name} of motion {motions.names[number]!r}"
-                raise ConfigError([Problem(f"{sentence}, got {wanted.get(joint)}", f"task.{name}.{joint}")])
-    return trajectory
+    for name, wanted in (("start", start), ("end", end)):
+        found = {joint: positions[number] for joint, positions in motions.ends()[name].items()}
+        for joint, position in found.items():
+            if joint not in wanted or abs(position - wanted[joint]) > SAME:
+                sentence = f"should be {position:.6g}, the {name} of its motion, or left out"
+                raise ConfigError([Problem(f"{sentence}; got {wanted.get(joint)}", f"task.{name}.{joint}")])
+        if name == "end" and len(end) > len(found):
+            raise ConfigError([Problem(f"should name only {join_names(list(found))}, as the file does", "task.end")])
+    return motions.trajectory(number)
 
 
 def _make_motions(table: Any, robot: Robot, path: Path) -> Motions:
     """Check a table of points, and put its columns in order."""
-    there = [name for name in table.column_names if name not in (MOTION, TIME)]
-    joints = tuple(joint for joint in robot.joints if {*columns_of(joint, robot)} & {*there})
-    known = [columns_of(joint, robot) for joint in joints]
-    orders = max((order + 1 for names in known for order in range(3) if names[order] in there), default=1)
-    wanted = [TIME, *(names[order] for order in range(orders) for names in known)]
-    problems = [Problem(_explain_column(name, robot), name, path) for name in there if name not in wanted] or [
-        Problem("the column is missing", name, path) for name in wanted if name not in table.column_names
-    ]
-    if len(set(table.column_names)) < len(table.column_names):
-        problems.append(Problem("a column is here twice", path=path))
-    if problems or not there or not len(table):
-        raise ConfigError(problems or [Problem("should have points of joints over time, and has none", path=path)])
+    there = {*table.column_names} - {MOTION, TIME}
+    joints = tuple(joint for joint in robot.joints if there & {*columns_of(joint, robot)})
+    by_order = list(zip(*(columns_of(joint, robot) for joint in joints), strict=True))
+    orders = 1 + max((number for number, names in enumerate(by_order) if there & {*names}), default=0)
+    wanted = [TIME, *(name for names in by_order[:orders] for name in names)]
+    wrong = {name: _explain_column(name, robot) for name in sorted(there - {*wanted})}
+    wrong = wrong or {name: "the column is missing" for name in wanted if name not in table.column_names}
+    if wrong or not len(table):
+        problems = [Problem(sentence, name, path) for name, sentence in wrong.items()]
+        raise ConfigError(problems or [Problem("has no points", path=path)])
     encoded = table[MOTION].cast("string").combine_chunks().dictionary_encode()
-    numbers = encoded.indices.to_numpy(zero_copy_only=False)
-    starts = np.append(0, np.flatnonzero(np.diff(numbers)) + 1)
-    names = [str(encoded.dictionary[number]) for number in numbers[starts].tolist()]
-    columns = {name: _read_numbers(table[name], name, path) for name in wanted}
-    motions = Motions(tuple(names), joints, np.append(starts, len(table)), columns)
+    starts = np.append(0, np.flatnonzero(np.diff(encoded.indices.to_numpy())) + 1)
+    names = tuple(encoded.take(starts).to_pylist())
+    columns = {name: _read_numbers(table, name, path) for name in wanted}
+    motions = Motions(names, joints, np.append(starts, len(table)), columns)
     if problem := next(_find_problems(motions), None):
         raise ConfigError([Problem(problem, path=path)])
     return motions
@@ -203,16 +188,15 @@ def _explain_column(name: str, robot: Robot) -> str:
     joint = name if name in robot.joints else name.rpartition("_")[0] or name
     if joint not in robot.joints:
         return unknown_joint(joint, robot)
-    return f"should be {', '.join(columns_of(joint, robot)[:2])} or {columns_of(joint, robot)[2]}"
+    return f"should be {join_names(columns_of(joint, robot), 'or')}"
 
 
-def _read_numbers(column: Any, name: str, path: Path) -> NDArray[np.float64]:
-    import pyarrow as pa
-
+def _read_numbers(table: Any, name: str, path: Path) -> NDArray[np.float64]:
     try:
-        numbers: NDArray[np.float64] = column.cast(pa.float64()).to_numpy()
-    except pa.ArrowException as error:
-        raise ConfigError([Problem(f"should be numbers: {error}", name, path)]) from error
+        numbers: NDArray[np.float64] = table[name].cast("float64").to_numpy()
+    except (KeyError, ValueError) as error:
+        # A name may be there twice; Arrow's errors are errors of values.
+        raise ConfigError([Problem(f"should be one column of numbers: {error}", name, path)]) from error
     return numbers
 
 
@@ -238,7 +222,7 @@ def _find_problems(motions: Motions) -> Iterator[str]:
         yield f"{_place(motions, row)}: {TIME} should rise, is {times[row]:g} after {times[row - 1]:g}"
     at_rest = np.append(offsets[:-1], offsets[1:] - 1)
     for name, values in list(motions.columns.items())[1 + len(motions.joints) :]:
-        if len(wrong := np.flatnonzero(np.abs(values[at_rest]) > _SAME)):
+        if len(wrong := np.flatnonzero(np.abs(values[at_rest]) > SAME)):
             row = at_rest[wrong[0]]
             yield f"{_place(motions, row)}: {name} should be 0, as motions begin and end at rest, got {values[row]:g}"
 

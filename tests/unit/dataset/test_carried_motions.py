@@ -32,7 +32,7 @@ sweep:
 """
 OF_A_FILE = """\
 name: drawn
-task: {{trajectory: {{family: file, file: points/trajectories.parquet}}}}
+task: {{trajectory: {{family: file, file: points/motions}}}}
 """
 
 
@@ -52,7 +52,7 @@ def carrying(drawn: Path, place: Path) -> Path:
     """A dataset of motions of a file that is gone; they were exported from another dataset."""
     source = place / "source"
     source.mkdir()
-    export(drawn, source / "points", to="motions")
+    export(drawn, source / "points", to="parquet")
     collect_here(write_config(source, trials=0, text=OF_A_FILE, sim=FAST), place / "carrying")
     source.rename(place / "moved")
     return place / "carrying"
@@ -84,7 +84,7 @@ def test_a_collection_goes_on_with_the_same_motions_wherever_they_are(
 
 def test_a_collection_does_not_go_on_with_other_motions(carrying: Path, place: Path, tmp_path: Path) -> None:
     shutil.copytree(place / "moved", tmp_path / "elsewhere")
-    points = tmp_path / "elsewhere" / "points" / "trajectories.parquet"
+    points = tmp_path / "elsewhere" / "points" / "motions" / "drawn_00000.parquet"
     table = pq.read_table(points)
     pq.write_table(table.filter(pc.not_equal(table["motion"], "3")), points)
     done = call_here("up", tmp_path / "elsewhere" / "small.yaml", "--resume", carrying, *INPROCESS)

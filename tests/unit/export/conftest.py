@@ -19,7 +19,7 @@ from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.task import task_of
 
-FORMATS = ("parquet", "npz", "lerobot", "hdf5", "mat", "motions")
+FORMATS = ("parquet", "npz", "lerobot", "hdf5", "mat")
 """The formats of this project; a package in `tests/plugins` adds another one."""
 SETTINGS: dict[str, Any] = {
     "trials": 6,

@@ -42,7 +42,7 @@ def place(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_page_has_a_command_for_every_format(place: Path) -> None:
     assert [command[5] for command in COMMANDS] == list(FORMATS)
     assert sorted(path.name for path in (place / "exports").iterdir()) == sorted(
-        ["tables", "arrays", "lerobot", "robomimic", "matlab", "motions"]
+        ["tables", "arrays", "lerobot", "robomimic", "matlab"]
     )
 
 

@@ -150,7 +150,7 @@ def test_an_empty_output_directory_is_accepted(source: Path, tmp_path: Path) -> 
 
 
 def test_an_unknown_format_is_refused_with_a_list_of_the_formats(source: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="unknown format 'docx'; known: parquet, npz, lerobot, hdf5, mat and motions"):
+    with pytest.raises(ConfigError, match="unknown format 'docx'; known: parquet, npz, lerobot, hdf5 and mat"):
         export(source, tmp_path / "out", to="docx")
 
 
@@ -215,7 +215,7 @@ def test_an_export_can_use_a_format_of_another_package(source: Path, tmp_path: P
     assert len((tmp_path / "text" / "throws.csv").read_text().splitlines()) == 1 + 6
     assert len(list((tmp_path / "text").glob("trial_*.csv"))) == 4
     assert 'pd.read_csv("throws.csv")' in (tmp_path / "text" / "README.md").read_text()
-    with pytest.raises(ConfigError, match="known: parquet, npz, lerobot, hdf5, mat and 2 more"):
+    with pytest.raises(ConfigError, match="known: parquet, npz, lerobot, hdf5, mat and csv"):
         export(source, tmp_path / "other", to="zarr")
 
 

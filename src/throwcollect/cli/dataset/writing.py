@@ -21,7 +21,7 @@ def export_dataset(
     output: OutputArgument,
     to: Annotated[
         str,
-        typer.Option("--to", metavar="FORMAT", help="parquet, npz, lerobot, hdf5, mat, motions, or another package's."),
+        typer.Option("--to", metavar="FORMAT", help="parquet, npz, lerobot, hdf5, mat, or one of another package."),
     ],
     rate: Annotated[
         int | None, typer.Option("--rate", metavar="HZ", help="Samples per second; as recorded if not given.")
