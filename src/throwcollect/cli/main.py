@@ -29,7 +29,7 @@ _OPTIONS = {"rate_hz": "--rate"}
 
 _COMMANDS = {
     "Commands": "show:init collect:up collect:resume collect:cover collect:join_run cluster_commands:submit "
-    "collect:join show:config show:plan show:doctor",
+    "collect:join show:config show:plan show:fit_dmp show:doctor",
     "Runs": "runs:ps runs:wait runs:logs runs:events runs:scale runs:stop runs:down serve:serve serve:view",
     "From a dataset to a throw": "learning:fit learning:aim learning:throw learning:score learning:adapt",
     "Nodes, as `up` starts them": "node_commands:router node_commands:sim node_commands:coordinator "

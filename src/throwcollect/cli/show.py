@@ -82,6 +82,32 @@ def config(
     typer.echo(found.model_dump_json(indent=2) if json else dump_yaml(found), nl=json)
 
 
+def fit_dmp(
+    path: ConfigArgument = DEFAULT_CONFIG,
+    settings: SetOption = None,
+    basis_functions: Annotated[
+        int, typer.Option("--basis-functions", metavar="N", min=2, max=500, help="Basis functions of each joint.")
+    ] = 25,
+) -> None:
+    """Print a section `task` that follows the motion of a configuration, such as one of a file, by DMPs."""
+    from throwcollect.config.loader import dump_yaml, load
+    from throwcollect.robots.description import robot_of
+    from throwcollect.robots.quintic_curve import sample_positions
+    from throwcollect.tasks.dmp import fit_motions
+    from throwcollect.tasks.task import trajectory_of
+
+    config = load(path, overrides(settings))
+    shown = trajectory_of(config)
+    (family,) = fit_motions([shown], basis_functions=basis_functions)
+    default, times = type(config.task).model_fields["points_hz"].default, shown.times
+    keys = {"trajectory": family, "duration_s": float(times[-1]), "points_hz": default}
+    fitted = config.model_copy(update={"task": config.task.model_copy(update=keys)})
+    misses = abs(sample_positions(trajectory_of(fitted), times) - shown.positions).max(axis=0).tolist()
+    miss, joint = max(zip(misses, shown.joints, strict=True))
+    typer.echo(dump_yaml(fitted, "task"), nl=False)
+    tell(f"the DMP stays within {miss:.2g} {robot_of(config).unit_of(joint)} of the motion; farthest is {joint}")
+
+
 def plan(
     path: ConfigArgument = DEFAULT_CONFIG,
     settings: SetOption = None,

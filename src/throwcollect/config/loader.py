@@ -77,12 +77,12 @@ def _placing(document: Document, key: str = "") -> Iterator[None]:
         raise type(error)(problems, expected=error.expected, hint=error.hint) from error
 
 
-def dump_yaml(config: Config) -> str:
-    """Write a configuration with all its keys as YAML that loads back to an equal one.
+def dump_yaml(config: Config, *sections: str) -> str:
+    """Write a configuration, or some sections of it, with all keys as YAML that loads back to an equal one.
 
     The text is part of every dataset, so it must not depend on the version of a library that writes YAML.
     """
-    return "".join(f"{line}\n" for line in _write_lines(config.model_dump(), ""))
+    return "".join(f"{line}\n" for line in _write_lines(config.model_dump(include={*sections} or None), ""))
 
 
 def value_as_yaml(value: Any) -> str:
@@ -147,12 +147,13 @@ def _find_motions(document: Document, directory: Path, robot: Any) -> None:
     with suppress(ValidationError):
         section = MotionFile.model_validate(given, strict=True, context=robot)
         section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
-        default = _find_default(document.values, ("task", "start"))
-        start = task.get("start", {joint: angle for joint, angle in default.items() if joint in robot.joints})
         keys = {"trajectory": section}
         if section.sha256 is None:
             with _placing(document):
-                keys = complete_motions(section, robot, start, task.get("end", {}))
+                keys = complete_motions(section, robot, task.get("start", {}), task.get("end", {}))
+            # Joints that the file does not move start where they do without it.
+            default = {} if "start" in task else _find_default(document.values, ("task", "start"))
+            keys["start"] = {joint: default[joint] for joint in default if joint in robot.joints} | keys["start"]
         document.values["task"] = task | keys
 
 

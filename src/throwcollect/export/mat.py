@@ -27,13 +27,12 @@ from throwcollect.extras import lazily
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.dmp import fit_dmp, kernels, roll_out
+from throwcollect.tasks.dmp import FIT_POINTS, fit_motions, kernels, roll_out
 
 scipy_io = lazily("scipy.io", extra="export")
 
 BASIS_FUNCTIONS = 25
 """Number of basis functions of each joint in a fitted DMP."""
-_FIT_POINTS = 501
 _LONGEST_NAME = 63
 """Most characters of the name of a field in MATLAB."""
 _LARGEST = 2**31 - 1
@@ -193,7 +192,7 @@ def _measure_target(throw: Throw, config: Config) -> tuple[float, ...]:
 def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], rate_hz: int) -> list[dict[str, Any]]:
     """Describe the DMPs of throws: those of their configurations, else ones fitted to the commanded motions."""
     to_fit = [motion for motion, task in motions if not isinstance(task.trajectory, DynamicMovementPrimitive)]
-    fitted = iter(_fit_primitives(to_fit))
+    fitted = iter(fit_motions(to_fit, basis_functions=BASIS_FUNCTIONS))
     # Rolling them out takes three times as long as reading the throws.
     logged = log_progress(motions, len(motions), "motion", "described")
     return [
@@ -204,37 +203,10 @@ def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], 
     ]
 
 
-def _fit_primitives(motions: Sequence[JointTrajectory]) -> list[DynamicMovementPrimitive]:
-    """Fit a DMP to each motion, all by one decomposition: stretched to a duration of 1, they have the same phases."""
-    if not motions:
-        return []
-    shares = np.linspace(0, 1, _FIT_POINTS)
-    sampled = [sample_quintic(motion, shares * motion.times[-1]) for motion in motions]
-    # A motion of duration T is stretched to 1, so its derivatives are multiplied by T and T squared.
-    positions, velocities, accelerations = (
-        np.hstack([each[order] * motion.times[-1] ** order for each, motion in zip(sampled, motions, strict=True)])
-        for order in range(3)
-    )
-    # A primitive has each joint once, so columns of several motions get names with their numbers.
-    names = [(number, joint) for number, motion in enumerate(motions) for joint in motion.joints]
-    together = fit_dmp(
-        [f"{number} {joint}" for number, joint in names],
-        shares,
-        positions,
-        velocities=velocities,
-        accelerations=accelerations,
-        basis_functions=BASIS_FUNCTIONS,
-    )
-    weights: list[dict[str, list[float]]] = [{} for _ in motions]
-    for number, joint in names:
-        weights[number][joint] = together.weights[f"{number} {joint}"]
-    return [together.model_copy(update={"weights": each}) for each in weights]
-
-
 def _describe_primitive(
     trajectory: JointTrajectory, family: DynamicMovementPrimitive, tau: float, rate_hz: int, *, fitted: bool = False
 ) -> dict[str, Any]:
-    times = np.linspace(0, trajectory.times[-1], _FIT_POINTS)
+    times = np.linspace(0, trajectory.times[-1], FIT_POINTS)
     positions, _, _ = sample_quintic(trajectory, times)
     weights = np.array(
         [family.weights.get(joint, [0.0] * family.basis_functions) for joint in trajectory.joints], dtype=np.float64

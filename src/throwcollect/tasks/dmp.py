@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from throwcollect.config.motion import DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import exp, matmul
+from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.wording import join_names
 
@@ -32,6 +33,8 @@ _SETTLED_RAD = 1e-3
 _SETTLED_RADPS = 5e-3
 _BLEND_S = 0.2
 _HORIZON_TAU = 5.0
+FIT_POINTS = 501
+"""Points of a motion that weights are fitted to."""
 
 
 def dmp_trajectory(
@@ -202,3 +205,30 @@ def fit_dmp(
     weights = np.linalg.lstsq(features, target, rcond=None)[0]
     learned = {joint: column.tolist() for joint, column in zip(joints, weights.T, strict=True)}
     return family.model_copy(update={"weights": learned})
+
+
+def fit_motions(motions: Sequence[JointTrajectory], *, basis_functions: int) -> list[DynamicMovementPrimitive]:
+    """Fit a DMP to each motion, all by one decomposition: stretched to a duration of 1, they have the same phases."""
+    if not motions:
+        return []
+    shares = np.linspace(0, 1, FIT_POINTS)
+    sampled = [sample_quintic(motion, shares * motion.times[-1]) for motion in motions]
+    # A motion of duration T is stretched to 1, so its derivatives are multiplied by T and T squared.
+    positions, velocities, accelerations = (
+        np.hstack([each[order] * motion.times[-1] ** order for each, motion in zip(sampled, motions, strict=True)])
+        for order in range(3)
+    )
+    # A primitive has each joint once, so columns of several motions get names with their numbers.
+    names = [(number, joint) for number, motion in enumerate(motions) for joint in motion.joints]
+    together = fit_dmp(
+        [f"{number} {joint}" for number, joint in names],
+        shares,
+        positions,
+        velocities=velocities,
+        accelerations=accelerations,
+        basis_functions=basis_functions,
+    )
+    weights: list[dict[str, list[float]]] = [{} for _ in motions]
+    for number, joint in names:
+        weights[number][joint] = together.weights[f"{number} {joint}"]
+    return [together.model_copy(update={"weights": each}) for each in weights]

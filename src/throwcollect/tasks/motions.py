@@ -177,8 +177,12 @@ def _make_motions(table: Any, robot: Robot, path: Path) -> Motions:
     encoded = table[MOTION].cast("string").combine_chunks().dictionary_encode()
     starts = np.append(0, np.flatnonzero(np.diff(encoded.indices.to_numpy())) + 1)
     names = tuple(encoded.take(starts).to_pylist())
-    columns = {name: _read_numbers(table, name, path) for name in wanted}
-    motions = Motions(names, joints, np.append(starts, len(table)), columns)
+    columns = {}
+    for name in wanted:
+        columns[name] = _read_numbers(table, name, path)
+        # The memory of a column is free again before the next one is copied.
+        table = table.drop_columns([name])
+    motions = Motions(names, joints, np.append(starts, len(encoded)), columns)
     if problem := next(_find_problems(motions), None):
         raise ConfigError([Problem(problem, path=path)])
     return motions

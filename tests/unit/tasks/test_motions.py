@@ -23,7 +23,8 @@ from throwcollect.tasks.motions import Motions, motions_of
 from throwcollect.tasks.task import trajectory_of
 
 ELBOW, WRIST = JOINTS = ("arm_right_4_joint", "arm_right_7_joint")
-STARTS = {ELBOW: -1.9, WRIST: -0.1}
+STARTS = {ELBOW: -1.85, WRIST: -0.1}
+"""The elbow starts elsewhere than by default."""
 TIMES = np.arange(26) / 25
 SHARE = 10 * TIMES**3 - 15 * TIMES**4 + 6 * TIMES**5
 ENDS = np.array([[-0.5, 0.5], [-0.6, 0.4], [-0.7, 0.3]])
@@ -284,7 +285,7 @@ def test_numbers_that_are_no_motions_are_refused(columns: dict[str, Any], messag
         ),
         (
             "file: motions.csv",
-            f"  start: {{{ELBOW}: -1.9, {WRIST}: 0}}",
+            f"  start: {{{ELBOW}: -1.85, {WRIST}: 0}}",
             f"3 × task.start.{WRIST}: should be -0.1, the start of its",
         ),
         ("file: motions.csv", "trials: 4", "trials: should be at most 3"),
