@@ -59,11 +59,6 @@ def fit(
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
     config, selected = dataset.config, _select(dataset, where)
-    if isinstance(config.task.trajectory, MotionFile):
-        raise ConfigError(
-            f"{dataset.directory}: its motions are those of a file, and there is nothing between them to aim with",
-            hint="sweep parameters of a motion; throwcollect fit-dmp finds those of a motion of a file",
-        )
     columns = tuple(targets) or config.task.targets
     if not columns:
         raise ConfigError(
@@ -124,6 +119,9 @@ def _check_names(targets: Sequence[str], parameters: Sequence[str], given: Seque
 
 
 def _select(dataset: Dataset, where: str | None) -> Dataset:
+    if isinstance(dataset.config.task.trajectory, MotionFile):
+        hint = "sweep parameters of a motion; throwcollect fit-dmp finds those of a motion of a file"
+        raise ConfigError(f"{dataset.directory} has motions of a file, and there is nothing between them", hint=hint)
     if where is None:
         return dataset
     selected = dataset.select(find_rows(where, dataset.throws, "where"))

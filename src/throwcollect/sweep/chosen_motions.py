@@ -8,9 +8,18 @@ import numpy as np
 
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config
-from throwcollect.robots.description import robot_of
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.motions import KEY, SAME, motions_of
+
+
+def count_motions(config: Config) -> int:
+    """Count the motions that trials without swept keys have, one each; 0 if motions are not those of a file."""
+    family = config.task.trajectory
+    if not isinstance(family, MotionFile):
+        return 0
+    from throwcollect.robots.description import robot_of
+    from throwcollect.tasks.motions import motions_of
+
+    return len(motions_of(family, robot_of(config))) if family.motion is None else 1
 
 
 def complete_point(values: Mapping[str, float], config: Config) -> dict[str, float]:
@@ -29,6 +38,9 @@ def add_motions(points: Points, config: Config) -> Points:
     family = config.task.trajectory
     if not isinstance(family, MotionFile):
         return points
+    from throwcollect.robots.description import robot_of
+    from throwcollect.tasks.motions import KEY, SAME, motions_of
+
     motions = motions_of(family, robot_of(config))
     columns = dict(zip(points.keys, points.values.T, strict=True))
     first = motions.number_of(family.motion)
@@ -37,7 +49,7 @@ def add_motions(points: Points, config: Config) -> Points:
         columns[KEY] = (turn if family.motion is None else np.full_like(turn, first)) * 1.0
     # A number that no motion has is a reason to refuse its trial.
     chosen = np.clip(columns[KEY], 0, len(motions) - 1).astype(np.int64)
-    for name, positions in motions.ends().items():
+    for name, positions in motions.ends.items():
         for joint, values in positions.items():
             # Where the configuration has another value than the first motion, the user has set it.
             configured = getattr(config.task, name)[joint]

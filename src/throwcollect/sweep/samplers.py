@@ -10,17 +10,14 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config, Parameter, Range, Values
 from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.errors import PlanError, Problem
 from throwcollect.reproducible_math import exp
-from throwcollect.robots.description import robot_of
-from throwcollect.sweep.chosen_motions import add_motions
+from throwcollect.sweep.chosen_motions import add_motions, count_motions
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.sobol import MOST_DIMENSIONS, draw_sobol
-from throwcollect.tasks.motions import motions_of
 
 _TRIALS_PER_SUCCESS = 10
 """Most trials per wanted success, for configurations with `until` and without `trials`."""
@@ -39,8 +36,7 @@ def draw_points(config: Config, *, directory: Path) -> Points:
     if sweep.file is not None:
         points = read_points(directory / sweep.file, config)
         return points[: _check_count(config.trials, len(points.values))]
-    if not sweep.parameters and isinstance(family := config.task.trajectory, MotionFile):
-        motions = len(motions_of(family, robot_of(config))) if family.motion is None else 1
+    if not sweep.parameters and (motions := count_motions(config)):
         return add_motions(Points((), np.empty((_check_count(config.trials, motions), 0))), config)
     if not sweep.parameters:
         raise PlanError(

@@ -214,8 +214,9 @@ def fit_motions(motions: Sequence[JointTrajectory], *, basis_functions: int) -> 
     shares = np.linspace(0, 1, FIT_POINTS)
     sampled = [sample_quintic(motion, shares * motion.times[-1]) for motion in motions]
     # A motion of duration T is stretched to 1, so its derivatives are multiplied by T and T squared.
+    durations = [motion.times[-1] for motion in motions]
     positions, velocities, accelerations = (
-        np.hstack([each[order] * motion.times[-1] ** order for each, motion in zip(sampled, motions, strict=True)])
+        np.hstack([each[order] * (1.0, T, T**2)[order] for each, T in zip(sampled, durations, strict=True)])
         for order in range(3)
     )
     # A primitive has each joint once, so columns of several motions get names with their numbers.

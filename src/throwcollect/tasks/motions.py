@@ -89,8 +89,9 @@ class Motions:
             )
         return number
 
+    @cached_property
     def ends(self) -> dict[str, dict[str, NDArray[np.float64]]]:
-        """Return the positions of each joint at the ``start`` and at the ``end`` of all motions, ``(n_motions,)``."""
+        """Positions of each joint at the ``start`` and at the ``end`` of all motions, ``(n_motions,)``."""
         rows = {"start": self.offsets[:-1], "end": self.offsets[1:] - 1}
         columns = list(self.columns.values())[1 : 1 + len(self.joints)]
         return {
@@ -101,16 +102,15 @@ class Motions:
     def trajectory(self, number: int) -> JointTrajectory:
         """Make the trajectory of a motion.
 
-        Velocities and accelerations that the file does not have are differences of second order, and 0 at both ends.
+        Velocities and accelerations that the file does not have are differences; velocities are 0 at both ends.
         """
         times, *columns = (column[self.offsets[number] : self.offsets[number + 1]] for column in self.columns.values())
         count = len(self.joints)
         orders = [np.column_stack(columns[first : first + count]) for first in range(0, len(columns), count)]
         while len(orders) < 3:
-            slopes = np.zeros_like(orders[-1])
-            if len(times) > 2:
-                slopes[1:-1] = np.gradient(orders[-1], times, axis=0)[1:-1]
-            orders.append(slopes)
+            orders.append(np.gradient(orders[-1], times, axis=0))
+            if len(orders) == 2:
+                orders[1][[0, -1]] = 0
         return JointTrajectory(self.joints, times, *orders)
 
 
@@ -139,9 +139,10 @@ def complete(family: MotionFile, robot: Robot, start: Mapping[str, float], end: 
     first = motions.number_of(family.motion)
     ends = {
         name: {joint: float(positions[first]) for joint, positions in found.items()}
-        for name, found in motions.ends().items()
+        for name, found in motions.ends.items()
     }
-    section = family.model_copy(update={"sha256": motions.digest})
+    motion = None if family.motion is None else float(first)
+    section = family.model_copy(update={"sha256": motions.digest, "motion": motion})
     return {"trajectory": section, "start": ends["start"] | {**start}, "end": ends["end"] | {**end}}
 
 
@@ -152,7 +153,7 @@ def file_trajectory(
     motions = motions_of(family, robot)
     number = motions.number_of(family.motion)
     for name, wanted in (("start", start), ("end", end)):
-        found = {joint: positions[number] for joint, positions in motions.ends()[name].items()}
+        found = {joint: positions[number] for joint, positions in motions.ends[name].items()}
         for joint, position in found.items():
             if joint not in wanted or abs(position - wanted[joint]) > SAME:
                 sentence = f"should be {position:.6g}, the {name} of its motion, or left out"
@@ -174,7 +175,7 @@ def _make_motions(table: Any, robot: Robot, path: Path) -> Motions:
     if wrong or not len(table):
         problems = [Problem(sentence, name, path) for name, sentence in wrong.items()]
         raise ConfigError(problems or [Problem("has no points", path=path)])
-    encoded = table[MOTION].cast("string").combine_chunks().dictionary_encode()
+    encoded = table[MOTION].cast("string").fill_null("").combine_chunks().dictionary_encode()
     starts = np.append(0, np.flatnonzero(np.diff(encoded.indices.to_numpy())) + 1)
     names = tuple(encoded.take(starts).to_pylist())
     columns = {}
@@ -225,7 +226,7 @@ def _find_problems(motions: Motions) -> Iterator[str]:
         row = wrong[0] + 1
         yield f"{_place(motions, row)}: {TIME} should rise, is {times[row]:g} after {times[row - 1]:g}"
     at_rest = np.append(offsets[:-1], offsets[1:] - 1)
-    for name, values in list(motions.columns.items())[1 + len(motions.joints) :]:
+    for name, values in list(motions.columns.items())[1 + len(motions.joints) : 1 + 2 * len(motions.joints)]:
         if len(wrong := np.flatnonzero(np.abs(values[at_rest]) > SAME)):
             row = at_rest[wrong[0]]
             yield f"{_place(motions, row)}: {name} should be 0, as motions begin and end at rest, got {values[row]:g}"

@@ -66,6 +66,29 @@ def test_throws_whose_points_were_exported_are_the_same_bit_for_bit(drawn: Path,
     assert "task.trajectory.motion" in Dataset.open(carrying).plan.keys
 
 
+OF_A_DMP = """\
+name: drawn
+trials: {trials}
+task:
+  end: {{arm_right_4_joint: -0.5}}
+  trajectory:
+    family: dmp
+    basis_functions: 12
+    weights:
+      arm_right_4_joint: [-758, -994, -1122, -1231, -1231, -1114, -858, -509, -156, 74, 58, -57]
+sweep: {{parameters: {{task.end.arm_right_4_joint: {{min: -0.55, max: -0.5}}}}}}
+"""
+
+
+def test_points_of_dmps_begin_with_any_acceleration(place: Path) -> None:
+    source = place / "dmp"
+    source.mkdir()
+    collect_here(write_config(source, trials=2, text=OF_A_DMP, sim=FAST), source / "drawn")
+    export(source / "drawn", source / "points", to="parquet")
+    collect_here(write_config(source, trials=0, text=OF_A_FILE, sim=FAST), source / "again")
+    assert info(source / "again").digest == info(source / "drawn").digest
+
+
 def test_it_is_verified_and_replayed_where_the_file_is_gone(carrying: Path) -> None:
     assert verify_dataset(carrying, replay=2) == []
     assert "    file: motions.parquet\n" in (carrying / "config.yaml").read_text()
