@@ -141,8 +141,10 @@ def _find_robot(document: Document, directory: Path) -> Any:
 def _find_motions(document: Document, directory: Path, robot: Any) -> None:
     """Complete the keys of a task whose motions are in a file, which may be relative to the directory."""
     task = document.values.get("task")
-    given = task.get("trajectory") if isinstance(task, dict) else None
-    if robot is None or not isinstance(task, dict) or not isinstance(given, dict) or given.get("family") != "file":
+    if robot is None or not isinstance(task, dict):
+        return
+    given, start, end = (task.get(name, {}) for name in ("trajectory", "start", "end"))
+    if not all(isinstance(each, dict) for each in (given, start, end)) or given.get("family") != "file":
         return
     with suppress(ValidationError):
         section = MotionFile.model_validate(given, strict=True, context=robot)
@@ -150,7 +152,7 @@ def _find_motions(document: Document, directory: Path, robot: Any) -> None:
         keys = {"trajectory": section}
         if section.sha256 is None:
             with _placing(document):
-                keys = complete_motions(section, robot, task.get("start", {}), task.get("end", {}))
+                keys = complete_motions(section, robot, start, end)
             # Joints that the file does not move start where they do without it.
             default = {} if "start" in task else _find_default(document.values, ("task", "start"))
             keys["start"] = {joint: default[joint] for joint in default if joint in robot.joints} | keys["start"]

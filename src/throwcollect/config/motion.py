@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, PositiveFloat
-from typing_extensions import Self
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Joint
@@ -63,10 +61,6 @@ class MotionFile(Section):
     """Points per second of a file that has no times."""
     sha256: str | None = None
     """Digest of the motions; it is written with a dataset."""
-
-    def placed(self, file: Path) -> Self:
-        """Make the section of motions that have been read: their copy is in `file`, which has joints and times."""
-        return self.model_copy(update={"file": str(file), "joints": [], "rate_hz": None})
 
 
 if TYPE_CHECKING:

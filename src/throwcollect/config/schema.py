@@ -233,11 +233,12 @@ class Config(Section):
         )
 
     def with_motions_in(self, file: Path) -> Config:
-        """Make a copy of this configuration whose motions, if it has them from a file, are in another file."""
+        """Make a copy of this configuration whose motions, if it has them from a file, are in a dataset's file."""
         if not isinstance(self.task.trajectory, MotionFile):
             return self
-        task = self.task.model_copy(update={"trajectory": self.task.trajectory.placed(file)})
-        return self.model_copy(update={"task": task})
+        place: dict[str, Any] = {"file": str(file), "joints": [], "rate_hz": None}
+        motions = self.task.trajectory.model_copy(update=place)
+        return self.model_copy(update={"task": self.task.model_copy(update={"trajectory": motions})})
 
     def run_as(self, other: Config) -> Config:
         """Make a copy of this configuration that takes all keys that do not change the dataset from another one."""

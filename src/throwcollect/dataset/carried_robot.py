@@ -76,13 +76,10 @@ def find_files(config: Config) -> Path | None:
     return Path(config.robot.urdf).parent if isinstance(config.robot, DescribedRobotConfig) else None
 
 
-def _list_robot(config: Config) -> list[Path]:
-    return [] if (source := find_files(config)) is None else list_files(source)
-
-
 def pack_robot(config: Config) -> str:
     """Write the files of a robot and of motions as a text, a zip archive in base64; it is empty if there are none."""
-    files = {f"{ROBOT}/{path.name}": path.read_bytes() for path in _list_robot(config)}
+    source = find_files(config)
+    files = {f"{ROBOT}/{path.name}": path.read_bytes() for path in (list_files(source) if source else ())}
     if isinstance(family := config.task.trajectory, MotionFile):
         files[MOTIONS] = _encode_motions(family, config)
     packed = io.BytesIO()

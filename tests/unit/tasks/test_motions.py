@@ -288,6 +288,7 @@ def test_numbers_that_are_no_motions_are_refused(columns: dict[str, Any], messag
             f"  start: {{{ELBOW}: -1.85, {WRIST}: 0}}",
             f"3 × task.start.{WRIST}: should be -0.1, the start of its",
         ),
+        ("file: motions.csv", "  start: 3", "task.start: should be "),
         ("file: motions.csv", "trials: 4", "trials: should be at most 3"),
         (
             "file: motions.csv",
