@@ -289,6 +289,11 @@ def test_numbers_that_are_no_motions_are_refused(columns: dict[str, Any], messag
             f"3 × task.start.{WRIST}: should be -0.1, the start of its",
         ),
         ("file: motions.csv", "  start: 3", "task.start: should be "),
+        (
+            "file: motions.csv",
+            "  end: {torso_1_joint: 0}",
+            f"task.end: should name only {ELBOW} and {WRIST}, as the file",
+        ),
         ("file: motions.csv", "trials: 4", "trials: should be at most 3"),
         (
             "file: motions.csv",
