@@ -55,4 +55,5 @@ def add_motions(points: Points, config: Config) -> Points:
             configured = getattr(config.task, name)[joint]
             if (values[chosen] != configured).any() and abs(values[first] - configured) <= SAME:
                 columns.setdefault(f"task.{name}.{joint}", values[chosen])
-    return Points(tuple(columns), np.column_stack(list(columns.values())), points.targets)
+    table = np.column_stack([*columns.values(), points.targets])
+    return Points((*columns, *points.target_names), table)
