@@ -108,13 +108,17 @@ class Channels:
     )
 
     def __init__(self, config: Config, urdf: str) -> None:
-        self.robot = urdf
+        self.robot, self._config = urdf, config
         self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
         topics = _make_topics(config, self._frames)
         self.recorded: dict[Channel, Topic] = {
             Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == _TF_ID else _SAMPLED): topic
             for number, topic in sorted(topics.items())
         }
+
+    def __reduce__(self) -> tuple[type[Channels], tuple[Config, str]]:
+        # Topics hold functions, which cannot be sent to another process.
+        return Channels, (self._config, self.robot)
 
     @property
     def all(self) -> tuple[Channel, ...]:
