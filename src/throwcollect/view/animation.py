@@ -1,4 +1,4 @@
-"""Draws a stored throw as an animated picture: robot and ball as recorded, the ground, and the path of the ball."""
+"""Draws a stored throw as an animated picture: robot and ball as recorded, bodies, ground, and path of the ball."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.robots.description import robot_of
-from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
+from throwcollect.robots.surroundings import bodies_of, looks_of
+from throwcollect.view.drawn_robot import BALL_RGBA, draw_bodies_of, draw_robot_of
 from throwcollect.view.viewer_directory import choose_throws
 
 _OUTWARD = np.array([0.32, -1.0, 0.22])
@@ -98,9 +99,16 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
     released_s = throw.row.get("release_time_s")
     released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
-    with Renderer(robot.urdf_with_files, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA) as renderer:
+    colours = (shape.rgba for shape in draw_bodies_of(config))
+    bodies = list(zip(bodies_of(config), colours, strict=True))
+    drawn = robot.urdf_with_files, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA
+    with Renderer(*drawn, bodies) as renderer:
         # The mount, or the feet, stand at the origin.
         points = [samples.ball_position, np.zeros((1, 3))]
+        # What the task is about is always in the picture; other bodies may be as large as a room.
+        for look in (each for each in looks_of(config) if each.name in config.task.bodies):
+            low, *_, high = sorted(z for _, z in look.side_m)
+            points.append(np.array([(*corner, z) for corner in look.above_m for z in (low, high)]))
         for number in shown:
             _place(renderer, joints, samples, number)
             frames = np.array(renderer.find_frames())

@@ -1,4 +1,4 @@
-"""Robot and ball as viewers draw them: URDF texts without collision shapes, their shapes, and the files of meshes."""
+"""What viewers draw of robot, ball and bodies: URDF texts without collision shapes, their shapes, files of meshes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from pathlib import Path
 
 from throwcollect.config.scene import BallConfig
 from throwcollect.config.schema import Config
-from throwcollect.episode.frames import quaternion_of
+from throwcollect.episode.frames import WORLD, quaternion_of
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description, robot_of
+from throwcollect.robots.surroundings import looks_of
 from throwcollect.robots.urdf import PACKAGE, parse_xml, read_visual
 from throwcollect.tools.tool import tool_of
 
@@ -126,6 +127,16 @@ def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path],
     return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes, locate)
 
 
+def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
+    """Make the shapes of the bodies that stand in the world of a trial, in the frame of the world."""
+    return tuple(
+        DrawnShape(
+            WORLD, look.position_m, quaternion_of(*look.rpy_rad), look.size_m, look.shape, "", _read_hex(look.color)
+        )
+        for look in looks_of(config)
+    )
+
+
 def ball_urdf(ball: BallConfig) -> str:
     """URDF text of the ball, whose only link is its frame."""
     robot = ElementTree.Element("robot", name=BALL)
@@ -150,6 +161,12 @@ def _make_material(name: str, rgba: Rgba) -> ElementTree.Element:
     material = ElementTree.Element("material", name=name)
     ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, rgba)))
     return material
+
+
+def _read_hex(color: str) -> Rgba:
+    """Make the numbers of a color ``#rrggbb``."""
+    r, g, b = (value / 255 for value in bytes.fromhex(color[1:]))
+    return r, g, b, 1.0
 
 
 def _read_color(material: ElementTree.Element) -> dict[str, Rgba]:

@@ -1,4 +1,4 @@
-"""Markers: the robot, the ball, its paths, where it was released, highest and landed, and the landing plane."""
+"""Markers: robot, bodies, the ball, its paths, where it was released, highest and landed, and the landing plane."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import BALL, make_header
 from throwcollect.errors import ConfigError
-from throwcollect.view.drawn_robot import BALL_RGBA, DrawnShape, Rgba
+from throwcollect.view.drawn_robot import BALL_RGBA, DrawnShape, Rgba, draw_bodies_of
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
 _SUCCEEDED: Rgba = (0.0, 0.75, 0.35, 1.0)
@@ -50,7 +50,7 @@ class ShownThrow:
 
 
 def shape_markers(name: str, shapes: Sequence[DrawnShape], locate: Callable[[str], Path], stamp_ns: int) -> Any:
-    """A visualization_msgs/MarkerArray with shapes of the robot in the frames of their links.
+    """A visualization_msgs/MarkerArray with shapes in the frames of their links.
 
     Meshes are ``data:`` URLs, so that viewers need no files.
 
@@ -83,6 +83,7 @@ def throw_markers(throw: ShownThrow) -> Any:
     ball = _make_marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
     ball.header.frame_id, ball.frame_locked = BALL, True
     markers = [marker(header=make_header(WORLD, stamp), action=marker.DELETEALL), ball]
+    markers += shape_markers("bodies", draw_bodies_of(throw.config), Path, stamp).markers
     markers.append(_make_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
     for point in ("release", "apex", "landing"):
         markers += _make_point(point, throw.throw.row, stamp)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,6 +57,15 @@ def test_a_faster_animation_is_shorter_and_has_fewer_pictures(written: Animation
     assert fast.duration_s == pytest.approx(0.2 * written.duration_s, abs=0.11)
     assert fast.pictures < written.pictures / 4
     assert fast.file.read_bytes()[:6] == b"GIF89a"
+
+
+def test_bodies_are_drawn_in_their_colours(make_collection: Any, tmp_path: Path) -> None:
+    pole = {"shape": "cylinder", "position_m": [0.9, -0.5, 0.5], "radius_m": 0.15, "length_m": 1.0, "color": "#20c040"}
+    collected = make_collection({"trials": 1, "scene": {"bodies": {"pole": pole}}}).collect(tmp_path / "a")
+    pixels = picture(render(collected, tmp_path / "throw.webp", slow=0.1).file, 0)
+    green = (pixels[..., 1] > 1.8 * pixels[..., 0]) & (pixels[..., 1] > 1.8 * pixels[..., 2])
+    # Its height over its width; its middle, as the edges are not sharp.
+    assert np.median(green.sum(axis=0)[green.any(axis=0)]) / np.median(green.sum(axis=1)[green.any(axis=1)]) > 2
 
 
 def test_the_camera_sees_all_points_and_stands_no_farther_than_needed() -> None:

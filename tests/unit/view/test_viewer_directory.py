@@ -235,6 +235,19 @@ def test_each_throw_is_shown_with_its_own_tool_and_ball(make_collection: Any, tm
     assert len({description.data for _, description in shown["/robot_description"]}) == 2
 
 
+def test_bodies_are_shown_where_they_stand_in_each_throw(make_collection: Any, tmp_path: Path) -> None:
+    pole = {"shape": "cylinder", "position_m": [1.0, 2.0, 0.5], "radius_m": 0.1, "length_m": 0.9, "color": "#ff8000"}
+    swept = {"scene.bodies.pole.position_m.0": {"values": [1.0, 1.5]}}
+    settings = {"trials": None, "scene": {"bodies": {"pole": pole}}, "sweep": {"sampler": "grid", "parameters": swept}}
+    shown = messages_of(view(make_collection(settings).collect(tmp_path / "a"), tmp_path / "view").recording)
+    found = [[each for each in array.markers if each.ns == "bodies"] for _, array in shown["/view/throw"]]
+    assert [fields(each.pose.position, "x", "y", "z") for (each,) in found] == [[1.0, 2.0, 0.5], [1.5, 2.0, 0.5]]
+    ((marker,), _) = found
+    assert (marker.type, fields(marker.scale, "x", "y", "z")) == (marker.CYLINDER, [0.2, 0.2, 0.9])
+    assert fields(marker.color, "r", "g", "b", "a") == pytest.approx([1.0, 128 / 255, 0.0, 1.0])
+    assert (marker.header.frame_id, marker.action) == ("world", marker.ADD)
+
+
 def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """The spoon keeps the ball."""
     contact = replace(header.contacts[0], end_ns=None)

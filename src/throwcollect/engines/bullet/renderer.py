@@ -1,4 +1,4 @@
-"""Pictures of a robot and a ball by Bullet's software renderer: no screen, no GPU, and nothing is simulated."""
+"""Pictures of robot, ball and bodies by Bullet's software renderer: no screen, no GPU, and nothing is simulated."""
 
 from __future__ import annotations
 
@@ -12,21 +12,25 @@ import pybullet
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
-from throwcollect.engines.bullet.scenery import BASE, connect, links, load_urdf
+from throwcollect.engines.bullet.scenery import BASE, connect, links, load_bodies, load_urdf
+from throwcollect.engines.engine import SceneBody
 from throwcollect.errors import ConfigError
+
+Rgba = tuple[float, float, float, float]
 
 _BACKGROUND = -1
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class Renderer:
-    """A robot and a ball in poses that a camera sees; a context manager.
+    """A robot, a ball and bodies in poses that a camera sees; a context manager.
 
     Args:
         urdf: URDF text of the robot; paths of meshes are absolute.
         base_height_m: Height of its base above the ground [m].
         ball_radius_m: Radius of the ball [m].
         ball_rgba: Its colour.
+        bodies: Bodies that stand in the world, each with its colour.
 
     Raises:
         ConfigError: If Bullet cannot load the description.
@@ -34,7 +38,12 @@ class Renderer:
     """
 
     def __init__(
-        self, urdf: str, base_height_m: float, ball_radius_m: float, ball_rgba: tuple[float, float, float, float]
+        self,
+        urdf: str,
+        base_height_m: float,
+        ball_radius_m: float,
+        ball_rgba: Rgba,
+        bodies: Sequence[tuple[SceneBody, Rgba]] = (),
     ) -> None:
         heavy = _add_masses(urdf)
         self._client = connect()
@@ -53,6 +62,9 @@ class Renderer:
         sphere = pybullet.createVisualShape(
             pybullet.GEOM_SPHERE, radius=ball_radius_m, rgbaColor=ball_rgba, physicsClientId=self._client
         )
+        loaded = load_bodies(self._client, [body for body, _ in bodies])
+        for number, (_, rgba) in zip(loaded, bodies, strict=True):
+            pybullet.changeVisualShape(number, BASE, rgbaColor=rgba, physicsClientId=self._client)
         self._ball = pybullet.createMultiBody(0, baseVisualShapeIndex=sphere, physicsClientId=self._client)
 
     def __enter__(self) -> Renderer:
@@ -87,7 +99,7 @@ class Renderer:
             light: Direction from which the light comes.
 
         Returns:
-            Red, green, blue, and 255 for the robot and the ball, 0 for the background; shape ``(height, width, 4)``.
+            Red, green, blue, and 255 for robot, ball and bodies, 0 for the background; shape ``(height, width, 4)``.
         """
         _, _, colors, _, objects = pybullet.getCameraImage(
             width,
