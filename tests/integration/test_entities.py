@@ -1,11 +1,13 @@
 """Services about entities: their names and states."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.integration.robot import PAUSED, Result, Robot
-from throwcollect.ros import get_message, get_service
+from tests.integration.robot import CONFIG, OWN, PAUSED, Result, Robot, running_simulation
+from throwcollect.config.schema import Config
+from throwcollect.ros import Context, get_message, get_service
 
 SetEntityState: Any = get_service("simulation_interfaces/srv/SetEntityState")
 EntityState: Any = get_message("simulation_interfaces/msg/EntityState")
@@ -85,7 +87,7 @@ def test_entities_cannot_be_filtered(robot: Robot) -> None:
     for service in ("get_entities", "get_entities_states"):
         refused = robot.call(service, filters=EntityFilters(filter="ball"))
         assert refused.result.result == Result.RESULT_FEATURE_UNSUPPORTED
-        assert refused.result.error_message == "entities cannot be filtered: there are ball and talos alone"
+        assert refused.result.error_message == "entities cannot be filtered; known: ball, talos"
         assert list(refused.entities) == []
 
 
@@ -94,3 +96,24 @@ def test_get_entities_states_returns_the_state_of_each_entity(robot: Robot) -> N
     assert list(response.entities) == list(robot.call("get_entities").entities) == ["ball", "talos"]
     for name, state in zip(response.entities, response.states, strict=True):
         assert robot.call("get_entity_state", entity=name).state == state
+
+
+def test_bodies_of_the_scene_and_of_the_task_are_entities_that_cannot_be_moved(
+    endpoint: str, session: Context, tmp_path: Path
+) -> None:
+    pole = {"shape": "cylinder", "position_m": [1.0, 2.0, 0.5], "rpy_rad": [0, 0, 1], "radius_m": 0.1, "length_m": 1.0}
+    scene = {"scene": {"bodies": {"pole": pole}}, "task": {"name": "throw_into", "wall": {"height_m": 0.8}}}
+    config = Config.model_validate({**CONFIG.model_dump(exclude_defaults=True), **scene})
+    with running_simulation(tmp_path, endpoint, session, OWN, config) as robot:
+        bin_parts = [f"bin_{part}" for part in ("floor", "front", "back", "right", "left")]
+        response = robot.call("get_entities_states")
+        assert list(response.entities) == ["ball", "talos", "pole", *bin_parts, "wall"]
+        pose = robot.call("get_entity_state", entity="pole").state.pose
+        assert (pose.position.x, pose.position.y, pose.position.z) == (1.0, 2.0, 0.5)
+        assert (pose.orientation.z, pose.orientation.w) == pytest.approx((0.479426, 0.877583), abs=1e-6)
+        assert robot.call("get_entity_state", entity="wall").state.pose.position.z == 0.4
+        for name in ("pole", "wall"):
+            refused = robot.call("set_entity_state", entity=name, state=entity_state()).result
+            assert refused.result == Result.RESULT_OPERATION_FAILED
+            assert refused.error_message == f"{name} is fixed to the world"
+        assert robot.call("get_entity_state", entity="pole").state.pose == pose

@@ -190,6 +190,8 @@ class Config(Section):
         for joint in self.robot.posture:
             if joint in self.task.start:
                 yield f"robot.posture.{joint}", "should be left out, as task.start sets this joint"
+        for name in sorted(self.scene.bodies.keys() & {"ball", self.tool.name, self.robot.name}):
+            yield f"scene.bodies.{name}", "should have another name, as the ball, the tool or the robot has this one"
         for name in self.scene.bodies.keys() & self.task.bodies.keys():
             yield f"scene.bodies.{name}", f"should have another name, as the task {self.task.name} has such a body"
         if self.until is not None and self.until.outcome() != self.task.success:

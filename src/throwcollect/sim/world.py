@@ -18,10 +18,12 @@ from throwcollect.engines.engine import (
     Observer,
     Sample,
     Scene,
+    SceneBody,
     State,
     Steps,
     ball_of,
 )
+from throwcollect.episode.frames import quaternion_of
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
 from throwcollect.extras import require_engine
 from throwcollect.members import explain_failure, load_member
@@ -73,6 +75,7 @@ class World(Observer):
     steps: int
     end_reason: EndReason | None
     _ends: EndRule
+    _bodies: tuple[SceneBody, ...]
     _contacts: ContactLog
     _start: Sequence[float]
     _offsets: NDArray[np.float64]
@@ -236,6 +239,12 @@ class World(Observer):
         return BodyState((0.0, 0.0, self._base_height))
 
     @property
+    def bodies(self) -> Mapping[str, BodyState]:
+        """The bodies of the scene, which never move, by name."""
+        placed = ((body.link.name, body.placement) for body in self._bodies)
+        return {name: BodyState(xyz, quaternion_of(*rpy)) for name, (xyz, rpy) in placed}
+
+    @property
     def rests(self) -> bool:
         """Whether the arm has been standing still, and the ball lying on something, for half a second."""
         return self.steps - self._resting_since >= REST_S * self._hz
@@ -287,6 +296,7 @@ class World(Observer):
 
     def _load(self, scene: Scene, engine: str) -> None:
         self.engine.load(scene)
+        self._bodies = scene.bodies
         # The robot as it was loaded stays, while only the ball is another one.
         if scene.robot is not self._compared:
             check_loaded(self.engine, engine, scene)

@@ -71,6 +71,13 @@ from throwcollect.errors import ConfigError, PlanError, Problem
         ("record: {topics: [joint_states]}", ["record.topics: should hold ball/odometry, from which throws are"]),
         ("robot: {locked: [torso_1_joint]}", ["robot.locked: should not hold joints that task.end moves, got torso"]),
         ("robot: {posture: {torso_1_joint: 0.1}}", ["robot.posture.torso_1_joint: should be left out, as task.start"]),
+        *(
+            (
+                f"scene: {{bodies: {{{name}: {{shape: sphere, radius_m: 0.1, position_m: [9, 9, 9]}}}}}}",
+                [f"scene.bodies.{name}: should have another name, as"],
+            )
+            for name in ("ball", "ground", "spoon", "talos")
+        ),
         ("tool: {cup_rim_radius_m: 0.003}", ["tool.cup_rim_radius_m: 0.003 m should be above cup_floor_radius_m"]),
         (
             "task: {trajectory: {family: dmp, basis_functions: 2, weights: {torso_1_joint: [1, 2, 3]}}}",

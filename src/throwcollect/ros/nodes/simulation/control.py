@@ -134,18 +134,23 @@ class EntityServices:
 
     def _select(self, filters: EntityFilters) -> list[str]:
         if filters != EntityFilters():
-            message = f"entities cannot be filtered: there are {_BALL} and {self._robot} alone"
+            message = f"entities cannot be filtered; known: {', '.join(self._names)}"
             raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
-        return [_BALL, self._robot]
+        return self._names
+
+    @property
+    def _names(self) -> list[str]:
+        return [_BALL, self._robot, *self._simulation.world.bodies]
 
     def _read_state(self, name: str) -> EntityState:
         self._require(name)
         world = self._simulation.world
-        return _to_message(world.ball if name == _BALL else world.robot_base, self._simulation.now_ns)
+        states = {_BALL: world.ball, self._robot: world.robot_base, **world.bodies}
+        return _to_message(states[name], self._simulation.now_ns)
 
     def _require(self, name: str) -> None:
-        if name not in (_BALL, self._robot):
-            raise RequestError("RESULT_NOT_FOUND", f"no entity {name!r:.80}; known: {_BALL}, {self._robot}")
+        if name not in self._names:
+            raise RequestError("RESULT_NOT_FOUND", f"no entity {name!r:.80}; known: {', '.join(self._names)}")
 
 
 def _to_body_state(message: EntityState) -> BodyState:
