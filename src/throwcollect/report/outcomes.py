@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
+from throwcollect.tasks.throw_into.into_result import IntoOutcome
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,19 @@ _STYLES = {
     ThrowOutcome.RECAUGHT.value: Style("#CC79A7", "triangle-up"),
     ThrowOutcome.NOT_RELEASED.value: Style("#56B4E9", "square"),
     ThrowOutcome.DROPPED.value: Style("#8A63D2", "star-triangle-down"),
+    ThrowOutcome.BODY_HIT.value: Style("#44AA99", "hourglass"),
+    IntoOutcome.WALL_HIT.value: Style("#AA4499", "diamond-wide"),
+    IntoOutcome.RIM_HIT.value: Style("#332288", "diamond-tall"),
+    IntoOutcome.BOUNCED_OUT.value: Style("#CC6677", "bowtie"),
+    IntoOutcome.SHORT.value: Style("#C4B04A", "triangle-left"),
+    IntoOutcome.BEYOND.value: Style("#117733", "triangle-right"),
     ThrowOutcome.TIMEOUT.value: Style("#009E73", "triangle-down"),
     TRACKING_FAILED: Style("#999933", "cross"),
     LOST: Style("#7F7F7F", "hexagon"),
     REFUSED: Style("#B3B3B3", "star"),
 }
 _UNKNOWN = Style("#882255", "pentagon")
+_VERBS = {LANDED: ("land", "landed"), IntoOutcome.IN_BIN.value: ("stay in the bin", "stayed in the bin")}
 _SHARED = (LIMIT_VIOLATED, TRACKING_FAILED, LOST, REFUSED)
 """Failures of any task."""
 _FAILURES = (_UNKNOWN, *(style for name, style in _STYLES.items() if name not in (LANDED, *_SHARED)))
@@ -88,6 +96,11 @@ class Outcomes:
     def succeeded(self) -> int:
         """Number of trials that succeeded."""
         return self.counts.get(self.success, 0)
+
+    @property
+    def verbs(self) -> tuple[str, str]:
+        """What a trial that succeeds does, and what one that succeeded did."""
+        return _VERBS.get(self.success, ("succeed", in_words(self.success)))
 
     def style_of(self, name: str) -> Style:
         """How an outcome is drawn; the success of any task is drawn as a landing is."""

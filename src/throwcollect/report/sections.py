@@ -44,7 +44,7 @@ from throwcollect.report.measured import (
     read_parameters,
     summarise_peaks,
 )
-from throwcollect.report.outcomes import LANDED, Outcomes, in_words
+from throwcollect.report.outcomes import Outcomes, in_words
 from throwcollect.report.targets import show_model, show_targets
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest
@@ -205,10 +205,9 @@ def _show_outcomes(
     title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
     blocks: list[Row | Table] = []
     failed = trials - outcomes.succeeded
-    text = f"All {trials:,} {noun}s {in_words(outcomes.success)}."
+    text = f"All {trials:,} {noun}s {outcomes.verbs[1]}."
     if failed:
-        did_not = "land" if outcomes.success == LANDED else "succeed"
-        text = f"{failed:,} of {trials:,} {noun}s ({format_share(failed, trials)}) did not {did_not}."
+        text = f"{failed:,} of {trials:,} {noun}s ({format_share(failed, trials)}) did not {outcomes.verbs[0]}."
     if failures:
         blocks.append(_tabulate(failures))
     if failed and len(outcomes.names) > 1 and parameters:

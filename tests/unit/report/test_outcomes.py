@@ -12,6 +12,7 @@ from throwcollect.report.throw.measured import Residuals
 from throwcollect.report.throw.throw_sections import _show_physics
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
+from throwcollect.tasks.throw_into.into_result import IntoOutcome
 
 
 def test_outcomes_have_a_fixed_order_with_unknown_ones_last() -> None:
@@ -24,8 +25,13 @@ def test_outcomes_have_a_fixed_order_with_unknown_ones_last() -> None:
 
 
 def test_every_outcome_has_a_colour_of_its_own() -> None:
-    names = (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")
-    assert len({style_of(name).colour for name in names}) == len(names)
+    for task, success in ((ThrowOutcome, "landed"), (IntoOutcome, "in_bin")):
+        found = Outcomes.of([*(outcome.value for outcome in task), REFUSED, "unheard of"], success=success)
+        assert found.names[0] == success
+        assert found.style_of(success) == style_of("landed")
+        styles = [found.style_of(name) for name in found.names]
+        for looks in ({each.colour for each in styles}, {each.symbol for each in styles}):
+            assert len(looks) == len(styles)
 
 
 def test_outcomes_of_another_task_have_different_styles() -> None:

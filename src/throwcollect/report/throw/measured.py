@@ -14,7 +14,7 @@ from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.progress_log import log_progress
 from throwcollect.report.measured import read_numbers
-from throwcollect.report.outcomes import LANDED, Outcomes
+from throwcollect.report.outcomes import Outcomes
 from throwcollect.tasks.throw.flight import flight_residual
 
 MOST_RESIDUALS = 2000
@@ -212,7 +212,7 @@ def measure_residuals(dataset: Dataset) -> Residuals:
 
 
 def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> tuple[int, ...]:
-    """Choose trials to look at: some that landed, from the nearest to the farthest, and one of some other outcomes."""
+    """Choose trials to look at: some that succeeded, by distance from near to far, and one of some other outcomes."""
     recorded = set(dataset.recorded.throws["trial"].to_pylist())
     by_distance = landed.trial[np.argsort(landed.distance_m, kind="stable")].tolist()
     usable = [trial for trial in by_distance if trial in recorded]
@@ -221,6 +221,6 @@ def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> t
     others = (
         next((trial for trial in numbers[outcomes.are(name)].tolist() if trial in recorded), None)
         for name in outcomes.names
-        if name != LANDED
+        if name != outcomes.success
     )
     return (*(usable[pick] for pick in picks), *[trial for trial in others if trial is not None][:_MOST_OTHERS])

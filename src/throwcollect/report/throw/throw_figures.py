@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,8 +21,9 @@ from throwcollect.report.figures import (
     single_precision,
 )
 from throwcollect.report.measured import choose_points
-from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
+from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.throw.measured import CellAxis, Landings, Residuals
+from throwcollect.robots.surroundings import BodyLook
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 _SCALE = "Viridis"
@@ -35,20 +37,34 @@ FLOOR_M = 1e-17
 """Smaller residuals are drawn as this value, as 0 has no place on a logarithmic axis."""
 
 
-def draw_landing_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
-    """Draw landings from above, coloured by release speed."""
+def draw_landing_map(landings: Landings, outcomes: Outcomes, bodies: Sequence[BodyLook] = ()) -> go.Figure:
+    """Draw landings from above, coloured by release speed, or by outcome if there is more to success than a landing."""
     figure = _draw_coloured(
         landings,
         outcomes,
         columns=("x_m", "y_m", "speed_mps"),
         hover="x %{x:.3f} m, y %{y:.3f} m, released at %{marker.color:.2f} m/s",
-        scale_title="release speed [m/s]",
+        scale_title="release speed [m/s]" if outcomes.success == LANDED else None,
     )
+    _draw_bodies(figure, bodies, "above_m")
     robot = {"symbol": "star-triangle-up", "size": 13, "color": NEUTRAL, "line": {"width": 1, "color": "white"}}
     figure.add_scatter(x=[0], y=[0], mode="markers", name="robot", marker=robot, hovertemplate="robot<extra></extra>")
     figure.update_xaxes(title="x, forward [m]", constrain="domain")
     figure.update_yaxes(title="y, left [m]", scaleanchor="x", constrain="domain")
     return figure.update_layout(height=460)
+
+
+def _draw_bodies(figure: go.Figure, bodies: Sequence[BodyLook], outline: str) -> None:
+    """Draw one of the outlines of bodies behind all that a figure shows; the more of a name, the paler each is."""
+    shown, same = len(figure.data), Counter(body.name for body in bodies)
+    for body in bodies:
+        first, *others = getattr(body, outline)
+        x, y = zip(first, *others, first, strict=True)
+        red, green, blue = bytes.fromhex(body.color[1:])
+        fill = f"rgba({red}, {green}, {blue}, {0.2 / same[body.name]:.3f})"
+        look = {"mode": "lines", "fill": "toself", "fillcolor": fill, "line": {"color": body.color, "width": 1}}
+        figure.add_scatter(x=x, y=y, **look, name=body.name, showlegend=False, hoverinfo="skip")
+    figure.data = (*figure.data[shown:], *figure.data[:shown])
 
 
 def draw_release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
@@ -66,44 +82,42 @@ def draw_release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
 
 
 def _draw_coloured(
-    landings: Landings, outcomes: Outcomes, *, columns: tuple[str, str, str], hover: str, scale_title: str
+    landings: Landings, outcomes: Outcomes, *, columns: tuple[str, str, str], hover: str, scale_title: str | None
 ) -> go.Figure:
-    """Draw points in one colour scale, each outcome with its own marker."""
+    """Draw points in one colour scale, or without its title in the colours of outcomes; each of these has a marker."""
     shown = landings[choose_points(len(landings))]
     x, y, colour = (getattr(shown, name) for name in columns)
     kind = go.Scattergl if len(shown) > _MOST_SVG_POINTS else go.Scatter
     size = 8 if len(shown) <= 300 else 6 if len(shown) <= 1500 else 4
     figure = go.Figure()
     present = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
-    # Throws that landed are drawn last, on top of the others, because the colour scale is mostly about them.
+    # Throws that succeeded are drawn last, on top of the others, because the colour scale is mostly about them.
     for code, name in reversed(present):
-        own, style = shown.code == code, style_of(name)
-        outline = {"size": 1.4 * size, "line": {"color": style.colour, "width": size / 5}} if name != LANDED else {}
+        own, style = shown.code == code, outcomes.style_of(name)
+        look: dict[str, object] = {"color": style.colour}
+        if scale_title is not None:
+            look = {"color": single_precision(colour[own]), "coloraxis": "coloraxis"}
+            if name != outcomes.success:
+                look |= {"size": 1.4 * size, "line": {"color": style.colour, "width": size / 5}}
         figure.add_trace(
             kind(
                 x=single_precision(x[own]),
                 y=single_precision(y[own]),
                 customdata=shown.trial[own],
                 mode="markers",
-                marker={
-                    "symbol": style.symbol,
-                    "size": size,
-                    **outline,
-                    "color": single_precision(colour[own]),
-                    "coloraxis": "coloraxis",
-                },
+                marker={"symbol": style.symbol, "size": size, **look},
                 showlegend=False,
                 hovertemplate=f"trial %{{customdata}}<br>{hover}<extra>{in_words(name)}</extra>",
             )
         )
     # The legend has markers of its own, because the points have no single colour.
     for _, name in present:
-        style = style_of(name)
-        look = {"symbol": style.symbol, "color": NEUTRAL}
-        if name != LANDED:
+        style = outcomes.style_of(name)
+        look = {"symbol": style.symbol, "color": style.colour if scale_title is None else NEUTRAL}
+        if scale_title is not None and name != outcomes.success:
             look = {"symbol": f"{style.symbol}-open", "color": style.colour}
         figure.add_scatter(x=[None], y=[None], mode="markers", name=in_words(name), marker={**look, "size": 9})
-    axis = {"colorscale": _SCALE, "colorbar": _colour_bar(scale_title)}
+    axis = {} if scale_title is None else {"colorscale": _SCALE, "colorbar": _colour_bar(scale_title)}
     return figure.update_layout(coloraxis=axis, legend=LEGEND_ABOVE)
 
 
@@ -160,9 +174,13 @@ def draw_residuals(residuals: Residuals) -> go.Figure:
     return figure.update_layout(height=300, bargap=0)
 
 
-def draw_ball_views(throws: Sequence[Throw], landing_height_m: float | None) -> tuple[go.Figure, go.Figure]:
+def draw_ball_views(
+    throws: Sequence[Throw], outcomes: Outcomes, landing_height_m: float | None, bodies: Sequence[BodyLook] = ()
+) -> tuple[go.Figure, go.Figure]:
     """Draw paths of the ball as seen from the robot's right, and from above."""
-    side, above = _draw_paths(throws, 2), _draw_paths(throws, 1)
+    side, above = _draw_paths(throws, outcomes, 2), _draw_paths(throws, outcomes, 1)
+    _draw_bodies(side, bodies, "side_m")
+    _draw_bodies(above, bodies, "above_m")
     if landing_height_m is not None:
         side.add_hline(y=landing_height_m, line={"color": NEUTRAL, "width": 1})
     side.update_yaxes(title="z, up [m]")
@@ -170,14 +188,14 @@ def draw_ball_views(throws: Sequence[Throw], landing_height_m: float | None) -> 
     return side, above
 
 
-def _draw_paths(throws: Sequence[Throw], axis: int) -> go.Figure:
+def _draw_paths(throws: Sequence[Throw], outcomes: Outcomes, axis: int) -> go.Figure:
     """Draw paths of the ball: x against another coordinate."""
     letter = "xyz"[axis]
     figure = go.Figure()
-    landed = [throw.trial for throw in throws if throw.outcome == LANDED]
+    landed = [throw.trial for throw in throws if throw.outcome == outcomes.success]
     for throw in throws:
-        name, colour = f"trial {throw.trial}, {in_words(throw.outcome)}", style_of(throw.outcome).colour
-        if throw.outcome == LANDED:
+        name, colour = f"trial {throw.trial}, {in_words(throw.outcome)}", outcomes.style_of(throw.outcome).colour
+        if throw.outcome == outcomes.success:
             name = f"trial {throw.trial}"
             colour = _SHADES[landed.index(throw.trial) * (len(_SHADES) - 1) // max(len(landed) - 1, 1)]
         x, y = (single_precision(throw.ball.position[:, each]) for each in (0, axis))

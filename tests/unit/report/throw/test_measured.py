@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.throw.measured import choose_examples, measure_residuals, read_landings
 from throwcollect.report.throw.throw_sections import report_throws
@@ -50,3 +52,46 @@ def test_the_report_on_a_derived_dataset_shows_throws_of_its_own_trials(collecte
     report = report_throws(dataset, Outcomes.of(dataset["outcome"].tolist()))
     (examples, _) = report.episodes
     assert str(examples.blocks[1]).startswith(("Joints of trial 4: measured", "Joints of trial 6: measured"))
+
+
+def rest_in_bin(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """The balls of even trials rest in the bin."""
+    if header.trial % 2:
+        return samples, header
+    samples.ball_position[-1], samples.ball_linear_velocity[-1] = (1.6, -0.25, 0.05), 0.0
+    return samples, replace(header, end_reason="rest")
+
+
+def test_a_report_on_throws_into_a_bin_shows_the_bin_and_which_throws_stayed_in_it(
+    make_collection: Any, tmp_path: Path
+) -> None:
+    swept = {"task.bin.y_m": {"values": [-0.2, -0.3, 9.0]}, "task.duration_s": {"values": [0.9, 1.0]}}
+    pole = {"shape": "cylinder", "position_m": [1, 2, 0.5], "radius_m": 0.1, "length_m": 1, "color": "#3f6fb0"}
+    settings = {
+        "trials": None,
+        "task": {"name": "throw_into"},
+        "scene": {"bodies": {"pole": pole}},
+        "sweep": {"sampler": "grid", "parameters": swept},
+    }
+    dataset = Dataset.open(make_collection(settings).collect(tmp_path / "a", change=rest_in_bin))
+    outcomes = Outcomes.of(dataset["outcome"].tolist(), success="in_bin")
+    assert outcomes.counts["in_bin"] == 2
+    report = report_throws(dataset, outcomes)
+    assert (report.tiles[1].value, report.tiles[1].label) == ("33.3 %", "in bin")
+    landing, _ = report.results
+    assert landing.text.startswith(
+        "2 of 6 throws stayed in the bin; the balls crossed the plane of the rim at z = 0.25 m"
+    )
+    (above, *_), (side, top) = landing.blocks[0], report.episodes[0].blocks[0]
+    assert above.text == "Bodies differ from throw to throw; those of a few throws are drawn."
+    for panel, column in ((above, 1), (side, 2), (top, 1)):
+        drawn = [trace for trace in panel.figure.data if trace.fill == "toself"]
+        # Outlines lie behind everything else.
+        assert drawn == list(panel.figure.data[: len(drawn)])
+        assert [trace.name for trace in drawn].count("pole") == 1
+        assert [trace.name for trace in drawn].count("bin_floor") == 3
+        (pole_drawn,) = (trace for trace in drawn if trace.name == "pole")
+        assert (max(pole_drawn.x), max(pole_drawn.y)) == pytest.approx((1.1, 2.1 if column == 1 else 1.0), abs=1e-3)
+        assert pole_drawn.fillcolor == "rgba(63, 111, 176, 0.200)"
+    legend = {trace.name: trace.marker.color for trace in above.figure.data if trace.showlegend is not False}
+    assert legend["in bin"] == outcomes.style_of("landed").colour
