@@ -18,6 +18,7 @@ from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.robots.description import full_description
 from throwcollect.robots.imported import list_files
 from throwcollect.robots.robot import Robot
+from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.runs.component_container import DESCRIPTION
 from throwcollect.runs.records import Records, Run
 
@@ -49,12 +50,14 @@ class SceneFacts:
         landing_height_m: Height of the plane in which throws land [m]; None if that varies.
         target_distance_m: Least and greatest distance from the robot's base at which throws are to land [m]; None
             without such a target.
+        bodies: Bodies of scene and task; a trial in which they differ has bodies of its own.
     """
 
     base_height_m: float
     mount_height_m: float
     landing_height_m: float | None
     target_distance_m: tuple[float, float] | None
+    bodies: tuple[BodyLook, ...]
 
 
 def scene_of(run: Run) -> SceneFacts:
@@ -67,6 +70,7 @@ def scene_of(run: Run) -> SceneFacts:
         config.robot.mount_height_m,
         None if varies else config.scene.landing_height_m,
         None if distance is None else (distance.min, distance.max),
+        looks_of(config),
     )
 
 

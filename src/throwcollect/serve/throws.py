@@ -8,6 +8,7 @@ import struct
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.directory import PLAN, config_path
 from throwcollect.episode.episode_message import Episode, unpack
 from throwcollect.errors import ThrowcollectError
+from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.ros import Node
 from throwcollect.ros.msg import UInt8MultiArray
 from throwcollect.ros.nodes.coordinator.showing import SHOWN_QOS, make_shown_topic
@@ -31,14 +33,18 @@ _LENGTH = struct.Struct("<I")
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
-def encode_throw(episode: Episode, simulation: str, values: Mapping[str, float]) -> bytes:
+def encode_throw(
+    episode: Episode, simulation: str, values: Mapping[str, float], bodies: tuple[BodyLook, ...] | None
+) -> bytes:
     """Encode an episode for the page, with the name of its simulation and the swept values by their dotted keys.
+
+    The bodies are those of this trial, or None if they are not known.
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
         joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
         all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``,
-        ``landing`` and ``values``.
+        ``landing``, ``values`` and ``bodies``.
     """
     samples = episode.samples()
     result = json.loads(episode.result)
@@ -53,6 +59,7 @@ def encode_throw(episode: Episode, simulation: str, values: Mapping[str, float])
         "rate_hz": NS_PER_S / spacing_ns,
         "landing": None if None in landing else landing,
         "values": dict(values),
+        "bodies": None if bodies is None else [asdict(body) for body in bodies],
     }
     text = json.dumps(header).encode()
     # In JavaScript, a typed array has to begin at a multiple of the size of its numbers.
@@ -61,21 +68,22 @@ def encode_throw(episode: Episode, simulation: str, values: Mapping[str, float])
     return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))
 
 
-class PlannedValues:
-    """Swept values of the trials of a run; its plan is read when they are first needed, and again when it has grown."""
+class PlannedTrials:
+    """Values and bodies of the trials of a run; its plan is read when first needed, and when it has grown."""
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._plan: Plan | None = None
 
-    def of(self, trial: int) -> Mapping[str, float]:
-        """Swept values of a trial, by dotted key; empty if the plan cannot be read on this machine."""
+    def of(self, trial: int) -> tuple[Mapping[str, float], tuple[BodyLook, ...] | None]:
+        """Swept values of a trial, by dotted key, and its bodies; none if the plan cannot be read on this machine."""
         try:
             if self._plan is None or trial not in self._plan.trials.numbers:
                 self._plan = Plan.read(self._directory / PLAN, load(config_path(self._directory)))
-            return self._plan.trial(trial).values
+            planned = self._plan.trial(trial)
+            return planned.values, looks_of(self._plan.config_of(planned))
         except (ThrowcollectError, IndexError):
-            return {}
+            return {}, None
 
 
 class ThrowWatch:
@@ -86,7 +94,7 @@ class ThrowWatch:
         self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
         self._is_over = threading.Event()
         self._newest: bytes | None = None
-        self._values = PlannedValues(run.place.directory)
+        self._planned = PlannedTrials(run.place.directory)
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
@@ -136,7 +144,7 @@ class ThrowWatch:
             episode = unpack(message, Signer.of_key(self._run.key))
             if not isinstance(episode, Episode) or not episode.result:
                 return
-            frame = encode_throw(episode, simulation, self._values.of(episode.header.trial))
+            frame = encode_throw(episode, simulation, *self._planned.of(episode.header.trial))
         except ThrowcollectError:
             # Another node has published something else on this topic.
             return

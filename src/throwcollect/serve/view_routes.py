@@ -44,7 +44,7 @@ def make_description_routes(instances: Instances) -> APIRouter:
 
     @router.get("/instances/{instance}/scene")
     def scene(instance: str) -> SceneFacts:
-        """Heights and distances in the scene of a run, which viewers need besides the description of the robot."""
+        """Heights, distances and bodies in the scene of a run, which viewers need besides the robot."""
         return scene_of(instances.get(instance))
 
     @router.put("/instances/{instance}/urdf", status_code=202, openapi_extra=_XML)

@@ -11,11 +11,19 @@ const makeFake = (known) => new Proxy(known, { get: (own, name) => (name in own 
 const arcs = [];
 /** How many lines have been drawn. */
 let lines = 0;
+/** @type {number[][][]} corners of each polygon that was filled */
+const polygons = [];
+let corners = [];
 const pen = makeFake({
+  beginPath: () => {
+    corners = [];
+  },
+  fill: () => corners.length && polygons.push(corners),
   arc: (x, y, radius) => arcs.push([x, y, radius]),
   measureText: () => ({ width: 10 }),
-  lineTo: () => {
+  lineTo: (x, y) => {
     lines += 1;
+    corners.push([x, y]);
   },
 });
 
@@ -233,6 +241,38 @@ test("the grid of the map has some lines, however far away a target is", () => {
     map.paint(makeElement(), 300, 300, 1);
     assert.ok(lines > 4 && lines < 40, `${lines} lines at ${away} m`);
   }
+});
+
+test("the map has the outlines of bodies: those of the throw that is marked, if they are known", () => {
+  const map = new LandingMap(() => {});
+  const outlines = () => {
+    polygons.length = 0;
+    const { centre, scale } = map.paint(makeElement(), 300, 300, 1);
+    return polygons.map((each) => each.map(([x, y]) => [centre[0] - (y - 150) / scale, centre[1] - (x - 150) / scale].map((value) => Math.round(value * 100) / 100)));
+  };
+  const square = (x, y, size) => [[x, y], [x + size, y], [x + size, y + size], [x, y + size]];
+  map.surround([{ above_m: square(1.5, -0.5, 0.4), color: "#8a6f4d" }]);
+  assert.deepEqual(outlines(), [[[1.5, -0.5], [1.9, -0.5], [1.9, -0.1], [1.5, -0.1]]]);
+  map.mark({ landing: null, bodies: null });
+  assert.equal(outlines()[0][0][0], 1.5);
+  map.mark({ landing: null, bodies: [{ above_m: square(2, 1, 0.5), color: "#8a6f4d" }] });
+  assert.deepEqual(outlines(), [square(2, 1, 0.5)]);
+  // A hall does not make everything else tiny.
+  map.mark({ landing: null, bodies: [{ above_m: square(-20, -20, 40), color: "#8a6f4d" }] });
+  assert.ok(map.paint(makeElement(), 300, 300, 1).scale > 40);
+  map.clear();
+  assert.deepEqual(outlines(), []);
+});
+
+test("a throw stands between the bodies of its own trial", async () => {
+  const { watching, station, put } = watch(new Set());
+  await put();
+  station.trails = makeFake({});
+  station.bodies = { put: (bodies) => Object.assign(station, { stood: bodies }) };
+  const bodies = [{ name: "post" }];
+  watching.begin({ simulation: "sim_0", bodies });
+  watching.begin({ simulation: "sim_0", bodies: null });
+  assert.equal(station.stood, bodies);
 });
 
 test("the map draws a single landing among very many dropped throws", () => {

@@ -15,7 +15,9 @@ const { placeApart } = await load("places.js");
 const { describeModel } = await load("model_map.js");
 const { describe, median, tabulate } = await load("model_words.js");
 const { Rosbridge } = await load("rosbridge.js");
-const { BoxGeometry, SphereGeometry } = await load("vendor/three/build/three.module.js");
+const { Bodies } = await load("bodies.js");
+const { colorOf } = await load("outcomes.js");
+const { BoxGeometry, SphereGeometry, Vector3 } = await load("vendor/three/build/three.module.js");
 
 const bytes = readFileSync(process.env.THROW);
 const thrown = () => decodeThrow(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
@@ -188,4 +190,28 @@ test("the landings that are drawn of a model are also described in words", () =>
   assert.equal(describeModel(null), "");
   const throws = [{ target: [1, 0], place: [1, 0.01] }, { target: [1, 1], place: null }];
   assert.match(describeModel({ name: "quick", reached: [[1, 0]], throws }), /^Grey: 1 .* quick .* 2 targets, .* 10 times as long; at 1 of them no throw landed\.$/);
+});
+
+test("bodies stand where the scene has them, and new ones take their place", () => {
+  const bodies = new Bodies();
+  const turn = [Math.PI / 2, 0, Math.PI / 2];
+  const common = { position_m: [1, 2, 3], rpy_rad: turn, size_m: [0.2, 0.4, 0.6], color: "#ff0000" };
+  bodies.put([{ ...common, name: "post", shape: "cylinder" }, { ...common, name: "box", shape: "box" }]);
+  const [post, box] = bodies.object.children;
+  bodies.object.updateMatrixWorld();
+  // The turn about x lays the axis of the cylinder along y, and that about z then along x.
+  const top = post.localToWorld(new Vector3(0, 0, 0.5));
+  top.toArray().forEach((value, i) => near(value, [1.3, 2, 3][i]));
+  post.geometry.computeBoundingBox();
+  post.geometry.boundingBox.max.toArray().forEach((value) => near(value, 0.5));
+  assert.equal(box.material.color.getHexString(), "ff0000");
+  bodies.put([{ ...common, name: "ball", shape: "sphere" }]);
+  assert.deepEqual(bodies.object.children.map(({ name }) => name), ["ball"]);
+});
+
+test("each outcome has a colour of its own, and every success the same", () => {
+  const throws = ["landed", "dropped", "not_released", "recaught", "self_hit", "body_hit", "limit_violated", "timeout", "tracking_failed", "lost"];
+  const names = [...throws, "wall_hit", "rim_hit", "bounced_out", "short", "beyond"];
+  assert.equal(new Set(names.map(colorOf)).size, names.length);
+  assert.equal(colorOf("in_bin"), colorOf("landed"));
 });

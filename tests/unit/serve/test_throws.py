@@ -12,14 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.unit.dataset.conftest import Collection
 from tests.unit.serve.conftest import Remember
 
+from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.episode_message import Episode
+from throwcollect.robots.surroundings import looks_of
 from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve import throws
-from throwcollect.serve.throws import PlannedValues, ThrowWatch, encode_throw
+from throwcollect.serve.throws import PlannedTrials, ThrowWatch, encode_throw
 
 _ALL: list[Any] = []
 
@@ -69,11 +72,14 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     samples = episode.samples()
     result = {"outcome": "landed", "landing_x_m": 1.0, "landing_y_m": -0.5, "landing_z_m": 0.02}
     judged = Episode(episode.header, episode.chunk, result=json.dumps(result))
-    frame = encode_throw(judged, "sim_0", {"ball.mass_kg": 0.05})
+    bodies = {"bodies": {"post": {"shape": "sphere", "radius_m": 0.1, "position_m": [1, 2, 3]}}}
+    looks = looks_of(Config.model_validate({"scene": bodies}))
+    frame = encode_throw(judged, "sim_0", {"ball.mass_kg": 0.05}, looks)
     size = int.from_bytes(frame[:4], "little")
     header = json.loads(frame[4 : 4 + size])
     assert header["landing"] == [1.0, -0.5, 0.02]
     assert header["values"] == {"ball.mass_kg": 0.05}
+    assert [(each["name"], each["size_m"]) for each in header["bodies"]] == [("post", [0.2, 0.2, 0.2])]
     assert (header["trial"], header["outcome"], header["samples"]) == (0, "landed", len(samples))
     assert header["rate_hz"] == pytest.approx(1e9 / (samples.stamps_ns[1] - samples.stamps_ns[0]))
     begin = 4 + size + (-(4 + size) % 4)
@@ -83,17 +89,26 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     assert np.allclose(numbers[:joints].reshape(len(samples), -1), samples.position)
     assert np.allclose(numbers[joints:].reshape(-1, 3), samples.ball_position)
     fell = json.dumps({**result, "landing_z_m": None})
-    told = encode_throw(Episode(episode.header, episode.chunk, result=fell), "sim_0", {})
-    assert json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])["landing"] is None
+    told = encode_throw(Episode(episode.header, episode.chunk, result=fell), "sim_0", {}, None)
+    header = json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])
+    assert (header["landing"], header["bodies"]) == (None, None)
 
 
 def test_planned_values_come_from_the_plan(collected: Path, tmp_path: Path) -> None:
-    values = PlannedValues(collected)
+    planned = PlannedTrials(collected)
     for trial in Dataset.open(collected).plan.trials:
-        assert values.of(trial.number) == trial.values
-    assert set(values.of(0)) == {"task.end.arm_right_4_joint", "task.duration_s", "ball.mass_kg"}
-    assert values.of(99) == {}
-    assert PlannedValues(tmp_path).of(0) == {}
+        assert planned.of(trial.number) == (trial.values, ())
+    assert set(planned.of(0)[0]) == {"task.end.arm_right_4_joint", "task.duration_s", "ball.mass_kg"}
+    assert planned.of(99) == ({}, None)
+    assert PlannedTrials(tmp_path).of(0) == ({}, None)
+
+
+def test_a_throw_has_the_bodies_of_its_own_trial(tmp_path: Path) -> None:
+    swept = {"task.bin.x_m": {"values": [1.0, 2.0]}}
+    settings = {"trials": None, "task": {"name": "throw_into"}, "sweep": {"sampler": "grid", "parameters": swept}}
+    planned = PlannedTrials(Collection(settings).collect(tmp_path / "a"))
+    found = [planned.of(number)[1] for number in (0, 1)]
+    assert [bodies[0].position_m[0] for bodies in found if bodies] == [1.0, 2.0]
 
 
 def test_listeners_share_one_thread_until_the_last_leaves(remember: Remember, listeners: list[Any]) -> None:

@@ -16,6 +16,7 @@ from throwcollect.robots.talos import TALOS
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 URL = "/api/v1/instances"
+PARTS = ("floor", "front", "back", "right", "left")
 
 
 def test_the_scene_has_its_heights_and_the_range_of_targets(
@@ -27,17 +28,38 @@ def test_the_scene_has_its_heights_and_the_range_of_targets(
     directory.mkdir(parents=True)
     text = "name: a\ntrials: 3\nrobot: {base_height_m: 1.1}\nscene: {landing_height_m: 0.4}\n"
     (directory / "config.yaml").write_text(text)
-    known = {"base_height_m": 1.1, "mount_height_m": 0, "landing_height_m": 0.4, "target_distance_m": None}
+    plain = {"mount_height_m": 0, "bodies": []}
+    known = {"base_height_m": 1.1, "landing_height_m": 0.4, "target_distance_m": None, **plain}
     assert client.get(f"{URL}/a/scene").json() == known
     (directory / "config.yaml").write_text(f"""{text}sweep:
   parameters: {{scene.landing_height_m: {{min: 0.1, max: 0.5}}, task.duration_s: {{min: 0.9, max: 1.2}}}}
   target: {{distance_m: {{min: 0.5, max: 2.5, bins: 4}}}}
 """)
-    aimed = {"base_height_m": 1.1, "mount_height_m": 0, "landing_height_m": None, "target_distance_m": [0.5, 2.5]}
+    aimed = {"base_height_m": 1.1, "landing_height_m": None, "target_distance_m": [0.5, 2.5], **plain}
     assert client.get(f"{URL}/a/scene").json() == aimed
     (directory / "config.yaml").write_text((CONFIGS / "panda.yaml").read_text())
-    arm = {"base_height_m": 0.8, "mount_height_m": 0.8, "landing_height_m": 0.0, "target_distance_m": None}
+    arm = {"base_height_m": 0.8, "mount_height_m": 0.8, "landing_height_m": 0.0, "target_distance_m": None, "bodies": []}
     assert client.get(f"{URL}/a/scene").json() == arm
+
+
+def test_the_scene_has_the_bodies_of_scene_and_task(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+    remember("a")
+    directory = tmp_path / "datasets" / "a"
+    directory.mkdir(parents=True)
+    pole = "pole: {shape: cylinder, position_m: [1, 2, 0.5], rpy_rad: [0, 0.5, 0], radius_m: 0.1, length_m: 1}"
+    (directory / "config.yaml").write_text(f"task: {{name: throw_into, wall: {{}}}}\nscene: {{bodies: {{{pole}}}}}\n")
+    bodies = client.get(f"{URL}/a/scene").json()["bodies"]
+    assert [each["name"] for each in bodies] == ["pole", *(f"bin_{part}" for part in PARTS), "wall"]
+    outlines = {name: bodies[0].pop(name) for name in ("above_m", "side_m")}
+    assert bodies[0] == {
+        "name": "pole",
+        "shape": "cylinder",
+        "size_m": [0.2, 0.2, 1.0],
+        "position_m": [1.0, 2.0, 0.5],
+        "rpy_rad": [0.0, 0.5, 0.0],
+        "color": "#8a6f4d",
+    }
+    assert all(len(corner) == 2 for outline in outlines.values() for corner in outline)
 
 
 def test_meshes_can_be_fetched_by_digest_and_cached_for_ever(

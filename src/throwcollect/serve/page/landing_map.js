@@ -6,6 +6,8 @@ import { TARGET_COLOR, colorOf } from "./outcomes.js";
 
 const DOT_PX = 2.5;
 const MARGIN_PX = 26;
+/** Bodies are in the picture up to this distance [m], as they may be as large as a hall. */
+const BODIES_M = 3;
 /** Two lines of the grid are no closer than this. */
 const CLOSEST_PX = 25;
 /** Most landings that are drawn. If there are more, every second one is dropped, now and of all later landings. */
@@ -32,6 +34,8 @@ export class LandingMap {
   #total = 0;
   /** @type {[number, number] | null} */
   #target = null;
+  /** @type {import("./bodies.js").Body[]} */
+  #bodies = [];
   /** @type {import("./throws.js").Throw | null} */
   #newest = null;
   /** @type {number[] | null} */
@@ -54,6 +58,7 @@ export class LandingMap {
     this.#trials.clear();
     this.#newest = null;
     this.#target = null;
+    this.#bodies = [];
     this.put([], 0, {});
     this.#which = SHOWN;
   }
@@ -86,6 +91,16 @@ export class LandingMap {
     this.#target = distances;
     this.#tell();
     this.#draw();
+  }
+
+  /** @param {import("./bodies.js").Body[]} bodies that are drawn, until a throw that is marked has others */
+  surround(bodies) {
+    this.#bodies = bodies;
+    this.#draw();
+  }
+
+  get #outlines() {
+    return (this.#newest?.bodies ?? this.#bodies).map(({ above_m, color }) => ({ corners: above_m, color }));
   }
 
   /** @param {number[] | null} place of the target [m], frame world; null if there is none */
@@ -156,7 +171,9 @@ export class LandingMap {
   #frame(width, height) {
     const [chosenX, chosenY] = this.#chosen ?? [0, 0];
     // The robot is always in the picture.
-    const places = [...this.#landings, ...(this.#model?.reached ?? [])];
+    const near = (value) => Math.min(Math.max(value, -BODIES_M), BODIES_M);
+    const corners = this.#outlines.flatMap((each) => each.corners.map((corner) => corner.map(near)));
+    const places = [...this.#landings, ...(this.#model?.reached ?? []), ...corners];
     const [x0, x1] = range([...places.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1, chosenX]);
     const [y0, y1] = range([...places.map(([, y]) => y), -0.5, 0.5, chosenY]);
     const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
@@ -186,6 +203,7 @@ export class LandingMap {
     const placed = this.#landings;
     const { at, scale, centre } = this.#frame(width, height);
     drawGrid(pen, style, at, scale, { width, height });
+    for (const outline of this.#outlines) drawOutline(pen, at, outline);
     drawRobot(pen, style, at, scale);
     if (this.#model) drawModel(pen, style, at, this.#model);
     if (this.#target) drawTarget(pen, style, at, scale, this.#target);
@@ -261,6 +279,18 @@ function stroke(pen, from, to) {
   pen.beginPath();
   pen.moveTo(...from);
   pen.lineTo(...to);
+  pen.stroke();
+}
+
+function drawOutline(pen, at, { corners, color }) {
+  pen.beginPath();
+  for (const corner of corners) pen.lineTo(...at(...corner));
+  pen.closePath();
+  pen.fillStyle = pen.strokeStyle = color;
+  pen.lineWidth = 1;
+  pen.globalAlpha = 0.2;
+  pen.fill();
+  pen.globalAlpha = 1;
   pen.stroke();
 }
 

@@ -5,11 +5,18 @@ export const TARGET_COLOR = "#d6246e";
 
 const COLORS = {
   landed: "#1f9e77",
+  in_bin: "#1f9e77",
   dropped: "#d95f02",
   not_released: "#7570b3",
   recaught: "#e7298a",
   self_hit: "#c5352f",
   limit_violated: "#b8860b",
+  body_hit: "#7f9c1f",
+  wall_hit: "#b04ac0",
+  rim_hit: "#00a2b3",
+  bounced_out: "#ff8f6b",
+  short: "#d4b106",
+  beyond: "#6a4fd0",
   timeout: "#4a90d9",
   tracking_failed: "#a0522d",
   lost: "#808080",

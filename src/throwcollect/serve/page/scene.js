@@ -5,6 +5,7 @@ import {
   SphereGeometry, Vector3, WebGLRenderer,
 } from "./vendor/three/build/three.module.js";
 import { OrbitControls } from "./vendor/three/examples/jsm/controls/OrbitControls.js";
+import { Bodies } from "./bodies.js";
 import { makeMarker } from "./marker.js";
 import { Trails } from "./trails.js";
 
@@ -31,6 +32,7 @@ const SPACING_M = 1.5;
 export class Station {
   group = new Group();
   trails = new Trails();
+  bodies = new Bodies();
   /** @type {import("./robot.js").Robot | null} */
   robot = null;
 
@@ -39,7 +41,7 @@ export class Station {
     this.ball.visible = false;
     this.target = makeMarker();
     this.target.visible = false;
-    this.group.add(this.ball, this.trails.object, this.target);
+    this.group.add(this.ball, this.trails.object, this.bodies.object, this.target);
   }
 
   /** @param {import("./robot.js").Robot} robot takes the place of the one before, in its posture */
@@ -66,6 +68,7 @@ export class Station {
 
   dispose() {
     this.trails.clear();
+    this.bodies.clear();
     this.robot?.dispose();
     this.group.removeFromParent();
     this.ball.geometry.dispose();
@@ -93,6 +96,8 @@ export class View {
   room = new Group();
   /** @type {number[] | null} */
   #target = null;
+  /** @type {import("./bodies.js").Body[]} */
+  #bodies = [];
   #isInRoom = false;
   #scene = new Scene();
   #camera = new PerspectiveCamera(38, 1, 0.05, 60);
@@ -180,6 +185,7 @@ export class View {
       if (this.stations.has(name)) continue;
       const station = new Station();
       station.setTarget(this.#target);
+      station.bodies.put(this.#bodies);
       this.stations.set(name, station);
       this.world.add(station.group);
     }
@@ -191,6 +197,7 @@ export class View {
     for (const station of this.stations.values()) station.dispose();
     this.stations.clear();
     this.shown = [];
+    this.#bodies = [];
     this.touch();
   }
 
@@ -198,6 +205,13 @@ export class View {
   setTarget(place) {
     this.#target = place;
     for (const station of this.stations.values()) station.setTarget(place);
+    this.touch();
+  }
+
+  /** @param {import("./bodies.js").Body[]} bodies that stand around each robot, until a throw has others */
+  setBodies(bodies) {
+    this.#bodies = bodies;
+    for (const station of this.stations.values()) station.bodies.put(bodies);
     this.touch();
   }
 

@@ -10,6 +10,7 @@
  * @property {number} rate_hz
  * @property {[number, number, number] | null} landing [m], frame world
  * @property {Record<string, unknown>} values swept keys and their values
+ * @property {import("./bodies.js").Body[] | null} bodies that stood around the robot; null if they are not known
  * @property {Float32Array} positions [rad], joints of a sample side by side
  * @property {Float32Array} ball [m], frame world, x y z of a sample side by side
  * @property {number} duration [s]

@@ -91,7 +91,9 @@ export class Watching {
 
   /** @param {import("./throws.js").Throw} shown begins to be replayed */
   begin(shown) {
-    this.view.stations.get(shown.simulation)?.trails.add(shown);
+    const station = this.view.stations.get(shown.simulation);
+    station?.trails.add(shown);
+    if (shown.bodies) station?.bodies.put(shown.bodies);
     this.map.mark(shown);
   }
 
@@ -144,6 +146,8 @@ export class Watching {
       if (scene !== null) {
         this.#scene = scene;
         this.map.aim(scene.target_distance_m);
+        this.map.surround(scene.bodies);
+        this.view.setBodies(scene.bodies);
         this.show(this.view.shown);
       }
     }
