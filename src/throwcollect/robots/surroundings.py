@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +14,19 @@ from throwcollect.config.scene import AnyBody, BoxConfig, CylinderConfig
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import HERE, BodyLink, LinkInertia, LinkShape, Placement, Vector, moments_of
 from throwcollect.engines.engine import SceneBody
+from throwcollect.reproducible_math import cos, matmul, sin
 
 Outline = tuple[tuple[float, float], ...]
-"""Corners of a polygon [m], counter-clockwise."""
+"""Corners of a polygon [m], counter-clockwise, to tenths of millimetres."""
 
 _ROUND = 24
 """Number of corners with which a circle is drawn."""
-_DIGITS = 4
-"""Digits of corners [m]: tenths of millimetres."""
 
 
 def bodies_of(config: Config) -> tuple[SceneBody, ...]:
     """Make the bodies that stand in the world of a trial: those of the scene, and those of the task."""
-    return tuple(_make_body(name, section) for name, section in _find_sections(config).items())
+    sections = {**config.scene.bodies, **config.task.bodies}
+    return tuple(_make_body(name, section) for name, section in sections.items())
 
 
 @dataclass(frozen=True)
@@ -55,53 +57,52 @@ class BodyLook:
 def looks_of(config: Config) -> tuple[BodyLook, ...]:
     """Describe how the bodies in the world of a trial look."""
     looks = []
-    for body, section in zip(bodies_of(config), _find_sections(config).values(), strict=True):
+    for name, section in {**config.scene.bodies, **config.task.bodies}.items():
+        body = _make_body(name, section)
         (shape,), (place, turn) = body.link.shapes, body.placement
         size = shape.size
         if shape.kind != "box":
             radius, *length = size
             size = (2 * radius, 2 * radius, *(length or [2 * radius]))
-        points = _find_corners(shape.kind, np.array(size)) @ _make_rotation(*turn).T + place
+        points = _turn(_find_corners(shape.kind, np.array(size)), turn) + place
         x, y, z = size
         above, side = (_find_outline(points[:, axes]) for axes in ([0, 1], [0, 2]))
-        looks.append(BodyLook(body.link.name, shape.kind, (x, y, z), place, turn, section.color, above, side))
+        looks.append(BodyLook(name, shape.kind, (x, y, z), place, turn, section.color, above, side))
     return tuple(looks)
-
-
-def _find_sections(config: Config) -> Mapping[str, AnyBody]:
-    return {**config.scene.bodies, **config.task.bodies}
 
 
 def _find_corners(kind: str, size: NDArray[np.float64]) -> NDArray[np.float64]:
     """Find points of a shape whose hull is the shape or nearly so, in its own frame [m], shape ``(n, 3)``."""
-    angles = np.arange(_ROUND) * 2 * np.pi / _ROUND
-    circle, ends = np.column_stack([np.cos(angles), np.sin(angles)]), np.array([-1.0, 1.0])
     if kind == "box":
-        corners = np.stack(np.meshgrid(ends, ends, ends), axis=-1).reshape(-1, 3)
-    elif kind == "cylinder":
-        corners = np.concatenate([np.column_stack([circle, np.full(_ROUND, end)]) for end in ends])
-    else:
-        # Parallels of the sphere, each as high as a corner of the circle.
-        corners = np.concatenate([np.column_stack([abs(r) * circle, np.full(_ROUND, z)]) for r, z in circle])
-    return corners * size / 2
+        return np.array(list(product([-1.0, 1.0], repeat=3))) * size / 2
+    angles = np.arange(_ROUND) * 2 * np.pi / _ROUND
+    circle = np.column_stack([cos(angles), sin(angles)])
+    # A sphere is drawn by parallels, one as high as each corner of the circle.
+    rings = circle if kind == "sphere" else np.array([(1.0, -1.0), (1.0, 1.0)])
+    return np.concatenate([np.column_stack([abs(r) * circle, np.full(_ROUND, z)]) for r, z in rings]) * size / 2
 
 
-def _make_rotation(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
-    """Make the matrix of rotations about the fixed axes x, y, z in this order, shape ``(3, 3)``."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    matrix: NDArray[np.float64] = about_z @ about_y @ about_x
-    return matrix
+def _turn(points: NDArray[np.float64], rpy_rad: Vector) -> NDArray[np.float64]:
+    """Turn points, shape ``(n, 3)``, about the fixed axes x, y, z in this order."""
+    turned = points.copy()
+    for angle, (one, other) in zip(rpy_rad, ((1, 2), (2, 0), (0, 1)), strict=True):
+        u, v = turned[:, [one, other]].T
+        turned[:, one] = math.cos(angle) * u - math.sin(angle) * v
+        turned[:, other] = math.sin(angle) * u + math.cos(angle) * v
+    return turned
+
+
+@cache
+def _make_directions() -> NDArray[np.float64]:
+    """Make directions all around, two degrees apart, shape ``(2, n)``; none is that of an edge of an upright box."""
+    angles = np.radians(np.arange(0.1, 360, 2))
+    return np.stack([cos(angles), sin(angles)])
 
 
 def _find_outline(points: NDArray[np.float64]) -> Outline:
     """Find the corners of the hull of points [m], shape ``(n, 2)``: those that are outermost in some direction."""
-    # None of the directions is that of an edge whose ends would be equally far, such as those of an upright box.
-    angles = np.radians(np.arange(720) / 2 + 0.1)
-    outermost = np.argmax(points @ np.stack([np.cos(angles), np.sin(angles)]), axis=0)
-    corners = [(round(x, _DIGITS), round(y, _DIGITS)) for x, y in points[outermost].tolist()]
+    outermost = np.argmax(matmul(points, _make_directions()), axis=0)
+    corners = [(round(x, 4), round(y, 4)) for x, y in points[outermost].tolist()]
     return tuple(dict.fromkeys(corners))
 
 

@@ -164,7 +164,6 @@ def _make_material(name: str, rgba: Rgba) -> ElementTree.Element:
 
 
 def _read_hex(color: str) -> Rgba:
-    """Make the numbers of a color ``#rrggbb``."""
     r, g, b = (value / 255 for value in bytes.fromhex(color[1:]))
     return r, g, b, 1.0
 
