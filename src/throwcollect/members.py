@@ -36,7 +36,10 @@ _OWN = MappingProxyType(
             "so101": "throwcollect.robots.example_robots:SO101",
             "tiago": "throwcollect.robots.example_robots:TIAGO",
         },
-        "tools": {"spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig"},
+        "tools": {
+            "spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig",
+            "claw": "throwcollect.tools.claw.claw_config:ClawConfig",
+        },
         "engines": {
             "bullet": "throwcollect.engines.bullet.bullet_engine:BulletEngine",
             "mujoco": "throwcollect.engines.mujoco.mujoco_engine:MujocoEngine",

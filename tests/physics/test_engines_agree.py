@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import pytest
 
@@ -18,9 +18,9 @@ POINTS: list[Mapping[str, float]] = [
 ]
 
 
-def throws(engine: str) -> Iterator[Throw]:
-    with Simulator("configs/quickstart.yaml", overrides=[f"sim.engine={engine}"]) as simulator:
-        yield from simulator.throw_many(POINTS)
+def throws(engine: str, config: str = "quickstart", points: Sequence[Mapping[str, float]] = POINTS) -> Iterator[Throw]:
+    with Simulator(f"configs/{config}.yaml", overrides=[f"sim.engine={engine}"]) as simulator:
+        yield from simulator.throw_many(points)
 
 
 def test_throws_of_both_engines_land_within_4_mm_of_each_other() -> None:
@@ -38,3 +38,15 @@ def test_throws_of_both_engines_land_within_4_mm_of_each_other() -> None:
             assert other[key] == pytest.approx(one[key], abs=tolerance), (key, point)
         assert one["recontacts"] == other["recontacts"] == 0
         assert one["digest"] != other["digest"]
+
+
+def test_balls_that_a_claw_lets_go_land_within_a_millimetre_of_each_other() -> None:
+    points = [{"tool.release_s": 0.62}, {"tool.release_s": 0.7}, {"tool.release_s": 0.78, "ball.mass_kg": 0.15}]
+    made = (throws(engine, "claw", points) for engine in ("bullet", "mujoco", "ballistic"))
+    for point, *same in zip(points, *made, strict=True):
+        for throw in same:
+            assert throw.row["outcome"] == "landed"
+            # The first step in which the ball is free.
+            assert throw.row["release_time_s"] == pytest.approx(point["tool.release_s"] + 0.002)
+            assert throw.row["landing_x_m"] == pytest.approx(same[0].row["landing_x_m"], abs=0.001)
+            assert throw.row["landing_y_m"] == pytest.approx(same[0].row["landing_y_m"], abs=0.001)

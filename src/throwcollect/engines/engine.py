@@ -60,11 +60,14 @@ class ToolLink:
         link: Its link in the robot's description.
         name: Its name in contacts of the ball.
         opening: Unit vector in the frame of the link; in this direction the tool is open and cannot hold the ball back.
+        seat: Centre in that frame of the ball that the tool holds until it lets go of it [m]; None if the ball lies in
+            the tool.
     """
 
     link: str
     name: str
     opening: Vector
+    seat: Vector | None = None
 
 
 @dataclass(frozen=True)
@@ -186,6 +189,7 @@ class Steps:
         stride: Steps from one sample to the next.
         drag_kgpm: Force of the air on the ball over the square of the ball's speed.
         ground_is_solid: Whether the ground stops the ball in these steps, even if that of the scene does not.
+        held: Number of the last step in which a tool that holds the ball still does; 0 if it lets go at once.
     """
 
     targets: NDArray[np.float64]
@@ -194,6 +198,7 @@ class Steps:
     stride: int
     drag_kgpm: float = 0.0
     ground_is_solid: bool = False
+    held: int = 0
 
 
 class Observer:
@@ -289,6 +294,9 @@ class Engine(ABC):
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
 
+        A ball that a tool holds (`ToolLink.seat`) moves with it, which counts as touching it, and is free from the
+        first step after `Steps.held` on, or once it has been placed elsewhere; then the tool never holds it again.
+
         Every engine moves a ball that nothing touches by the same arithmetic, which `dataset verify` repeats:
         in each step of dt, v += (g - drag_kgpm / ball_mass_kg · |v| · v) · dt, and then x += v · dt.
 
@@ -300,7 +308,7 @@ class Engine(ABC):
 
     @abstractmethod
     def place_ball(self, ball: BodyState) -> None:
-        """Set pose and velocity of the ball."""
+        """Set pose and velocity of the ball, which no tool holds then."""
 
 
 def ball_of(sample: Sample) -> BodyState:

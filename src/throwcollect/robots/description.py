@@ -95,7 +95,7 @@ def full_description(config: Config) -> str:
     The hand has no collision shapes, because its fingers reach into the tool's handle.
     """
     robot = robot_of(config)
-    key = robot, config.tool.model_dump_json()
+    key = robot, config.tool.without_release().model_dump_json()
     # Another thread may clear the dictionary at any moment.
     if (text := _written.get(key)) is None:
         if len(_written) >= _MOST_WRITTEN:

@@ -65,7 +65,7 @@ class Feasibility:
         self._dynamics = Dynamics(self._robot, self._model, {})
         self._locked: Mapping[str, float] = {}
         self._free_dynamics = self._dynamics
-        self._tool_config, self._tool = config.tool, tool_of(config)
+        self._tool_config, self._tool = config.tool.without_release(), tool_of(config)
         check_names(config, self._robot, self._tool)
         self._clearance = Clearance(self._robot, self._model, self._tool)
         self._key_of_around: object = None
@@ -177,8 +177,8 @@ class Feasibility:
 
     def _tool_of(self, config: Config) -> Tool:
         """Return the tool of a trial; if it differs from that of the previous trial, `_clearance` gets its shapes."""
-        if config.tool != self._tool_config:
-            self._tool_config, self._tool = config.tool, tool_of(config)
+        if config.tool.without_release() != self._tool_config:
+            self._tool_config, self._tool = config.tool.without_release(), tool_of(config)
             self._clearance = Clearance(self._robot, self._model, self._tool)
             self._key_of_around = None
         return self._tool

@@ -18,11 +18,12 @@ _OPENING = (1.0, 0.0, 0.0)
 def scene_of(config: Config, description: Description) -> Scene:
     """Describe the world of a trial, with the robot of a description."""
     tool = tool_of(config)
+    seat = tool.ball_seat(config.ball.radius_m) if tool.release_s is not None else None
     return Scene(
         robot=description.model,
         moving=description.moving,
         base_height_m=config.robot.base_height_m,
-        tool=ToolLink(tool.link, tool.name, _OPENING),
+        tool=ToolLink(tool.link, tool.name, _OPENING, seat),
         # If the landing plane is at height zero, the trial ends before the ball could touch the ground.
         ground_is_solid=config.scene.landing_height_m > 0,
         ball_radius_m=config.ball.radius_m,

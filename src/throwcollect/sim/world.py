@@ -128,7 +128,7 @@ class World(Observer):
         # Of `task.end`, only the names of joints count, because they say which joints are locked.
         bodies = trial.task.bodies
         key = (
-            *(trial.robot, trial.tool, trial.ball, trial.scene, trial.sim),
+            *(trial.robot, trial.tool.without_release(), trial.ball, trial.scene, trial.sim),
             *(trial.task.start, tuple(trial.task.end), bodies),
         )
         if key != self._start_key:
@@ -146,6 +146,7 @@ class World(Observer):
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
         self._ends = task_of(trial).end_rule()
         self._drag = drag_of(trial)
+        self._release_step = round((tool_of(trial).release_s or 0.0) * sim.physics_hz)
         self._motors = self._make_motors(trial)
         self._touching = self._settled.touching
         self._begin(start_ns, self._settled.sample)
@@ -180,6 +181,7 @@ class World(Observer):
             stride=self._stride,
             drag_kgpm=self._drag,
             ground_is_solid=not stop_at_end,
+            held=max(0, self._release_step - first),
         )
         with explain_failure("engines", self._name, "take steps"):
             taken = self.engine.run(steps, self)
@@ -291,20 +293,20 @@ class World(Observer):
         steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
         targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
         # The first sample is due one step after the last step, so no sample is recorded.
-        self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
+        self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1, held=steps), Observer())
         self._settled = self.engine.state
 
     def _load(self, scene: Scene, engine: str) -> None:
         self.engine.load(scene)
         self._bodies = scene.bodies
         # The robot as it was loaded stays, while only the ball is another one.
-        if scene.robot is not self._compared:
+        if scene.robot != self._compared:
             check_loaded(self.engine, engine, scene)
             self._compared = scene.robot
 
     def _describe(self, trial: Config) -> Description:
         """Describe the robot for a trial; the description of the previous trial is kept while it is the same."""
-        key = (trial.tool, find_locked_joints(trial))
+        key = (trial.tool.without_release(), find_locked_joints(trial))
         if self._described is None or self._described[0] != key:
             self._described = key, physics_description(trial)
         return self._described[1]

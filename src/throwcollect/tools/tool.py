@@ -1,8 +1,10 @@
-"""The kind of part `Tool`: a body in the robot's hand with a cup from which a ball is thrown."""
+"""The kind of part `Tool`: a body in the robot's hand from which a ball is thrown, as it lies in it or is held."""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -13,6 +15,7 @@ from pydantic import Field
 from throwcollect.config.schema import Config
 from throwcollect.members import explain_failure, load_part
 from throwcollect.pinocchio_library import pinocchio
+from throwcollect.reproducible_math import add_up
 
 Positive = Annotated[float, Field(gt=0)]
 _Numbers = tuple[float, ...]
@@ -40,6 +43,11 @@ class Tool(ABC):
     """
 
     name: str
+
+    @property
+    def release_s(self) -> float | None:
+        """Time since the start of a trial up to which the tool holds the ball [s]; None if the ball lies in it."""
+        return None
 
     @property
     def link(self) -> str:
@@ -93,6 +101,17 @@ class Tool(ABC):
         Returns:
             Slope [rad]; above zero, the way climbs and the ball stays; below zero, it goes down.
         """
+
+
+def spread_mass(mass_kg: float, boxes: Sequence[Box]) -> pinocchio.Inertia:
+    """Compute the inertia of a mass [kg] that is spread evenly over the volume of boxes."""
+    # `add_up` is used, because from Python 3.12 on `sum` rounds in another way, and the bytes of a throw depend on
+    # the inertia.
+    density = mass_kg / add_up(math.prod(box.size) for box in boxes)
+    total = pinocchio.Inertia.Zero()
+    for box in boxes:
+        total += box.placement.act(pinocchio.Inertia.FromBox(density * math.prod(box.size), *box.size))
+    return total
 
 
 def tool_of(config: Config) -> Tool:

@@ -35,7 +35,7 @@ from throwcollect.errors import ConfigError, PlanError, Problem
             "task: {trajectory: {family: dpm}}",
             ["task.trajectory.family: should be 'minimum_jerk', 'dmp' or 'file', got 'dpm'; did you mean 'dmp'?"],
         ),
-        ("tool: {name: gripper}", ["tool.name: should be 'spoon', got 'gripper'"]),
+        ("tool: {name: gripper}", ["tool.name: should be 'spoon' or 'claw', got 'gripper'"]),
         (
             "robot: {locked: torso_1_joint}",
             ["robot.locked: should be 'auto' or 'none', got 'torso_1_joint'; or should be a valid list, got"],

@@ -253,3 +253,22 @@ def test_an_engine_without_a_start_state_is_freed(engine, monkeypatch):
     with pytest.raises(ConfigError, match=r"tool\.cup_floor_radius_m"):
         World(config(sim={"engine": engine}, tool={"cup_floor_radius_m": 0.006}, ball={"radius_m": 0.005}))
     assert freed == [None]
+
+
+def test_a_claw_lets_go_at_the_time_of_each_trial_without_settling_anew(monkeypatch):
+    trials = [config(tool={"name": "claw", "release_s": release_s}) for release_s in (0.5, 0.6)]
+    world = World(trials[0])
+    monkeypatch.setattr(world.engine, "rest", lambda *_: pytest.fail("settled anew"))
+    for trial, end_ns in zip(trials, (502_000_000, 602_000_000), strict=True):
+        throw(world, trial)
+        held = world.contacts()[0]
+        assert (held.body, held.start_ns, held.end_ns) == ("claw", 0, end_ns)
+    world.close()
+
+
+def test_a_trial_follows_one_whose_claw_has_no_room_for_the_ball(world):
+    good = config(tool={"name": "claw"})
+    expected = throw(world, good)
+    with pytest.raises(ConfigError, match="has no room between the open fingers"):
+        world.reset(config(tool={"name": "claw", "opening_m": 0.04}))
+    assert same(throw(world, good), expected)

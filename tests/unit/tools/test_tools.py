@@ -46,4 +46,5 @@ def test_a_ball_rests_above_the_boxes_and_stays_in_the_upright_cup(section: Tool
         assert np.linalg.norm(np.maximum(inside, 0)) > RADIUS_M * 0.98
     safe = tool.way_out(RADIUS_M, np.array([1.0, 0.0, 0.0]))
     assert safe > 0
-    assert tool.way_out(RADIUS_M, np.array([-1.0, 0.0, 0.0])) < 0
+    # A tool that holds the ball does so at any tilt.
+    assert (tool.way_out(RADIUS_M, np.array([-1.0, 0.0, 0.0])) > 0) == (tool.release_s is not None)

@@ -37,7 +37,7 @@ class BallisticEngine(Engine):
     - At the end of each step, the arm is at the commanded positions, at the velocity that led there. Motors have no
       torques and no limits.
     - The ball moves with its seat in the tool as long as the tool pushes it. From the first step on in which the tool
-      would have to pull the ball back along its opening, the ball is free and keeps the velocity that it had.
+      would have to pull the ball back along its opening, or that lets go of it, it is free and keeps its velocity.
     - In each step, gravity and drag accelerate a free ball, which then moves at its new velocity, as in Bullet. It
       touches nothing but solid ground, where it stays.
     - The ball never spins, and nothing touches the robot.
@@ -139,7 +139,7 @@ class BallisticEngine(Engine):
             yield moment
 
     def _carry(self, steps: Steps) -> Iterator[_Moment]:
-        """Compute the ball in its seat, up to the step in which the tool would have to pull it."""
+        """Compute the ball in its seat, up to the step in which the tool would have to pull it, or lets go of it."""
         place, turn = self._tool_path.along(steps.targets[1:])
         hz = self._physics.hz
         # Joints follow their commands without delay, so the path of the seat is known for all steps at once.
@@ -152,6 +152,8 @@ class BallisticEngine(Engine):
         x, y, z = (push * matmul(turn, self._opening)[:, :, 0]).T
         pulled = np.flatnonzero(x + y + z <= 0)
         last = int(pulled[0]) if len(pulled) else len(push)
+        if self._scene.tool.seat is not None:
+            last = min(steps.held, len(push))
         for position, velocity in zip(path[1 : last + 1].tolist(), velocities[1 : last + 1].tolist(), strict=True):
             yield tuple(position), tuple(velocity), self._carried_by
 

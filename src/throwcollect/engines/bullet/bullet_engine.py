@@ -32,10 +32,12 @@ from throwcollect.engines.engine import (
     SceneBody,
     State,
     Steps,
+    ToolLink,
     ball_of,
     body_of,
     split_bodies,
 )
+from throwcollect.engines.grip import carry, find_held
 
 _ANY_BODY, _ANY_LINK = -1, -2
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -57,6 +59,10 @@ class BulletEngine(Engine):
     _forces: list[float]
     _position_gains: list[float]
     _velocity_gains: list[float]
+    _physics: Physics
+    _tool: ToolLink
+    _radius: float
+    _held: BodyState | None
 
     def __init__(self) -> None:
         self._client = connect()
@@ -87,7 +93,9 @@ class BulletEngine(Engine):
         self._names = self._scenery.names | {(each, BASE): body.link.name for each, body in self._bodies.items()}
         self._ball = load_ball(self._client, scene.ball_radius_m)
         self._moving = [number for number, body in self._bodies.items() if body.moves]
-        self._scene, self._placed = scene, tuple(part for body in scene.moving_bodies for part in body.start)
+        self._placed = tuple(part for body in scene.moving_bodies for part in body.start)
+        self._tool, self._radius = scene.tool, scene.ball_radius_m
+        self._scene = scene
 
     def describe_robot(self) -> list[LoadedLink]:
         """Describe the robot's links as Bullet has them."""
@@ -96,7 +104,7 @@ class BulletEngine(Engine):
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
         set_physics(self._client, self._scenery, self._ball, self._bodies, physics)
-        self._forces = list(physics.efforts)
+        self._physics, self._forces = physics, list(physics.efforts)
         # Bullet divides the error of a position by the time step before it multiplies it by the gain.
         self._position_gains = [physics.position_gain_per_s / physics.hz] * len(physics.efforts)
         self._velocity_gains = [physics.velocity_gain] * len(physics.efforts)
@@ -109,8 +117,10 @@ class BulletEngine(Engine):
         tool = pybullet.getLinkState(scenery.robot, scenery.tool, computeForwardKinematics=True, physicsClientId=client)
         # Fields 4 and 5 are the pose of the link's frame. Those before are of its centre of mass.
         centre, _ = pybullet.multiplyTransforms(tool[4], tool[5], seat, _UPRIGHT)
-        still = (0.0,) * len(joints)
-        self.reset(State((*joints, *still, *still, *self._placed, *centre, *_UPRIGHT, *(0.0,) * 6), frozenset()))
+        still, turn, touching = (0.0,) * len(joints), _UPRIGHT, frozenset[str]()
+        if self._tool.seat is not None:
+            turn, touching = tool[5], frozenset({self._tool.name})
+        self.reset(State((*joints, *still, *still, *self._placed, *centre, *turn, *(0.0,) * 6), touching))
 
     def reset(self, state: State) -> None:
         """Put robot and ball into a state, and leave no trace of earlier ones in the world.
@@ -130,6 +140,7 @@ class BulletEngine(Engine):
             renew_moving(client, number)
             self._place(number, body_of(numbers))
         self._touching, self._pressing = state.touching, None
+        self._hold(find_held(self._tool, state))
 
     @property
     def state(self) -> State:
@@ -159,6 +170,8 @@ class BulletEngine(Engine):
                 last_wanted = wanted
                 position, velocity = wanted
                 aim(robot, joints, mode, position, velocity, forces, position_gains, velocity_gains, client)
+            if number == steps.held:
+                self._hold(None)
             if drag:
                 # Drag is applied before every step, because Bullet forgets external forces after each.
                 self._apply_drag(drag)
@@ -167,6 +180,9 @@ class BulletEngine(Engine):
             # Bullet also lists points that are close without touching; those have no normal force (field 9).
             points = points_on(ball, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
             pressing = {(point[2], point[4]) for point in points if point[9] > 0} if points else nothing
+            if self._held is not None:
+                self._carry(self._held)
+                pressing = {*pressing, (robot, self._scenery.tool)}
             if pressing != last_pressing:
                 self._pressing = last_pressing = pressing
                 self._report_touch(number, observer)
@@ -178,12 +194,28 @@ class BulletEngine(Engine):
 
     def place_ball(self, ball: BodyState) -> None:
         """Set pose and velocity of the ball."""
+        self._hold(None)
         self._place(self._ball, ball)
 
     def _place(self, number: int, body: BodyState) -> None:
         place, turn, client = body.position, body.orientation_xyzw, self._client
         pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
         pybullet.resetBaseVelocity(number, body.linear_velocity, body.angular_velocity, physicsClientId=client)
+
+    def _hold(self, ball: BodyState | None) -> None:
+        """Let the tool hold a ball, whose mass the arm bears, or none."""
+        self._held = ball
+        if self._scenery.held is not None:
+            mass_kg = self._physics.ball_mass_kg if ball else 0.0
+            sphere = {"mass": mass_kg, "localInertiaDiagonal": [0.4 * mass_kg * self._radius**2] * 3}
+            pybullet.changeDynamics(self._scenery.robot, self._scenery.held, physicsClientId=self._client, **sphere)
+
+    def _carry(self, ball: BodyState) -> None:
+        """Move the held ball to where the tool is after a step."""
+        robot, held = self._scenery.robot, self._scenery.held
+        place = pybullet.getLinkState(robot, held, computeForwardKinematics=True, physicsClientId=self._client)
+        self._held = carry(ball, place[4], place[5], self._physics.hz)
+        self._place(self._ball, self._held)
 
     def _report_touch(self, step: int, observer: Observer) -> None:
         """Tell the observer which bodies press on the ball now, unless only other surfaces of the same bodies do."""

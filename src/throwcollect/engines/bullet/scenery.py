@@ -15,8 +15,9 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import HERE, BodyModel, LinkInertia, Vector
+from throwcollect.engines.body import BodyModel, Vector
 from throwcollect.engines.engine import GROUND, LoadedLink, Physics, Quaternion, Scene, SceneBody, body_of
+from throwcollect.engines.grip import ANY_INERTIA, HELD_LINK, add_held_link
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.native_reading import reading_natively
 
@@ -27,8 +28,6 @@ UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 BASE = -1
 """Link number of the first link of a body."""
-
-_ANY_INERTIA = LinkInertia(1.0, HERE, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
 
 _GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _MOVING_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
 """Bullet lets a pair collide if the mask of either one has the group of the other; the floor is a ground that is not
@@ -43,12 +42,14 @@ class Scenery:
         robot: Body number of the robot.
         joints: Joint numbers of the moving joints, in the order of the scene.
         tool: Link number of the tool.
+        held: Link number of the link that has the mass of a ball that the tool holds; None if it cannot hold any.
         names: Name of each surface that can press on the ball: the ground, the tool or a link of the robot.
     """
 
     robot: int
     joints: list[int]
     tool: int
+    held: int | None
     names: dict[Surface, str]
 
 
@@ -66,7 +67,7 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
     # By default Bullet computes inertias from the collision shapes.
-    robot = _load_model(client, scene.robot, (0.0, 0.0, scene.base_height_m))
+    robot = _load_model(client, add_held_link(scene.robot, scene.tool), (0.0, 0.0, scene.base_height_m))
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
     names = {(ground, BASE): GROUND, (robot, BASE): root}
@@ -82,7 +83,8 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
         if body == ground:
             group, mask = (_GROUND_GROUP, _BALL_GROUP) if scene.ground_is_solid else (_FLOOR_GROUP, 0)
         pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
-    return Scenery(robot=robot, joints=[joints[joint] for joint in scene.moving], tool=tool, names=names)
+    held = joints.get(HELD_LINK)
+    return Scenery(robot, [joints[joint] for joint in scene.moving], tool, held, names)
 
 
 def _load_model(
@@ -161,7 +163,7 @@ def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody
     numbers = {}
     for body in bodies:
         # Bullet complains of links without a mass; that of a body that never moves does not matter.
-        link = body.link if body.moves else replace(body.link, inertia=_ANY_INERTIA)
+        link = body.link if body.moves else replace(body.link, inertia=ANY_INERTIA)
         at = body_of(body.start)
         model = BodyModel(link.name, (link,))
         number = _load_model(client, model, at.position, at.orientation_xyzw, moves=body.moves)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import compress
-from operator import itemgetter
+from operator import itemgetter, or_
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import (
@@ -27,6 +28,7 @@ from throwcollect.engines.engine import (
     body_of,
     split_bodies,
 )
+from throwcollect.engines.grip import HELD_LINK, carry, find_held
 from throwcollect.engines.mujoco.contact_targets import ROLLING_ROWS, SLIDING_ROWS, aim_contacts
 from throwcollect.engines.mujoco.scenery import (
     Surface,
@@ -37,6 +39,7 @@ from throwcollect.engines.mujoco.scenery import (
     place_bodies,
     resize_ball,
     set_physics,
+    weigh_held,
 )
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
@@ -56,6 +59,8 @@ class MujocoEngine(Engine):
     _surfaces: list[Surface]
     _bounces: dict[int, float]
     _rows: int
+    _seat: int | None
+    _held: BodyState | None
     _model: mujoco.MjModel
     _data: mujoco.MjData
 
@@ -84,6 +89,8 @@ class MujocoEngine(Engine):
             raise ConfigError(f"MuJoCo cannot load the robot's description: {error}") from error
         place_bodies(self._model, scene.bodies)
         self._data = mujoco.MjData(self._model)
+        self._seat = None if scene.tool.seat is None else self._model.body(HELD_LINK).id
+        self._grip = bytes(surface.name == scene.tool.name for surface in self._surfaces)
         # Joints of the robot come first in the model, but not in the order of the scene.
         names = [self._model.joint(number).name for number in range(len(scene.moving))]
         self._columns = np.array([scene.moving.index(name) for name in names])
@@ -97,7 +104,7 @@ class MujocoEngine(Engine):
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
         self._physics = physics
-        set_physics(self._model, self._scene.bodies, physics)
+        set_physics(self._model, self._scene, physics)
         self._rows = ROLLING_ROWS if physics.ball_rolling_friction_m else SLIDING_ROWS
         self._bounces = find_bounces(self._model, self._scene.bodies, physics.ball_restitution)
         moving, first = len(self._scene.moving_bodies), 3 * len(self._places)
@@ -111,9 +118,11 @@ class MujocoEngine(Engine):
         mujoco.mj_kinematics(model, data)
         tool = data.body(self._scene.tool.link)
         centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
-        still = (0.0,) * len(joints)
+        still, turn, touching = (0.0,) * len(joints), (0.0, 0.0, 0.0, 1.0), frozenset[str]()
+        if self._scene.tool.seat is not None:
+            turn, touching = _to_xyzw(tool.xquat), frozenset({self._scene.tool.name})
         placed = [part for body in self._scene.moving_bodies for part in body.start]
-        self.reset(State((*joints, *still, *still, *placed, *centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), frozenset()))
+        self.reset(State((*joints, *still, *still, *placed, *centre, *turn, *(0.0,) * 6), touching))
 
     def reset(self, state: State) -> None:
         """Put robot and ball into a state, and leave no trace of earlier ones in the world."""
@@ -126,6 +135,7 @@ class MujocoEngine(Engine):
         for number, numbers in enumerate(split_bodies(state.sample, count), start=1):
             self._place(number, body_of(numbers))
         self._touching = state.touching
+        self._hold(find_held(self._scene.tool, state))
         self._compute_contact_forces()
 
     @property
@@ -144,8 +154,7 @@ class MujocoEngine(Engine):
         # Local names, arithmetic in place and a single loop, because every operation here costs time in every step.
         model, data, physics = self._model, self._data, self._physics
         count, hz = len(self._columns), float(physics.hz)
-        pull = np.full(count, hz * physics.position_gain_per_s)
-        brake = np.full(count, hz * physics.velocity_gain)
+        pull, brake = (np.full(count, hz * gain) for gain in (physics.position_gain_per_s, physics.velocity_gain))
         # These are views: what is written into `acceleration` and `torque` is what MuJoCo computes with.
         position, velocity = data.qpos[:count], data.qvel[:count]
         acceleration, torque = data.qacc[:count], data.qfrc_applied[:count]
@@ -155,18 +164,18 @@ class MujocoEngine(Engine):
         most = np.array(physics.efforts)[self._columns]
         least, lag = -most, model.dof_damping[:count] / hz
         pressing, nothing = data.sensordata[::_PRESS], np.zeros(len(self._surfaces))
-        presses = np.zeros(len(self._surfaces), np.bool_)
+        presses, untouched = np.zeros(len(self._surfaces), np.bool_), bytes(len(self._surfaces))
         multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
         begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
         restitution, bounces, rows = physics.ball_restitution, self._bounces, self._rows
-        untouched = presses.tobytes()
         # This equals no state of the surfaces, so the first step compares what presses with what pressed before.
         last_presses, number = b"", 0
         for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
+            if number == steps.held:
+                self._hold(None)
             begin_step(model, data)
-            # This acceleration leads in one step to the velocity of Bullet's motor: it is hz (gain (target - position)
-            # + share (target velocity - velocity)).
+            # Bullet's motor accelerates by hz (gain (target - position) + share (target velocity - velocity)).
             subtract(want, multiply(position, pull, work), work)
             subtract(work, multiply(velocity, brake, other), acceleration)
             inverse(model, data, 1, needed)
@@ -183,6 +192,8 @@ class MujocoEngine(Engine):
             end_step(model, data)
             number += 1
             now = greater(pressing, nothing, presses).tobytes() if contacts else untouched
+            if self._held is not None:
+                now = self._carry(self._held, now)
             if now != last_presses:
                 last_presses = now
                 self._report_touch(number, now, observer)
@@ -196,6 +207,7 @@ class MujocoEngine(Engine):
 
     def place_ball(self, ball: BodyState) -> None:
         """Set pose and velocity of the ball."""
+        self._hold(None)
         self._place(0, ball)
 
     def _place(self, number: int, body: BodyState) -> None:
@@ -205,6 +217,20 @@ class MujocoEngine(Engine):
         self._data.qpos[at : at + 7] = (*body.position, w, x, y, z)
         spin = _turn_back(body.orientation_xyzw, body.angular_velocity)
         self._data.qvel[by : by + 6] = (*body.linear_velocity, *spin)
+
+    def _hold(self, ball: BodyState | None) -> None:
+        """Let the tool hold a ball, whose mass the arm bears, or none."""
+        self._held = ball
+        if self._seat is not None:
+            weigh_held(self._model, is_held=ball is not None)
+
+    def _carry(self, ball: BodyState, presses: bytes) -> bytes:
+        """Move the held ball to where the tool is after a step, and return which surfaces press on it."""
+        mujoco.mj_kinematics(self._model, self._data)
+        (x, y, z), turn = self._data.xpos[self._seat].tolist(), _to_xyzw(self._data.xquat[self._seat])
+        self._held = carry(ball, (x, y, z), turn, self._physics.hz)
+        self._place(0, self._held)
+        return bytes(map(or_, presses, self._grip))
 
     def _compute_contact_forces(self) -> None:
         """Compute the contact forces on the robot that motors need in the first step, as if they had held it before."""
@@ -268,6 +294,11 @@ def _turn(orientation_xyzw: Sequence[float], vector: Sequence[float]) -> Vector:
     # With t = 2 u x v for the vector part u and the real part w, the turned vector is v + w t + u x t.
     p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     return (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p)
+
+
+def _to_xyzw(orientation_wxyz: NDArray[np.float64]) -> Quaternion:
+    w, x, y, z = orientation_wxyz.tolist()
+    return x, y, z, w
 
 
 def _turn_back(orientation_xyzw: Quaternion, vector: Vector) -> Vector:

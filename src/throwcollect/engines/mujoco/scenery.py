@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from throwcollect.engines.body import INERTIA, BodyModel, LinkShape, Placement, Vector
 from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
+from throwcollect.engines.grip import HELD_LINK, add_held_link
 from throwcollect.engines.mujoco.contact_targets import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
@@ -83,7 +84,8 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         The world, and its surfaces that can press on the ball.
     """
     try:
-        spec = _read_robot(scene.robot.rename_links({_WORLD_LINK: _STAND_IN}))
+        robot = add_held_link(scene.robot, scene.tool).rename_links({_WORLD_LINK: _STAND_IN})
+        spec = _read_robot(robot)
     except ValueError as error:
         raise ConfigError(f"MuJoCo cannot read the robot's description: {error}") from error
     world = spec.worldbody
@@ -224,6 +226,13 @@ def resize_ball(model: mujoco.MjModel, radius: float) -> None:
     model.dof_length[first + 3 : first + 6] = radius
 
 
+def weigh_held(model: mujoco.MjModel, *, is_held: bool) -> None:
+    """Give the link of the held ball the mass and the inertia of the ball, or none."""
+    link, ball = model.body(HELD_LINK).id, model.body(BALL).id
+    model.body_mass[link] = model.body_mass[ball] * is_held
+    model.body_inertia[link] = model.body_inertia[ball] * is_held
+
+
 def let_ball_hit_floor(model: mujoco.MjModel, *, floor: bool) -> None:
     """Let the ball collide with a ground that is not solid, too, or not."""
     hits = _BALL_HITS | (_FLOOR_BIT if floor else 0)
@@ -231,7 +240,7 @@ def let_ball_hit_floor(model: mujoco.MjModel, *, floor: bool) -> None:
     model.geom_conaffinity[model.geom(BALL).id] = model.body_conaffinity[model.body(BALL).id] = hits
 
 
-def set_physics(model: mujoco.MjModel, bodies: Sequence[SceneBody], physics: Physics) -> None:
+def set_physics(model: mujoco.MjModel, scene: Scene, physics: Physics) -> None:
     """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
     model.opt.timestep = 1 / physics.hz
     model.opt.iterations = physics.solver_iterations
@@ -256,7 +265,7 @@ def set_physics(model: mujoco.MjModel, bodies: Sequence[SceneBody], physics: Phy
     # A pair of shapes that is named in the model has numbers of its own.
     model.pair_solref[:], model.pair_solimp[:, :2] = (2 / physics.hz, 1.0), HARDNESS
     frictions = dict.fromkeys(range(model.ngeom), physics.surface_friction)
-    frictions |= {geom: each.friction for each in bodies for geom in _list_geoms(model, each)}
+    frictions |= {geom: each.friction for each in scene.bodies for geom in _list_geoms(model, each)}
     for pair, (one, other) in enumerate(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)):
         if sphere in (one, other):
             friction = frictions[one if other == sphere else other]
@@ -264,6 +273,8 @@ def set_physics(model: mujoco.MjModel, bodies: Sequence[SceneBody], physics: Phy
             model.pair_dim[pair] = model.geom_condim[sphere]
         else:
             model.pair_friction[pair, :2] = frictions[one] * frictions[other]
+    if scene.tool.seat is not None:
+        weigh_held(model, is_held=True)
     # Recompute the numbers that the solver derives from masses, such as those by which it scales contacts.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.pinocchio_library import pinocchio
-from throwcollect.reproducible_math import add_up
 from throwcollect.tools.spoon.spoon_config import SpoonConfig
-from throwcollect.tools.tool import Box, Tool
+from throwcollect.tools.tool import Box, Tool, spread_mass
 
 
 class Spoon(Tool):
@@ -69,13 +68,7 @@ class Spoon(Tool):
     @property
     def inertia(self) -> pinocchio.Inertia:
         """Inertia of the spoon in ``spoon_link``, with its mass spread evenly over the volume of its boxes."""
-        # `add_up` is used, because from Python 3.12 on `sum` rounds in another way, and the bytes of a throw depend on
-        # the inertia.
-        density = self._config.mass_kg / add_up(math.prod(box.size) for box in self.boxes)
-        total = pinocchio.Inertia.Zero()
-        for box in self.boxes:
-            total += box.placement.act(pinocchio.Inertia.FromBox(density * math.prod(box.size), *box.size))
-        return total
+        return spread_mass(self._config.mass_kg, self.boxes)
 
     def ball_seat(self, radius: float) -> tuple[float, float, float]:
         """Find the centre [m] of a ball that rests in the upright cup, in ``spoon_link``."""

@@ -1,0 +1,1 @@
+"""The claw: a gripper that lets go of the ball at a given time."""
