@@ -1,3 +1,5 @@
+"""How throws into a bin are judged, and the bin as boxes."""
+
 from __future__ import annotations
 
 import math
