@@ -114,10 +114,6 @@ class TaskConfig(Section):
         """Outcome of a trial that succeeded."""
         return self.until.outcome()
 
-    def shows_target(self, row: Mapping[str, object], targets: Collection[str]) -> bool:
-        """Whether a row of the table of throws shows where its motion leads, in these columns of targets."""
-        return row["outcome"] in (self.success, *self.informative) and all(row[name] is not None for name in targets)
-
     @property
     def bodies(self) -> Mapping[str, AnyBody]:
         """Bodies that the task puts into the world, by name; none by default."""

@@ -260,8 +260,10 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
     processes = limit_processes(processes, len(thrown))
     throws = world.throw_many([points[number] for number in thrown], processes=processes)
     for number, throw in log_progress(zip(thrown, throws, strict=True), len(thrown), "throw", "simulated"):
-        if world.config.task.shows_target(throw.row, learned.targets):
-            places[number] = [throw.row[column] for column in learned.targets]
+        place = [throw.row[column] for column in learned.targets]
+        task = world.config.task
+        if throw.outcome in (task.success, *task.informative) and None not in place:
+            places[number] = place
     return np.split(places, len(lists))
 
 
