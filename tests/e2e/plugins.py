@@ -20,12 +20,12 @@ PLUGINS = Path(__file__).parents[1] / "plugins"
 
 
 @contextmanager
-def process_with_plugins() -> Iterator[ProcessPoolExecutor]:
-    """A process that finds these packages, as do its children; it runs the functions that are submitted to it."""
+def process_with_plugins(packages: Path = PLUGINS) -> Iterator[ProcessPoolExecutor]:
+    """A process that finds the packages of a directory, as do its children; it runs the functions that it is given."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("PYTHONPATH", str(PLUGINS), prepend=os.pathsep)
-            patch.setattr(sys, "path", [str(PLUGINS), *sys.path])
+            patch.setenv("PYTHONPATH", str(packages), prepend=os.pathsep)
+            patch.setattr(sys, "path", [str(packages), *sys.path])
             # The process starts with its first function, while the path is patched.
             assert process.submit(call_here, "--version").result().returncode == 0
         yield process

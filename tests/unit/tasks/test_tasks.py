@@ -43,6 +43,8 @@ def test_a_task_has_the_common_outcomes_and_its_success(section: type[TaskConfig
     words = {each.value for each in make_task(section).outcomes}
     assert {LIMIT_VIOLATED, TRACKING_FAILED, LOST, fill(section).success} <= words
     assert REFUSED not in words
+    # `ThrowTask` finds these.
+    assert not section.throws or {"not_released", "dropped", "self_hit", "recaught"} <= words
 
 
 @of_every_task
