@@ -121,8 +121,9 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
         return "cannot vary from trial to trial"
     if isinstance(leaf.value, int) and not isinstance(leaf.value, bool):
         return "cannot be swept, as it is a whole number; the values of a sweep have decimals"
-    # A number that a file has may be null.
-    if not isinstance(leaf.value, float | None):
+    # The number of a motion in a file may be null. In the world, null means that something is not there.
+    is_chosen_later = leaf.value is None and leaf.key.effect is Effect.TASK
+    if not (isinstance(leaf.value, float) or is_chosen_later):
         return "cannot be swept, as it is not a number"
     joint = leaf.name.removeprefix("task.start.")
     if joint != leaf.name and joint not in config.task.end:
