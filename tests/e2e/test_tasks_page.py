@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import tomllib
 
+import throwcollect
 from tests.e2e.collection import INPROCESS, call_here
 from tests.e2e.plugins import process_with_plugins
 from throwcollect.config.loader import load
@@ -46,12 +47,17 @@ def run(text: str, call: Call, *few: str) -> dict[str, str]:
 
 
 def test_the_world_with_a_table_is_right_and_its_table_can_be_swept(tmp_path: Path) -> None:
-    (yaml,) = blocks("yaml", BODIES)
+    yaml, moving = blocks("yaml", BODIES)
     (tmp_path / "table.yaml").write_text(yaml, encoding="utf-8")
     config = load(tmp_path / "table.yaml")
     table = config.scene.bodies["table"]
     assert table.position_m[2] + table.size_m[2] / 2 == pytest.approx(config.scene.landing_height_m)
     assert "scene.bodies.table.position_m.0" in config.sweep.parameters
+    (tmp_path / "moving.yaml").write_text(moving, encoding="utf-8")
+    throw = throwcollect.Simulator(tmp_path / "moving.yaml").throw()
+    assert list(throw.bodies) == ["can"]
+    assert throw.bodies["can"].position[0] == pytest.approx((1.5, -0.25, 0.58), abs=2e-3)
+    assert {"can_x_m", "can_wz_radps"} <= set(throw.to_pandas().columns)
 
 
 def test_a_throw_that_is_aimed_at_a_bin_stays_in_it(
