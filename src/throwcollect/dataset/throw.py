@@ -35,7 +35,7 @@ from throwcollect.episode.topics import BODY_PARTS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.surroundings import bodies_of
+from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
@@ -286,7 +286,7 @@ class Throw:
         """
         header, samples = self.read_samples()
         times = samples.seconds_since(header.start_ns)
-        moving = [body.link.name for body in bodies_of(self._config) if body.moves]
+        moving = moving_bodies_of(self._config)
         parts = (np.split(samples.bodies[:, number], BODY_PARTS, axis=1) for number in range(len(moving)))
         return {name: Ball(times, samples.stamps_ns, *each) for name, each in zip(moving, parts, strict=True)}
 

@@ -20,7 +20,7 @@ from throwcollect.episode.topics import (
     transforms,
 )
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.surroundings import bodies_of
+from throwcollect.robots.surroundings import moving_bodies_of
 
 ROBOT_DESCRIPTION_ID = 1
 TF_STATIC_ID = 2
@@ -142,12 +142,12 @@ class Channels:
 def _make_topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     chosen, robot = config.record.topics, robot_of(config)
     topics = {JOINT_STATES_ID: joint_states(robot.joints), BALL_ODOMETRY_ID: ball_odometry()}
-    moving = [body.link.name for body in bodies_of(config) if body.moves]
-    topics |= {FIRST_BODY_ID + number: body_odometry(name, number) for number, name in enumerate(moving)}
+    bodies = moving_bodies_of(config)
+    topics |= {FIRST_BODY_ID + number: body_odometry(name, number) for number, name in enumerate(bodies)}
     if "clock" in chosen:
         topics[_CLOCK_ID] = clock()
     if "tf" in chosen:
-        topics[_TF_ID] = transforms(frames.moving, robot.joints)
+        topics[_TF_ID] = transforms(frames.moving, robot.joints, bodies)
     if "controller_state" in chosen:
         moved = {robot.controller_of(joint) for joint in config.task.end}
         # All controllers are counted, so that each has the same number in every dataset, whichever ones are recorded.

@@ -44,6 +44,10 @@ class Samples:
     ball_angular_velocity: NDArray[np.float64]
     bodies: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 13)))
 
+    def __post_init__(self) -> None:
+        if not self.bodies.size:
+            object.__setattr__(self, "bodies", np.zeros((len(self), 0, 13)))
+
     def __len__(self) -> int:
         return len(self.stamps_ns)
 

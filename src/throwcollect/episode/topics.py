@@ -202,15 +202,17 @@ def _fill_clock(rows: Rows, samples: Samples, _: SetPoints) -> None:
     put_stamps(rows, "clock", samples.stamps_ns)
 
 
-def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
-    """``/tf``: tf2_msgs/TFMessage with the ball in world and every frame that a joint moves."""
+def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str], bodies: Sequence[str] = ()) -> Topic:
+    """``/tf``: tf2_msgs/TFMessage with ball and moving bodies in world, and every frame that a joint moves."""
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]
-    pairs = [(WORLD, BALL, (0.0, 0.0, 0.0)), *((frame.parent, frame.child, frame.translation) for frame in frames)]
+    free = [(WORLD, name, (0.0, 0.0, 0.0)) for name in (BALL, *bodies)]
+    pairs = [*free, *((frame.parent, frame.child, frame.translation) for frame in frames)]
     message = get_message(kind)(transforms=[_make_transform(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
     variable = [f"transforms.{n}.{path}" for n in range(len(pairs)) for path in (*_STAMP, "transform.rotation")]
     # The translations of frames that joints turn stand in the template.
-    moved = [0, *(number for number, frame in enumerate(frames, start=1) if frame.slides)]
+    slides = (number for number, frame in enumerate(frames, start=len(free)) if frame.slides)
+    moved = [*range(len(free)), *slides]
     layout = MessageLayout(message, [*variable, *(f"transforms.{n}.transform.translation" for n in moved)])
 
     def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
@@ -218,7 +220,11 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
             put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
         rows["transforms.0.transform.translation"] = samples.ball_position
         rows["transforms.0.transform.rotation"] = samples.ball_orientation_xyzw
-        for number, (frame, column) in enumerate(zip(frames, columns, strict=True), start=1):
+        for number in range(len(bodies)):
+            position, rotation, *_velocities = np.split(samples.bodies[:, number], BODY_PARTS, axis=1)
+            rows[f"transforms.{number + 1}.transform.translation"] = position
+            rows[f"transforms.{number + 1}.transform.rotation"] = rotation
+        for number, (frame, column) in enumerate(zip(frames, columns, strict=True), start=len(free)):
             position = samples.position[:, column]
             if frame.slides:
                 rows[f"transforms.{number}.transform.translation"] = frame.translation_at(position)

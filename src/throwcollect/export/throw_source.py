@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import index
 from pathlib import Path
 
@@ -16,13 +17,16 @@ from throwcollect.arguments import refuse_argument
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.trajectories import name_components
+from throwcollect.dataset.trajectories import BALL_COMPONENTS
+from throwcollect.engines.engine import BODY_NUMBERS
 from throwcollect.episode.record import Samples
+from throwcollect.episode.topics import BALL, BODY_PARTS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.progress_log import ProgressLog
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
+from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.units import NS_PER_S, ascii_unit, name_sliding, unit_of_name
@@ -74,7 +78,11 @@ class Signal:
 
 
 def list_signals(
-    joints: Sequence[str], moving: Sequence[str], targets: Sequence[TargetColumn], sliding: Collection[str] = ()
+    joints: Sequence[str],
+    moving: Sequence[str],
+    targets: Sequence[TargetColumn],
+    sliding: Collection[str] = (),
+    bodies: Sequence[str] = (),
 ) -> tuple[Signal, ...]:
     """Describe all signals of an exported throw; those of targets have the same value in all its samples.
 
@@ -94,12 +102,7 @@ def list_signals(
         ),
         _describe_joints("command_velocity_radps", "Commanded velocities.", moving, sliding),
         _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving, sliding),
-        _describe_ball("ball_position_m", "Ball centre in world.", "ball_position", "xyz"),
-        _describe_ball("ball_orientation_xyzw", "Unit quaternion, ball to world.", "ball_orientation_xyzw", "xyzw"),
-        _describe_ball("ball_velocity_mps", "Velocity of the ball in world.", "ball_velocity", "xyz"),
-        _describe_ball(
-            "ball_angular_velocity_radps", "Angular velocity of the ball in world.", "ball_angular_velocity", "xyz"
-        ),
+        *(signal for body in (BALL, *bodies) for signal in _describe_body(body)),
         *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
     )
 
@@ -113,9 +116,19 @@ def _describe_joints(
     return Signal(name, description, components, each, f"<joint>_{ending}")
 
 
-def _describe_ball(name: str, description: str, column: str, axes: str) -> Signal:
-    components = name_components(column, ())
-    return Signal(name, description, components, ", ".join(axes), ", ".join(components))
+_BODY_SIGNALS = {
+    "position_m": ("Centre of the {} in world.", "position", "xyz"),
+    "orientation_xyzw": ("Unit quaternion, {} to world.", "orientation_xyzw", "xyzw"),
+    "velocity_mps": ("Velocity of the {} in world.", "velocity", "xyz"),
+    "angular_velocity_radps": ("Angular velocity of the {} in world.", "angular_velocity", "xyz"),
+}
+
+
+def _describe_body(body: str) -> Iterator[Signal]:
+    """Describe the signals of the ball, or of another body that moves, by its name."""
+    for ending, (description, quantity, axes) in _BODY_SIGNALS.items():
+        components = tuple(f"{body}_{component}" for component in BALL_COMPONENTS[quantity])
+        yield Signal(f"{body}_{ending}", description.format(body), components, ", ".join(axes), ", ".join(components))
 
 
 Signals = Mapping[str, NDArray[np.float64]]
@@ -196,7 +209,13 @@ class ExportSource:
             dataset,
             rate_hz,
             targets,
-            list_signals(dataset.joints, dataset.moving_joints, targets, robot_of(dataset.config).sliding),
+            list_signals(
+                dataset.joints,
+                dataset.moving_joints,
+                targets,
+                robot_of(dataset.config).sliding,
+                moving_bodies_of(dataset.config),
+            ),
             throws,
             dataset.throws.drop_columns(list(_PLACES)),
             ProgressLog(len(dataset.throws), "trial", "exported"),
@@ -220,6 +239,9 @@ class ExportSource:
             samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
             trajectory = trajectory_of(self.dataset.config_of(throw))
             signals = _compute_signals(samples, trajectory, header.start_ns)
+            for number, body in enumerate(moving_bodies_of(config)):
+                parts = np.split(samples.bodies[:, number], BODY_PARTS, axis=1)
+                signals |= dict(zip((f"{body}_{ending}" for ending in _BODY_SIGNALS), parts, strict=True))
             signals |= {each.name: np.full((len(samples), 1), throw[each.name]) for each in self.targets}
             yield ThrowSeries(throw, throw.outcome == config.task.success, signals, trajectory)
             self.progress.note(throw.trial + 1)
@@ -271,14 +293,41 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
     # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
-    columns = {**vars(samples), "ball_orientation_xyzw": _remove_flips(samples.ball_orientation_xyzw)}
-    del columns["stamps_ns"]
-    found = {name: _interpolate_linearly(column, places) for name, column in columns.items()}
-    for name, slopes in {"position": "velocity", "ball_position": "ball_linear_velocity"}.items():
-        found[name] = _interpolate_cubically(columns[name], columns[slopes] / recorded_hz, places)
-    found["ball_orientation_xyzw"] /= np.linalg.norm(found["ball_orientation_xyzw"], axis=1, keepdims=True)
+    elsewhere = partial(_resample_body, places=places, recorded_hz=recorded_hz)
+    ball = (
+        samples.ball_position,
+        samples.ball_orientation_xyzw,
+        samples.ball_linear_velocity,
+        samples.ball_angular_velocity,
+    )
+    names = ("ball_position", "ball_orientation_xyzw", "ball_linear_velocity", "ball_angular_velocity")
+    found = dict(zip(names, elsewhere(*ball), strict=True))
+    numbers = range(samples.bodies.shape[1])
+    bodies = [np.hstack(elsewhere(*np.split(samples.bodies[:, each], BODY_PARTS, axis=1))) for each in numbers]
+    found["bodies"] = np.stack(bodies, axis=1) if bodies else np.zeros((count, 0, BODY_NUMBERS))
+    found["position"] = _interpolate_cubically(samples.position, samples.velocity / recorded_hz, places)
+    found |= {name: _interpolate_linearly(getattr(samples, name), places) for name in ("velocity", "effort")}
     elapsed_ns = np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64)
     return Samples(stamps_ns=samples.stamps_ns[0] + elapsed_ns, **found)
+
+
+def _resample_body(
+    position: NDArray[np.float64],
+    orientation: NDArray[np.float64],
+    linear: NDArray[np.float64],
+    angular: NDArray[np.float64],
+    *,
+    places: NDArray[np.float64],
+    recorded_hz: int,
+) -> tuple[NDArray[np.float64], ...]:
+    """Compute the ball, or another body, between its samples; see `resample`."""
+    turn = _interpolate_linearly(_remove_flips(orientation), places)
+    return (
+        _interpolate_cubically(position, linear / recorded_hz, places),
+        turn / np.linalg.norm(turn, axis=1, keepdims=True),
+        _interpolate_linearly(linear, places),
+        _interpolate_linearly(angular, places),
+    )
 
 
 def _interpolate_linearly(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -106,6 +106,12 @@ def _find_outline(points: NDArray[np.float64]) -> Outline:
     return tuple(dict.fromkeys(corners))
 
 
+def moving_bodies_of(config: Config) -> tuple[str, ...]:
+    """Name the bodies that move, in the order of samples."""
+    sections = {**config.scene.bodies, **config.task.bodies}
+    return tuple(name for name, section in sections.items() if section.mass_kg is not None)
+
+
 def _make_body(name: str, section: AnyBody) -> SceneBody:
     size: tuple[float, ...] = (section.radius_m,) if not isinstance(section, BoxConfig) else tuple(section.size_m)
     if isinstance(section, CylinderConfig):

@@ -15,6 +15,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
 from throwcollect.engines.bullet.renderer import Renderer
+from throwcollect.engines.engine import body_of
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
@@ -161,7 +162,8 @@ def _reduce_colours(pictures: list[Any]) -> list[Any]:
 def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number: int) -> None:
     angles = map(float, samples.position[number])
     x, y, z = map(float, samples.ball_position[number])
-    renderer.place(dict(zip(joints, angles, strict=True)), (x, y, z))
+    bodies = [body_of(tuple(numbers)) for numbers in samples.bodies[number].tolist()]
+    renderer.place(dict(zip(joints, angles, strict=True)), (x, y, z), bodies)
 
 
 class _Ground:

@@ -15,7 +15,7 @@ from throwcollect.episode.frames import WORLD, quaternion_of
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description, robot_of
-from throwcollect.robots.surroundings import looks_of
+from throwcollect.robots.surroundings import looks_of, moving_bodies_of
 from throwcollect.robots.urdf import PACKAGE, parse_xml, read_visual
 from throwcollect.tools.tool import tool_of
 
@@ -128,13 +128,14 @@ def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path],
 
 
 def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
-    """Make the shapes of the bodies that stand in the world of a trial, in the frame of the world."""
-    return tuple(
-        DrawnShape(
-            WORLD, look.position_m, quaternion_of(*look.rpy_rad), look.size_m, look.shape, "", _read_hex(look.color)
-        )
-        for look in looks_of(config)
-    )
+    """Make the shapes of the bodies in the world of a trial: in the frame of the world, or of a body that moves."""
+    moving, shapes = moving_bodies_of(config), []
+    for look in looks_of(config):
+        pose = WORLD, look.position_m, quaternion_of(*look.rpy_rad)
+        if look.name in moving:
+            pose = look.name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+        shapes.append(DrawnShape(*pose, look.size_m, look.shape, "", _read_hex(look.color)))
+    return tuple(shapes)
 
 
 def ball_urdf(ball: BallConfig) -> str:

@@ -34,6 +34,7 @@ from throwcollect.episode.topics import (
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
+from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.tools.tool import tool_of
 from throwcollect.view.drawn_robot import ball_urdf, draw_robot_of
 from throwcollect.view.markers import ShownThrow, all_markers, path_cloud, shape_markers, throw_markers
@@ -68,7 +69,7 @@ class ViewRecording:
         self._looks: tuple[str, str, float] | None = None
         robot = robot_of(config)
         self._topics = [
-            transforms(_read_frames(config).moving, robot.joints),
+            transforms(_read_frames(config).moving, robot.joints, moving_bodies_of(config)),
             joint_states(robot.joints),
             ball_odometry(),
             _ball_speed(),

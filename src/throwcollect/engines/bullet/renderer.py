@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
 from throwcollect.engines.bullet.scenery import BASE, connect, links, load_bodies, load_urdf
-from throwcollect.engines.engine import SceneBody
+from throwcollect.engines.engine import BodyState, SceneBody
 from throwcollect.errors import ConfigError
 
 Rgba = tuple[float, float, float, float]
@@ -65,6 +65,7 @@ class Renderer:
         loaded = load_bodies(self._client, [body for body, _ in bodies])
         for number, (_, rgba) in zip(loaded, bodies, strict=True):
             pybullet.changeVisualShape(number, BASE, rgbaColor=rgba, physicsClientId=self._client)
+        self._moving = [number for number, body in loaded.items() if body.moves]
         self._ball = pybullet.createMultiBody(0, baseVisualShapeIndex=sphere, physicsClientId=self._client)
 
     def __enter__(self) -> Renderer:
@@ -73,11 +74,16 @@ class Renderer:
     def __exit__(self, *_: object) -> None:
         pybullet.disconnect(self._client)
 
-    def place(self, joints: Mapping[str, float], ball: Vector) -> None:
-        """Put joints at angles [rad], and the centre of the ball at a place in world [m]; other joints stay at 0."""
+    def place(self, joints: Mapping[str, float], ball: Vector, bodies: Sequence[BodyState] = ()) -> None:
+        """Put joints at angles [rad], and the centre of the ball at a place in world [m]; other joints stay at 0.
+
+        Bodies that move are put into their poses, in the order in which they were given.
+        """
         for name, angle in joints.items():
             pybullet.resetJointState(self._robot, self._joints[name], angle, physicsClientId=self._client)
-        pybullet.resetBasePositionAndOrientation(self._ball, ball, _UPRIGHT, physicsClientId=self._client)
+        poses = [(ball, _UPRIGHT), *((body.position, body.orientation_xyzw) for body in bodies)]
+        for number, pose in zip((self._ball, *self._moving), poses, strict=True):
+            pybullet.resetBasePositionAndOrientation(number, *pose, physicsClientId=self._client)
 
     def find_frames(self) -> list[Vector]:
         """Find the origins of the frames of the robot's links in world [m]."""

@@ -1,0 +1,106 @@
+"""Bodies that the ball pushes, from the YAML file to Python, exports, viewers and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from mcap.reader import make_reader
+from PIL import Image
+
+import throwcollect
+from rclzenoh.interfaces import deserialize, get_message
+from tests.e2e.collection import collect_here
+from throwcollect.config.loader import load
+from throwcollect.dataset.verify import verify
+from throwcollect.export.export import export
+from throwcollect.view.animation import render
+from throwcollect.view.viewer_directory import view
+
+pytestmark = pytest.mark.e2e
+
+CONFIG = """\
+name: cans
+trials: 3
+seed: 7
+sim: {engine: mujoco}
+record: {topics: [joint_states, ball/odometry, tf]}
+run: {replay: 0}
+scene:
+  bodies:
+    table: {shape: box, size_m: [0.8, 1.2, 0.04], position_m: [1.6, -0.3, 0.5]}
+    can:
+      {shape: cylinder, radius_m: 0.05, length_m: 0.2, mass_kg: 0.1, position_m: [1.5, -0.23, 0.62], color: "#c02b2b"}
+    brick: {shape: box, size_m: [0.1, 0.1, 0.1], mass_kg: 0.1, position_m: [1.65, -0.5, 0.57]}
+sweep:
+  parameters:
+    task.end.arm_right_4_joint: {min: -0.62, max: -0.6}
+"""
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("bodies")
+    (directory / "cans.yaml").write_text(CONFIG, encoding="utf-8")
+    collect_here(directory / "cans.yaml", directory / "data")
+    return directory / "data"
+
+
+@pytest.fixture(scope="module")
+def pushed(dataset: Path) -> int:
+    """Number of a trial whose ball hit the can."""
+    return next(throw.trial for throw in throwcollect.load(dataset) if throw.outcome == "body_hit")
+
+
+def test_python_has_the_motion_of_each_body(dataset: Path, pushed: int) -> None:
+    throw = throwcollect.load(dataset)[pushed]
+    can, brick = throw.bodies["can"], throw.bodies["brick"]
+    assert np.linalg.norm(can.position[-1] - can.position[0]) > 0.02
+    assert np.abs(brick.position - brick.position[0]).max() < 1e-3
+    speeds = np.diff(can.position, axis=0) * load(dataset / "config.yaml").record.rate_hz
+    middle = (can.velocity[1:] + can.velocity[:-1]) / 2
+    # Impacts apart, velocities are those of the positions, in world.
+    assert np.median(np.abs(speeds - middle)) < 1e-3
+    assert verify(dataset, processes=2) == []
+
+
+@pytest.mark.parametrize("rate_hz", [250, 60])
+def test_exports_have_columns_for_bodies(dataset: Path, pushed: int, rate_hz: int, tmp_path: Path) -> None:
+    export(dataset, tmp_path / "out", to="parquet", rate_hz=rate_hz)
+    table = pq.read_table(tmp_path / "out" / "trajectories", filters=[("trial", "==", pushed)])
+    can = throwcollect.load(dataset)[pushed].bodies["can"]
+    assert table["can_z_m"].to_pylist()[0] == can.position[0, 2]
+    assert table["can_x_m"].to_numpy().max() == pytest.approx(can.position[:, 0].max(), abs=2e-3)
+    turns = np.column_stack([table[f"can_q{axis}"].to_numpy() for axis in "xyzw"])
+    assert np.linalg.norm(turns, axis=1) == pytest.approx(1.0)
+
+
+def test_viewers_draw_a_body_in_its_own_frame(dataset: Path, pushed: int, tmp_path: Path) -> None:
+    view(dataset, tmp_path / "view", trials=[pushed])
+    (file,) = (tmp_path / "view").glob("*.mcap")
+    places, frames = [], set()
+    with file.open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages(topics=["/tf", "/view/throw"]):
+            content = deserialize(message.data, get_message(schema.name))
+            if channel.topic == "/tf":
+                places += [each.transform.translation.x for each in content.transforms if each.child_frame_id == "can"]
+            else:
+                frames |= {marker.header.frame_id for marker in content.markers if marker.ns == "bodies"}
+    assert frames == {"world", "can", "brick"}
+    assert places == throwcollect.load(dataset)[pushed].bodies["can"].position[:, 0].tolist()
+
+
+def test_pictures_show_where_a_body_is(dataset: Path, pushed: int, tmp_path: Path) -> None:
+    render(dataset, tmp_path / "throw.webp", trial=pushed)
+
+    def find_red(frame: int) -> np.ndarray:
+        with Image.open(tmp_path / "throw.webp") as picture:
+            picture.seek(frame)
+            pixels = np.array(picture.convert("RGB"), int)
+        return np.argwhere((pixels[..., 0] > 120) & (pixels[..., 1] < 90) & (pixels[..., 2] < 80)).mean(axis=0)
+
+    with Image.open(tmp_path / "throw.webp") as picture:
+        last = picture.n_frames - 1
+    assert np.linalg.norm(find_red(last) - find_red(0)) > 3
