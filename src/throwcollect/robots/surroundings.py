@@ -40,6 +40,7 @@ class BodyLook:
         position_m: Its centre in world [m].
         rpy_rad: Rotations about the axes x, y, z of the world, in this order [rad].
         color: ``#rrggbb``.
+        moves: Whether it moves when it is pushed; then its place and outlines are those at the start.
         above_m: Its outline as seen from above: x and y in world [m].
         side_m: Its outline as seen from the right of the robot: x and z in world [m].
     """
@@ -50,6 +51,7 @@ class BodyLook:
     position_m: Vector
     rpy_rad: Vector
     color: str
+    moves: bool
     above_m: Outline
     side_m: Outline
 
@@ -67,7 +69,7 @@ def looks_of(config: Config) -> tuple[BodyLook, ...]:
         points = _turn(_find_corners(shape.kind, np.array(size)), turn) + place
         x, y, z = size
         above, side = (_find_outline(points[:, axes]) for axes in ([0, 1], [0, 2]))
-        looks.append(BodyLook(name, shape.kind, (x, y, z), place, turn, section.color, above, side))
+        looks.append(BodyLook(name, shape.kind, (x, y, z), place, turn, section.color, body.moves, above, side))
     return tuple(looks)
 
 

@@ -30,6 +30,8 @@ from throwcollect.units import NS_PER_S
 _SPIN_S = 0.2
 _FLOAT_BYTES = 4
 _LENGTH = struct.Struct("<I")
+_POSE = 7
+"""How many numbers of a body are its centre and its quaternion, xyzw."""
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
@@ -42,9 +44,10 @@ def encode_throw(
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
-        joints [rad], shape ``(n_samples, n_joints)``, and the ball's centre in the world [m], shape ``(n_samples, 3)``;
-        all little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``,
-        ``landing``, ``values`` and ``bodies``.
+        joints [rad], shape ``(n_samples, n_joints)``, the ball's centre in the world [m], shape ``(n_samples, 3)``, and
+        centres and quaternions of the bodies that move, shape ``(n_samples, n_moving, 7)``; all little-endian. The
+        header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``, ``landing``, ``values``
+        and ``bodies``.
     """
     samples = episode.samples()
     result = json.loads(episode.result)
@@ -64,7 +67,7 @@ def encode_throw(
     text = json.dumps(header).encode()
     # In JavaScript, a typed array has to begin at a multiple of the size of its numbers.
     padding = b"\0" * (-(_LENGTH.size + len(text)) % _FLOAT_BYTES)
-    numbers = (samples.position, samples.ball_position)
+    numbers = (samples.position, samples.ball_position, samples.bodies[:, :, :_POSE])
     return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))
 
 

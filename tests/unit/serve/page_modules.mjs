@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { pathToFileURL } from "node:url";
 
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
-const { ballAt, decodeThrow, jointsAt, seriesOf, widestJoint } = await load("throws.js");
+const { ballAt, decodeThrow, jointsAt, posesAt, seriesOf, widestJoint } = await load("throws.js");
 const { Playback } = await load("playback.js");
 const { inOrder, lives, steps, watchable } = await load("state.js");
 const { readChanges } = await load("controls.js");
@@ -36,6 +36,20 @@ test("joints and ball are interpolated between two samples", () => {
   ballAt(thrown(), 0.015).forEach((value, i) => near(value, [1.5, 2.5, 3.5][i]));
   assert.deepEqual(jointsAt(thrown(), 99), [2, 12]);
   assert.deepEqual(jointsAt(thrown(), -1), [0, 10]);
+});
+
+test("bodies that move are where they were at the sample before", () => {
+  const rows = [[0, 0, 1, 0, 0, 0, 1], [0.5, 0, 1, 0, 0, 1, 0]];
+  const shown = { samples: 2, rate_hz: 10, moved: new Float32Array(rows.flat()) };
+  assert.deepEqual(posesAt(shown, 0.09), [rows[0]]);
+  assert.deepEqual(posesAt(shown, 9), [rows[1]]);
+  assert.deepEqual(posesAt(thrown(), 0), []);
+  const bodies = new Bodies();
+  const look = { shape: "box", size_m: [1, 1, 1], position_m: [3, 0, 0], rpy_rad: [0, 0, 0], color: "#ffffff" };
+  bodies.put([{ ...look, name: "wall", moves: false }, { ...look, name: "can", moves: true }]);
+  bodies.move(posesAt(shown, 0.1));
+  const [wall, can] = bodies.object.children;
+  assert.deepEqual([wall.position.x, can.position.x, can.quaternion.z], [3, 0.5, 1]);
 });
 
 test("a panel goes to the nearest place where it covers no other one", () => {

@@ -7,6 +7,7 @@ import json
 import threading
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,10 @@ from tests.unit.serve.conftest import Remember
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.message_table import ChunkEncoder
+from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import looks_of
 from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records, Run
@@ -67,13 +71,15 @@ def watch(run: Run, scenario: Callable[[ThrowWatch], Awaitable[None]]) -> None:
     assert not threads()
 
 
+POST = {"shape": "sphere", "radius_m": 0.1, "position_m": [1, 2, 3]}
+
+
 def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -> None:
     episode = next(iter(Dataset.open(collected).episodes()))
     samples = episode.samples()
     result = {"outcome": "landed", "landing_x_m": 1.0, "landing_y_m": -0.5, "landing_z_m": 0.02}
     judged = Episode(episode.header, episode.chunk, result=json.dumps(result))
-    bodies = {"bodies": {"post": {"shape": "sphere", "radius_m": 0.1, "position_m": [1, 2, 3]}}}
-    looks = looks_of(Config.model_validate({"scene": bodies}))
+    looks = looks_of(Config.model_validate({"scene": {"bodies": {"post": POST}}}))
     frame = encode_throw(judged, "sim_0", {"ball.mass_kg": 0.05}, looks)
     size = int.from_bytes(frame[:4], "little")
     header = json.loads(frame[4 : 4 + size])
@@ -92,6 +98,20 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     told = encode_throw(Episode(episode.header, episode.chunk, result=fell), "sim_0", {}, None)
     header = json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])
     assert (header["landing"], header["bodies"]) == (None, None)
+
+
+def test_an_encoded_throw_holds_the_poses_of_bodies_that_move(collected: Path) -> None:
+    episode = next(iter(Dataset.open(collected).episodes()))
+    config = Config.model_validate({"scene": {"bodies": {"can": {**POST, "mass_kg": 0.1}, "post": POST}}})
+    bodies = np.random.default_rng(1).normal(size=(len(episode.samples()), 1, 13))
+    bodies[:, :, 3:7] /= np.linalg.norm(bodies[:, :, 3:7], axis=2, keepdims=True)
+    channels = Channels(config, full_description(config))
+    chunk, _ = ChunkEncoder(channels, level=1).encode(replace(episode.samples(), bodies=bodies))
+    frame = encode_throw(Episode(episode.header, chunk, result='{"outcome": "landed"}'), "sim_0", {}, looks_of(config))
+    header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
+    assert [(each["name"], each["moves"]) for each in header["bodies"]] == [("can", True), ("post", False)]
+    poses = np.frombuffer(frame[-len(bodies) * 7 * 4 :], "<f4").reshape(-1, 7)
+    np.testing.assert_allclose(poses, bodies[:, 0, :7], rtol=1e-6)
 
 
 def test_planned_values_come_from_the_plan(collected: Path, tmp_path: Path) -> None:

@@ -64,6 +64,7 @@ def test_the_scene_has_the_bodies_of_scene_and_task(client: TestClient, remember
         "position_m": [1.0, 2.0, 0.5],
         "rpy_rad": [0.0, 0.5, 0.0],
         "color": "#8a6f4d",
+        "moves": False,
     }
     assert all(len(corner) == 2 for outline in outlines.values() for corner in outline)
 

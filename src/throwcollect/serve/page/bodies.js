@@ -12,6 +12,7 @@ import {
  * @property {number[]} position_m centre [m], frame world
  * @property {number[]} rpy_rad turns about the axes x, y, z of the world, in this order [rad]
  * @property {string} color
+ * @property {boolean} moves
  * @property {number[][]} above_m corners of its outline as seen from above [m], frame world
  */
 
@@ -27,22 +28,35 @@ const OPACITY = 0.75;
 /** The bodies around one robot. */
 export class Bodies {
   object = new Group();
+  /** @type {Mesh[]} */
+  #moving = [];
 
   /** @param {Body[]} bodies take the place of those before */
   put(bodies) {
     this.clear();
-    for (const { name, shape, size_m, position_m, rpy_rad, color } of bodies) {
+    for (const { name, shape, size_m, position_m, rpy_rad, color, moves } of bodies) {
       const mesh = new Mesh(SHAPES[shape], new MeshLambertMaterial({ color, transparent: true, opacity: OPACITY }));
       mesh.name = name;
       mesh.scale.fromArray(size_m);
       mesh.position.fromArray(position_m);
       mesh.rotation.set(...rpy_rad, "ZYX");
       this.object.add(mesh);
+      if (moves) this.#moving.push(mesh);
     }
+  }
+
+  /** @param {number[][]} poses centre [m] and quaternion of each body that moves, frame world */
+  move(poses) {
+    this.#moving.forEach((mesh, i) => {
+      if (!poses[i]) return;
+      mesh.position.fromArray(poses[i]);
+      mesh.quaternion.fromArray(poses[i], 3);
+    });
   }
 
   clear() {
     for (const mesh of this.object.children) mesh.material.dispose();
     this.object.clear();
+    this.#moving = [];
   }
 }

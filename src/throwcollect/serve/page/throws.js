@@ -13,11 +13,12 @@
  * @property {import("./bodies.js").Body[] | null} bodies that stood around the robot; null if they are not known
  * @property {Float32Array} positions [rad], joints of a sample side by side
  * @property {Float32Array} ball [m], frame world, x y z of a sample side by side
+ * @property {Float32Array} moved centres [m] and quaternions of the bodies that move, 7 numbers each, frame world
  * @property {number} duration [s]
  */
 
 /**
- * Decode a message: length of the header, header, padding to 4 bytes, positions of joints, positions of the ball.
+ * Decode a message: length of the header, header, padding to 4 bytes, positions of joints, positions of the ball, poses of bodies.
  * @param {ArrayBuffer} buffer
  * @returns {Throw}
  * @throws {RangeError} if it is shorter than its header says
@@ -30,7 +31,8 @@ export function decodeThrow(buffer) {
   // Typed arrays need the byte order of the machine; all machines with a browser are little-endian, as the message is.
   const positions = new Float32Array(buffer, start, samples * joints.length);
   const ball = new Float32Array(buffer, start + positions.byteLength, samples * 3);
-  return { ...header, positions, ball, duration: Math.max(0, samples - 1) / header.rate_hz };
+  const moved = new Float32Array(buffer, ball.byteOffset + ball.byteLength);
+  return { ...header, positions, ball, moved, duration: Math.max(0, samples - 1) / header.rate_hz };
 }
 
 /**
@@ -64,6 +66,17 @@ export function jointsAt(shown, time) {
  */
 export function ballAt(shown, time) {
   return valuesAt(shown.ball, 3, shown, time);
+}
+
+/**
+ * @param {Throw} shown
+ * @param {number} time [s]
+ * @returns {number[][]} centre and quaternion of each body that moves, at the sample before
+ */
+export function posesAt(shown, time) {
+  const width = shown.moved.length / shown.samples;
+  const row = Math.min(Math.floor(time * shown.rate_hz), shown.samples - 1) * width;
+  return Array.from({ length: width / 7 }, (_, i) => [...shown.moved.slice(row + 7 * i, row + 7 * i + 7)]);
 }
 
 /**

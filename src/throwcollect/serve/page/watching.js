@@ -3,7 +3,7 @@
 import { Landings } from "./landings.js";
 import { Robot } from "./robot.js";
 import { lives } from "./state.js";
-import { ballAt, decodeThrow, jointsAt } from "./throws.js";
+import { ballAt, decodeThrow, jointsAt, posesAt } from "./throws.js";
 
 /** Watches one run at a time, and only while the page is visible. */
 export class Watching {
@@ -84,6 +84,7 @@ export class Watching {
       station.posedAt = time;
       station.robot?.move(jointsAt(shown, time).map((position, i) => [shown.joints[i], position]));
       station.placeBall(ballAt(shown, time));
+      station.bodies.move(posesAt(shown, time));
       station.trails.reveal(shown.duration ? time / shown.duration : 1);
       this.view.touch();
     }
