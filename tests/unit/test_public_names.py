@@ -77,9 +77,11 @@ def test_importing_throwcollect_loads_no_other_package() -> None:
 
 
 def test_documents_import_from_no_inner_module() -> None:
+    # Packages with tasks of their own are made of the classes that these are derived from; a test runs that page.
     inside = [
         f"{path.name}: {line}"
         for path in DOCUMENTS
+        if path.name != "tasks.md"
         for line in path.read_text(encoding="utf-8").splitlines()
         if re.match(r"\s*(from throwcollect\.|import throwcollect\.)", line)
     ]

@@ -150,9 +150,9 @@ def physics_description(config: Config) -> Description:
 def check_names(config: Config, robot: Robot, tool: Tool) -> None:
     """Make sure that what the ball touches is told apart: tool, ground, bodies of the scene, and links of the robot."""
     for name in {**config.scene.bodies, **config.task.bodies}:
-        if name in (tool.name, tool.link, *robot.description.links):
-            what = "the tool" if name in (tool.name, tool.link) else f"a link of {robot.title}"
-            raise ConfigError([Problem(f"should have another name, as {what} has this one", f"scene.bodies.{name}")])
+        if name in (tool.link, *robot.description.links):
+            sentence = f"should have another name, as a link of {robot.title} has this one"
+            raise ConfigError([Problem(sentence, f"scene.bodies.{name}")])
     if taken := {tool.name, tool.link} & {"ground", *robot.description.links}:
         raise ConfigError(
             f"tool.name: the tool is recorded as {tool.name}, with the link {tool.link}; the ground or a link of "
