@@ -45,7 +45,7 @@ class Samples:
     bodies: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 13)))
 
     def __post_init__(self) -> None:
-        if not self.bodies.size:
+        if len(self.bodies) != len(self):
             object.__setattr__(self, "bodies", np.zeros((len(self), 0, 13)))
 
     def __len__(self) -> int:

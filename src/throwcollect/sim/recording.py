@@ -118,5 +118,5 @@ def to_samples(
         ball_orientation_xyzw=table[:, -10:-6],
         ball_linear_velocity=table[:, BALL_LINEAR_VELOCITY],
         ball_angular_velocity=table[:, -3:],
-        bodies=others[:, :-BODY_NUMBERS].reshape(len(table), -1, BODY_NUMBERS),
+        bodies=others[:, :-BODY_NUMBERS].reshape(len(table), others.shape[1] // BODY_NUMBERS - 1, BODY_NUMBERS),
     )

@@ -1,7 +1,8 @@
 import numpy as np
+import pytest
 
 from throwcollect.episode.record import Contact
-from throwcollect.sim.recording import ContactLog, SampleLog
+from throwcollect.sim.recording import ContactLog, SampleLog, to_samples
 
 
 def test_a_log_keeps_all_samples_from_a_number_on():
@@ -63,3 +64,15 @@ def test_the_log_knows_the_bodies_that_touch_now():
     assert sorted(log.bodies) == ["head_2_link", "spoon"]
     log.update(frozenset(), 2)
     assert not log.bodies
+
+
+@pytest.mark.parametrize("bodies", [0, 2])
+@pytest.mark.parametrize("rows", [0, 3])
+def test_samples_have_the_bodies_that_move_even_if_there_are_none(rows: int, bodies: int) -> None:
+    joints = ("shoulder", "elbow")
+    table = np.arange(rows * (6 + 13 * (bodies + 1)), dtype=np.float64).reshape(rows, -1 if rows else 19 + 13 * bodies)
+    samples = to_samples(table, np.arange(rows), joints, joints, {}, np.zeros(2))
+    assert samples.bodies.shape == (rows, bodies, 13)
+    assert samples.ball_position.shape == (rows, 3)
+    if rows and bodies:
+        assert samples.bodies[0].ravel().tolist() == [*range(6, 6 + 26)]
