@@ -130,8 +130,8 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
     axes = _list_axes(config)
     values = np.concatenate([np.column_stack([each.throws[column_of(axis.key)] for axis in axes]) for each in datasets])
     outcomes = np.concatenate([each.throws["outcome"].to_numpy() for each in datasets])
-    heights = np.concatenate([each.throws["landing_z_m"].to_numpy() for each in datasets])
-    landed = np.isin(outcomes.astype(str), [config.task.success, *config.task.informative]) & np.isfinite(heights)
+    ends = np.concatenate([each.throws["landing_x_m"].to_numpy() for each in datasets])
+    landed = np.isin(outcomes.astype(str), [config.task.success, *config.task.informative]) & np.isfinite(ends)
     if not any(axis.role is KeyRole.PARAMETER for axis in axes) or landed.sum() < count_needed_throws(len(axes)):
         raise ConfigError(
             f"{landed.sum()} throws have landed",
