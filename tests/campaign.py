@@ -119,10 +119,10 @@ def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
         time.sleep(source.uniform(0.2, 4.0))
         if running.process.poll() is not None:
             return
-        launcher = psutil.Process(running.process.pid)
-        parties = [launcher, *launcher.children(recursive=True)]
-        victim, number = source.choice(parties), source.choice(SIGNALS)
         try:
+            launcher = psutil.Process(running.process.pid)
+            parties = [launcher, *launcher.children(recursive=True)]
+            victim, number = source.choice(parties), source.choice(SIGNALS)
             name = " ".join(words_of(victim)[-1:])
             victim.send_signal(number)
             if number == signal.SIGSTOP:
