@@ -8,7 +8,6 @@ Frames and units: world with x forward, y left, z up; metres, radians, seconds, 
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import HERE, BodyLink, BodyModel, Placement, Vector
+from throwcollect.engines.body import HERE, BodyLink, BodyModel, Placement, Vector, turn_of
 
 Quaternion = tuple[float, float, float, float]
 
@@ -94,10 +93,7 @@ class SceneBody:
     @property
     def start(self) -> Sample:
         """The numbers of a sample for its pose at the start, at rest."""
-        (sr, cr), (sp, cp), (sy, cy) = ((math.sin(turn / 2), math.cos(turn / 2)) for turn in self.placement.rpy)
-        x, y = sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy
-        z, w = cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy
-        return (*self.placement.xyz, x, y, z, w, *(0.0,) * 6)
+        return (*self.placement.xyz, *turn_of(self.placement), *(0.0,) * 6)
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,7 @@ def physics_description(config: Config) -> Description:
 
 
 def check_names(config: Config, robot: Robot, tool: Tool) -> None:
-    """Make sure that what the ball touches is told apart: tool, ground, bodies of the scene, and links of the robot."""
+    """Make sure that tool, ground, bodies of the scene and links of the robot have different names in contacts."""
     for name in {**config.scene.bodies, **config.task.bodies}:
         if name in (tool.link, *robot.description.links):
             sentence = f"should have another name, as a link of {robot.title} has this one"

@@ -128,9 +128,7 @@ class LocalNodes(NodeHost):
 
     def frozen(self) -> frozenset[str]:
         """Names of the nodes that a signal has stopped, and none has continued."""
-        return frozenset(
-            name for name, process in self._processes.items() if process.pid is not None and _is_stopped(process.pid)
-        )
+        return frozenset(name for name, process in self._processes.items() if _is_stopped(process.pid))
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """See `NodeHost.signal`."""

@@ -49,7 +49,7 @@ class World(Observer):
     `reset` puts it into the start state of a trial, which is a pure function of the trial's configuration, bit for bit.
     `run` then takes physics steps until the trial ends:
 
-    - ``landed``: what the task says (see `Task.end_rule`), by default that the ball has crossed the landing plane;
+    - ``landed``: by the rule of the task (`Task.end_rule`), by default when the ball has crossed the landing plane;
     - ``rest``: the arm has moved and stands still, and the ball has been lying on something for half a second;
     - ``timeout``: the longest duration is over.
 

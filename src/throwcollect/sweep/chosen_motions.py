@@ -31,7 +31,7 @@ def complete_point(values: Mapping[str, float], config: Config) -> dict[str, flo
 
 
 def add_motions(points: Points, config: Config) -> Points:
-    """Add the motion of each trial, and where it starts and ends if that is not where the configuration says.
+    """Add the motion of each trial, and its start and end where they differ from the configuration.
 
     Trials take the motions in turn, unless the configuration names one or the points have a column for it.
     """

@@ -1,7 +1,7 @@
-"""Sets up a Bullet world: ground, robot with its tool, ball.
+"""Sets up a Bullet world: ground, robot with its tool, ball, and bodies of the scene.
 
-Nothing but the ball collides with other things. Shapes of a robot may overlap each other
-at rest, and with these few pairs the order in which Bullet solves contacts does not depend on earlier trials.
+Only the ball and bodies that move collide with other things. Shapes of a robot may overlap each other at rest, and with
+these few pairs the order in which Bullet solves contacts does not depend on earlier trials.
 """
 
 from __future__ import annotations

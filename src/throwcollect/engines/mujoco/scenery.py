@@ -1,6 +1,6 @@
-"""Sets up a MuJoCo world: ground, robot with its tool, ball.
+"""Sets up a MuJoCo world: ground, robot with its tool, ball, and bodies of the scene.
 
-As in Bullet, nothing but the ball collides with other things.
+As in Bullet, only the ball and bodies that move collide with other things.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import INERTIA, BodyModel, LinkShape, Placement, Vector
+from throwcollect.engines.body import INERTIA, BodyModel, LinkShape, Vector, turn_of
 from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
 from throwcollect.engines.grip import HELD_LINK, add_held_link
 from throwcollect.engines.mujoco.contact_targets import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
@@ -165,18 +165,17 @@ def place_bodies(model: mujoco.MjModel, bodies: Sequence[SceneBody]) -> None:
     """Give bodies their poses and sizes, as if the model had been compiled with them."""
     for each in bodies:
         body = model.body(_name_body(each)).id
-        model.body_pos[body], model.body_quat[body] = each.placement.xyz, _turn(each.placement)
+        x, y, z, w = turn_of(each.placement)
+        model.body_pos[body], model.body_quat[body] = each.placement.xyz, (w, x, y, z)
         if (inertia := each.link.inertia) is not None:
             model.body_mass[body] = inertia.mass_kg
             model.body_inertia[body] = [inertia.moments_kgm2[number] for number in _DIAGONAL]
-            model.body_ipos[body], model.body_iquat[body] = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
         for number, shape in enumerate(each.link.shapes):
             geom = model.geom(f"{_name_body(each)}/{number}").id
             size, half = _size(shape)
             model.geom_size[geom] = size
             model.geom_aabb[geom, 3:] = half
             model.geom_rbound[geom] = math.hypot(*half) if shape.kind != "sphere" else half[0]
-            model.geom_pos[geom], model.geom_quat[geom] = shape.placement.xyz, _turn(shape.placement)
 
 
 def _size(shape: LinkShape) -> tuple[Vector, Vector]:
@@ -189,17 +188,6 @@ def _size(shape: LinkShape) -> tuple[Vector, Vector]:
         case "sphere", (radius,):
             return (radius, 0.0, 0.0), (radius, radius, radius)
     raise ValueError(shape.kind)
-
-
-def _turn(placement: Placement) -> tuple[float, float, float, float]:
-    """Rotation of a placement as a unit quaternion, wxyz."""
-    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in placement.rpy)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
 
 
 def _watch(spec: mujoco.MjSpec, surface: Surface) -> None:
@@ -249,14 +237,14 @@ def set_physics(model: mujoco.MjModel, scene: Scene, physics: Physics) -> None:
     model.body_mass[ball] = physics.ball_mass_kg
     # This is the inertia of a solid sphere.
     model.body_inertia[ball] = 0.4 * physics.ball_mass_kg * model.geom_size[sphere, 0] ** 2
-    # Frictions are multiplied, as in Bullet. There is no rolling and no torsional friction.
+    # Frictions are multiplied, as in Bullet. Only the ball resists rolling and spinning.
     model.geom_friction[:] = (physics.surface_friction**2, 0.0, 0.0)
     rolling = physics.ball_rolling_friction_m
     model.geom_friction[sphere] = (
         physics.ball_friction * physics.surface_friction,
         *[rolling * physics.surface_friction] * 2,
     )
-    # All contacts are contacts of the ball. Those that resist rolling have rows for it.
+    # Contacts of the ball that resist rolling have rows for it.
     model.geom_condim[sphere] = ROLLING_ROWS if rolling else SLIDING_ROWS
     model.geom_margin[sphere] = _REACH_M
     # Friction stops sliding within one step if it can. `aim_contacts` replaces the targets along the normals.
