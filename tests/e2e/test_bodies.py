@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,18 @@ def test_exports_have_columns_for_bodies(dataset: Path, pushed: int, rate_hz: in
     assert table["can_x_m"].to_numpy().max() == pytest.approx(can.position[:, 0].max(), abs=2e-3)
     turns = np.column_stack([table[f"can_q{axis}"].to_numpy() for axis in "xyzw"])
     assert np.linalg.norm(turns, axis=1) == pytest.approx(1.0)
+
+
+def test_policies_get_the_bodies_as_state_of_the_environment(dataset: Path, pushed: int, tmp_path: Path) -> None:
+    export(dataset, tmp_path / "out", to="lerobot")
+    names = json.loads((tmp_path / "out" / "meta" / "info.json").read_text())["features"]
+    state = names["observation.environment_state"]["names"]
+    assert [name for name in state if name.endswith(".x")] == ["ball.x", "can.x", "brick.x"]
+    (file,) = (tmp_path / "out" / "data").rglob("*.parquet")
+    rows = pq.read_table(file)["observation.environment_state"].to_pylist()
+    seen = {round(row[state.index("can.x")], 4) for row in rows}
+    can = throwcollect.load(dataset)[pushed].bodies["can"]
+    assert {round(float(x), 4) for x in can.position[:, 0].astype(np.float32)} <= seen
 
 
 def test_viewers_draw_a_body_in_its_own_frame(dataset: Path, pushed: int, tmp_path: Path) -> None:

@@ -19,10 +19,12 @@ from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.throw import Throw
+from throwcollect.episode.topics import BALL
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.throw_source import ExportSource, ThrowSeries, unit_of
+from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sweep.parquet_file import encode_table
 
 _VERSION = "v3.0"
@@ -62,15 +64,17 @@ class Feature:
         return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
 
 
-def list_features(moving: Sequence[str], targets: Sequence[TargetColumn]) -> dict[str, Feature]:
-    """List features by name, in the order of their columns; `moving` are the joints that the task moves."""
+def list_features(
+    moving: Sequence[str], targets: Sequence[TargetColumn], bodies: Sequence[str] = ()
+) -> dict[str, Feature]:
+    """List features by name, in the order of their columns, for the joints that the task moves, and moving bodies."""
     positions = tuple(f"{joint}.pos" for joint in moving)
-    ball = ("ball.x", "ball.y", "ball.z", "ball.vx", "ball.vy", "ball.vz")
+    free = (f"{body}.{part}" for body in (BALL, *bodies) for part in ("x", "y", "z", "vx", "vy", "vz"))
     goal = tuple(f"target.{each.word.replace(' ', '_')}" for each in targets)
     return {
         "observation.state": Feature("float32", (*positions, *(f"{joint}.vel" for joint in moving))),
         "observation.effort": Feature("float32", tuple(f"{joint}.effort" for joint in moving)),
-        "observation.environment_state": Feature("float32", (*ball, *goal)),
+        "observation.environment_state": Feature("float32", (*free, *goal)),
         "action": Feature("float32", positions),
         "next.reward": Feature("float32"),
         "next.success": Feature("bool"),
@@ -107,7 +111,7 @@ dataset = LeRobotDataset("me/throws", root=".")
             "|---|---|---|",
             "| `observation.state` | rad, rad/s | positions (`.pos`), velocities (`.vel`) of moving joints, measured |",
             "| `observation.effort` | N m | torques of their motors |",
-            "| `observation.environment_state` | m, m/s | position and velocity of the ball's centre, in world"
+            "| `observation.environment_state` | m, m/s | position and velocity of ball and moving bodies, in world"
             f"{_describe_goal(source)} |",
             "| `action` | rad | their commanded positions one frame later, on the trajectory sent to controllers |",
             f"| `next.reward` | 1 | 1 in the last frame of a throw that {success}, 0 in all others |",
@@ -128,7 +132,8 @@ dataset = LeRobotDataset("me/throws", root=".")
 
 def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset in LeRobot's format; see `Exporter.write`."""
-    features = list_features(source.dataset.moving_joints, source.targets)
+    bodies = moving_bodies_of(source.dataset.config)
+    features = list_features(source.dataset.moving_joints, source.targets, bodies)
     tasks: dict[str, int] = {}
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
@@ -179,17 +184,15 @@ def _compute_frames(
     count, signals, done = len(throw), throw.signals, throw.done
     moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
     index = np.arange(count)
+    bodies = (BALL, *moving_bodies_of(source.dataset.config))
+    free = [f"{body}_{quantity}" for body in bodies for quantity in ("position_m", "velocity_mps")]
+    targets = [each.name for each in source.targets]
     values = {
         "observation.state": np.hstack(
             [signals[f"joint_{name}"][:, moving] for name in ("position_rad", "velocity_radps")]
         ),
         "observation.effort": signals["joint_effort_nm"][:, moving],
-        "observation.environment_state": np.hstack(
-            [
-                signals[name]
-                for name in ("ball_position_m", "ball_velocity_mps", *(each.name for each in source.targets))
-            ]
-        ),
+        "observation.environment_state": np.hstack([signals[name] for name in (*free, *targets)]),
         "action": throw.find_actions(source.rate_hz),
         "next.reward": done * throw.succeeded,
         "next.success": done * throw.succeeded,
