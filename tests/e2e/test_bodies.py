@@ -67,6 +67,16 @@ def test_python_has_the_motion_of_each_body(dataset: Path, pushed: int) -> None:
     assert verify(dataset, processes=2) == []
 
 
+def test_trajectories_have_columns_for_bodies(dataset: Path) -> None:
+    loaded = throwcollect.load(dataset)
+    found = loaded.trajectories(["can_velocity", "brick_position", "ball_velocity"])
+    for throw, arrays in zip(loaded, found, strict=True):
+        np.testing.assert_allclose(arrays["can_velocity"], throw.bodies["can"].velocity, rtol=0, atol=1e-14)
+        np.testing.assert_array_equal(arrays["brick_position"], throw.bodies["brick"].position)
+        np.testing.assert_allclose(arrays["ball_velocity"], throw.object.velocity, rtol=0, atol=1e-14)
+    assert {"can_angular_velocity", "brick_orientation_xyzw"} <= loaded.trajectories().columns.keys()
+
+
 @pytest.mark.parametrize("rate_hz", [250, 60])
 def test_exports_have_columns_for_bodies(dataset: Path, pushed: int, rate_hz: int, tmp_path: Path) -> None:
     export(dataset, tmp_path / "out", to="parquet", rate_hz=rate_hz)
@@ -101,7 +111,7 @@ def test_viewers_draw_a_body_in_its_own_frame(dataset: Path, pushed: int, tmp_pa
                 places += [each.transform.translation.x for each in content.transforms if each.child_frame_id == "can"]
             else:
                 frames |= {marker.header.frame_id for marker in content.markers if marker.ns == "bodies"}
-    assert frames == {"world", "can", "brick"}
+    assert frames == {"world", "can", "brick", "ball"}
     assert places == throwcollect.load(dataset)[pushed].bodies["can"].position[:, 0].tolist()
 
 

@@ -20,8 +20,8 @@ pytest.importorskip("mujoco")
 
 pytestmark = pytest.mark.e2e
 ROOT = Path(__file__).parents[2]
-BODIES, INTO, OWN = re.split(
-    r"^## (?:Throw into a bin|A task of your own)$",
+BODIES, OBJECT, INTO, OWN = re.split(
+    r"^## (?:Another object than a ball|Throw into a bin|A task of your own)$",
     (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8"),
     flags=re.MULTILINE,
 )
@@ -55,9 +55,13 @@ def test_the_world_with_a_table_is_right_and_its_table_can_be_swept(tmp_path: Pa
     assert "scene.bodies.table.position_m.0" in config.sweep.parameters
     (tmp_path / "moving.yaml").write_text(moving, encoding="utf-8")
     throw = throwcollect.Simulator(tmp_path / "moving.yaml").throw()
-    assert list(throw.bodies) == ["can"]
+    assert list(throw.bodies) == ["ball", "can"]
     assert throw.bodies["can"].position[0] == pytest.approx((1.5, -0.25, 0.58), abs=2e-3)
     assert {"can_x_m", "can_wz_radps"} <= set(throw.to_pandas().columns)
+    (block,) = blocks("yaml", OBJECT)
+    (tmp_path / "block.yaml").write_text(block, encoding="utf-8")
+    thrown = throwcollect.Simulator(tmp_path / "block.yaml").throw()
+    assert (thrown.outcome, thrown.object.name) == ("landed", "block")
 
 
 def test_a_throw_that_is_aimed_at_a_bin_stays_in_it(

@@ -98,16 +98,17 @@ def test_get_entities_states_returns_the_state_of_each_entity(robot: Robot) -> N
         assert robot.call("get_entity_state", entity=name).state == state
 
 
-def test_bodies_of_the_scene_and_of_the_task_are_entities_that_cannot_be_moved(
+def test_bodies_of_the_scene_and_of_the_task_are_entities_and_those_with_a_mass_can_be_moved(
     endpoint: str, session: Context, tmp_path: Path
 ) -> None:
     pole = {"shape": "cylinder", "position_m": [1.0, 2.0, 0.5], "rpy_rad": [0, 0, 1], "radius_m": 0.1, "length_m": 1.0}
-    scene = {"scene": {"bodies": {"pole": pole}}, "task": {"name": "throw_into", "wall": {"height_m": 0.8}}}
+    can = {"shape": "box", "position_m": [1.0, 1.0, 0.05], "size_m": [0.1, 0.1, 0.1], "mass_kg": 0.2}
+    scene = {"scene": {"bodies": {"pole": pole, "can": can}}, "task": {"name": "throw_into", "wall": {"height_m": 0.8}}}
     config = Config.model_validate({**CONFIG.model_dump(exclude_defaults=True), **scene})
     with running_simulation(tmp_path, endpoint, session, OWN, config) as robot:
         bin_parts = [f"bin_{part}" for part in ("floor", "front", "back", "right", "left")]
         response = robot.call("get_entities_states")
-        assert list(response.entities) == ["ball", "talos", "pole", *bin_parts, "wall"]
+        assert list(response.entities) == ["ball", "can", "pole", *bin_parts, "wall", "talos"]
         pose = robot.call("get_entity_state", entity="pole").state.pose
         assert (pose.position.x, pose.position.y, pose.position.z) == (1.0, 2.0, 0.5)
         assert (pose.orientation.z, pose.orientation.w) == pytest.approx((0.479426, 0.877583), abs=1e-6)
@@ -117,3 +118,6 @@ def test_bodies_of_the_scene_and_of_the_task_are_entities_that_cannot_be_moved(
             assert refused.result == Result.RESULT_OPERATION_FAILED
             assert refused.error_message == f"{name} is fixed to the world"
         assert robot.call("get_entity_state", entity="pole").state.pose == pose
+        assert robot.call("set_entity_state", entity="can", state=entity_state()).result.result == Result.RESULT_OK
+        assert robot.call("get_entity_state", entity="can").state.pose == entity_state().pose
+        assert robot.call("get_entity_state", entity="ball").state.pose != entity_state().pose

@@ -45,9 +45,9 @@ def landing():
     """Point and time of a landing: where the ball's lowest point crosses the ground, between two samples."""
 
     def find(samples, radius=0.025):
-        lowest = samples.ball_position[-2:, 2] - radius
+        lowest = samples.object_position[-2:, 2] - radius
         share = lowest[0] / (lowest[0] - lowest[1])
-        before, after = samples.ball_position[-2:]
+        before, after = samples.object_position[-2:]
         times = samples.stamps_ns[-2:] / 1e9
         return (before + share * (after - before))[:2], float(times[0] + share * (times[1] - times[0]))
 

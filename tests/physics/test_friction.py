@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.engines.test_engine_contract import PHYSICS, SCENE, begin, still
 
-from throwcollect.engines.engine import BodyState, Engine, Observer, ball_of
+from throwcollect.engines.engine import BodyState, Engine, Observer, object_in
 from throwcollect.members import load_member
 
 SPEED_MPS = 2.0
@@ -29,9 +29,9 @@ def test_a_sliding_ball_keeps_its_direction_and_slows_by_the_product_of_friction
     engine: Engine, degrees: float
 ) -> None:
     angle = np.radians(degrees)
-    engine.place_ball(BodyState((2.0, 0.0, SCENE.ball_radius_m), linear_velocity=velocity(angle)))
+    engine.place(0, BodyState((2.0, 0.0, SCENE.object.radius_m), linear_velocity=velocity(angle)))
     engine.run(still(engine, 50), Observer())
-    x, y, _ = ball_of(engine.state.sample).linear_velocity
-    friction = PHYSICS.ball_friction * PHYSICS.surface_friction
+    x, y, _ = object_in(engine.state.sample).linear_velocity
+    friction = SCENE.object.friction * PHYSICS.surface_friction
     assert np.arctan2(y, x) == pytest.approx(angle, abs=1e-3)
     assert SPEED_MPS - np.hypot(x, y) == pytest.approx(friction * PHYSICS.gravity_mps2 * 50 / PHYSICS.hz, rel=0.01)

@@ -68,7 +68,7 @@ def test_tool_motion_places_the_ball_where_the_physics_has_it():
     world = World(Config(sim={"settle_s": 0.0}))
     samples = world.samples()
     place = ToolMotion(Config()).place(samples.position[0])
-    assert place == pytest.approx(samples.ball_position[0], abs=1e-4)
+    assert place == pytest.approx(samples.object_position[0], abs=1e-4)
     world.close()
 
 

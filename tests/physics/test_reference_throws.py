@@ -54,7 +54,7 @@ def test_reference_throws_are_released_at_the_reference_time_and_velocity(
     samples, release_s = thrown[number]
     assert release_s == pytest.approx(expected_s, abs=tolerance_s)
     # A step earlier or later changes the vertical velocity by 0.01 m/s.
-    at_release = samples.ball_linear_velocity[round(release_s * 1000)]
+    at_release = samples.object_linear_velocity[round(release_s * 1000)]
     assert at_release == pytest.approx(velocity, abs=0.015)
 
 

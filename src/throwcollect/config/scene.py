@@ -11,6 +11,9 @@ from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, match
 from throwcollect.config.section import Section, any_of
 
+BALL = "ball"
+"""Name of the ball, as that of a body."""
+
 _Length = Annotated[float, Field(ge=0.001, le=20)]
 _Triple = Annotated[list[Annotated[float, Field(ge=-20, le=20)]], Field(min_length=3, max_length=3)]
 _Color = Annotated[str, match(r"#[0-9a-fA-F]{6}", "# and six hexadecimal digits, such as #8a6f4d")]
@@ -18,7 +21,7 @@ BodyName = Annotated[str, match(r"[a-z][a-z0-9_]{0,31}", "up to 32 lower-case le
 
 
 class BallConfig(Section):
-    """The ball."""
+    """The ball, which lies in the tool at the start, or is held by it."""
 
     mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.045
     """Mass."""
@@ -39,8 +42,13 @@ class BallConfig(Section):
 class BodyConfig(Section):
     """A body of the scene."""
 
-    position_m: Annotated[_Triple, Key(swept=True)]
-    """Position of its centre in world at the start: x, y, z."""
+    position_m: Annotated[_Triple, Key(swept=True)] = [0.0, 0.0, 0.0]
+    """Position of its centre in world at the start: x, y, z. With `lies_on`, it counts from the place that follows from
+    that."""
+    lies_on: BodyName | None = None
+    """Name of the body on the middle of which it lies at the start; the object may lie in the tool. Null for none."""
+    velocity_mps: Annotated[_Triple, Key(swept=True)] = [0.0, 0.0, 0.0]
+    """Velocity of a body that moves in world at the start: x, y, z."""
     rpy_rad: Annotated[list[Angle], Field(min_length=3, max_length=3), Key(swept=True)] = [0.0, 0.0, 0.0]
     """Rotations about the axes x, y, z of the world, in this order."""
     mass_kg: Annotated[Annotated[float, Field(gt=0, le=100)] | None, Key(swept=True)] = None
@@ -50,6 +58,9 @@ class BodyConfig(Section):
     restitution: Annotated[Annotated[float, Field(ge=0, le=1)] | None, Key(swept=True)] = None
     """Coefficient of restitution [-]; it is multiplied with that of what touches the body, which is 1 for the ground
     and the robot. Null: 0 for a body that moves, otherwise 1."""
+    rolling_friction_m: Annotated[float, Field(ge=0, le=0.01), Key(swept=True)] = 0.0
+    """Lever arm with which a surface resists the rolling of a body that moves; it is multiplied with the friction of
+    that surface."""
     color: Annotated[_Color, Key(Effect.APPEARANCE, swept=False)] = "#8a6f4d"
     """Color in pictures."""
 
@@ -105,9 +116,12 @@ class SceneConfig(Section):
     """Coulomb friction of all that the ball may touch, whatever the tool is [-]: the tool, the robot's links and the
     ground. It is multiplied with `ball.friction`."""
     bodies: Annotated[dict[BodyName, AnyBody], Field(max_length=32)] = {}
-    """Things that stand in the world, such as a table or a wall, by name. The ball collides with them; a motion in
-    which the robot touches one is refused."""
+    """Things that stand in the world, such as a table or a wall, by name. The object collides with them; a motion in
+    which the robot touches one is refused, unless that is the object."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if "ground" in self.bodies:
             yield "bodies.ground", "should have another name, as contacts with the ground have this one"
+        for name, body in self.bodies.items():
+            if body.mass_kg is None and any(body.velocity_mps):
+                yield f"bodies.{name}.velocity_mps", "should be left out, as a body without mass_kg never moves"

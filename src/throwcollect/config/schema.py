@@ -21,12 +21,13 @@ from throwcollect.config.kinds import ContradictionError, Name, unknown_joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile
 from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
-from throwcollect.config.scene import BallConfig, SceneConfig
+from throwcollect.config.scene import BALL, AnyBody, BallConfig, BodyName, SceneConfig
 from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
 from throwcollect.config.task_config import TaskConfig, UntilConfig
 from throwcollect.config.tool_config import ToolConfig
 from throwcollect.members import find_broken, load_member, names_of, usable_names
+from throwcollect.wording import join_names
 
 __all__ = [
     "FASTEST",
@@ -157,7 +158,10 @@ class Config(Section):
     tool: Annotated[AnyTool, Key(Effect.PHYSICS)] = load_member("tools", "spoon")()
     """The tool in its hand."""
     ball: Annotated[BallConfig, Key(Effect.PHYSICS, swept=True)] = BallConfig()
-    """The ball."""
+    """The ball; it is the object that the robot acts on, unless `object` or the task names another one."""
+    object: Annotated[BodyName | None, Key(Effect.PHYSICS)] = None
+    """Name of the body of `scene.bodies` that the robot acts on in place of a ball; it needs a mass. Null for the ball,
+    or for the object of the task."""
     scene: Annotated[SceneConfig, Key(Effect.PHYSICS, swept=True)] = SceneConfig()
     """The rest of the world."""
     sim: Annotated[SimConfig, Key(Effect.PHYSICS)] = SimConfig()
@@ -190,7 +194,8 @@ class Config(Section):
         for joint in self.robot.posture:
             if joint in self.task.start:
                 yield f"robot.posture.{joint}", "should be left out, as task.start sets this joint"
-        for name in sorted(self.scene.bodies.keys() & {"ball", self.tool.name, self.robot.name}):
+        yield from self._find_wrong_bodies()
+        for name in sorted(self.scene.bodies.keys() & {BALL, self.tool.name, self.robot.name}):
             yield f"scene.bodies.{name}", "should have another name, as the ball, the tool or the robot has this one"
         for name in self.scene.bodies.keys() & self.task.bodies.keys():
             yield f"scene.bodies.{name}", f"should have another name, as the task {self.task.name} has such a body"
@@ -203,6 +208,35 @@ class Config(Section):
         if self.run.root_namespace and self.run.simulations > 1:
             several = f"{self.run.simulations} simulations (-n)"
             yield "run.root_namespace", f"should be left out, as {several} cannot share a namespace"
+
+    @property
+    def bodies(self) -> dict[str, AnyBody]:
+        """All bodies of the scene and of the task, by name."""
+        return {**self.scene.bodies, **self.task.bodies}
+
+    @property
+    def acted_on(self) -> str:
+        """Name of the object that the robot acts on; it is one of `bodies`, or the ball."""
+        return self.object or self.task.object or BALL
+
+    def _find_wrong_bodies(self) -> Iterator[tuple[str, str]]:
+        bodies, acted_on = self.bodies, self.acted_on
+        if acted_on != BALL:
+            if acted_on not in bodies or bodies[acted_on].mass_kg is None:
+                movable = [name for name, body in bodies.items() if body.mass_kg is not None]
+                yield "object", f"should be a body with a mass_kg, {join_names(movable) or 'none'}, got {acted_on}"
+            if self.ball != BallConfig():
+                yield "ball", f"should be left out, as the robot acts on {acted_on}"
+        for name, body in bodies.items():
+            below = body.lies_on
+            if below is None or (below == self.tool.name and name == acted_on):
+                continue
+            if below not in bodies or bodies[below].lies_on is not None:
+                others = [other for other, each in bodies.items() if other != name and each.lies_on is None]
+                yield (
+                    f"scene.bodies.{name}.lies_on",
+                    f"should be a body that lies on none, {join_names(others) or 'none'}, got {below}",
+                )
 
     def _find_unknown_joints(self) -> Iterator[tuple[str, str]]:
         robot = self.robot.find()

@@ -120,6 +120,11 @@ class TaskConfig(Section):
         return {}
 
     @property
+    def object(self) -> str | None:
+        """Name of the body that the robot acts on in the place of the ball; None for the ball."""
+        return None
+
+    @property
     def noun(self) -> str:
         """Noun for one of its trials."""
         return "throw" if self.throws else "trial"

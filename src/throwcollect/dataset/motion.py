@@ -1,4 +1,4 @@
-"""Motions of ball and joints during one throw."""
+"""Motions of bodies and joints during one throw."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ball:
-    """The ball, or another body that moves, during a throw; world frame: x forward, y left, z up.
+class Body:
+    """A body that moves, such as the ball, during a throw; world frame: x forward, y left, z up.
 
     Attributes:
+        name: Its name.
         time_s: Time since the start of the trial [s], shape ``(n_samples,)``.
         stamps_ns: Simulated time [ns], shape ``(n_samples,)``; as in the messages.
         position: Centre [m], shape ``(n_samples, 3)``.
@@ -22,6 +23,7 @@ class Ball:
         angular_velocity: [rad/s], shape ``(n_samples, 3)``.
     """
 
+    name: str
     time_s: NDArray[np.float64]
     stamps_ns: NDArray[np.int64]
     position: NDArray[np.float64]
@@ -33,7 +35,7 @@ class Ball:
         return len(self.stamps_ns)
 
     def __repr__(self) -> str:
-        return f"Ball({len(self)} samples, {self.time_s[-1]:.3f} s)"
+        return f"Body({self.name}: {len(self)} samples, {self.time_s[-1]:.3f} s)"
 
 
 @dataclass(frozen=True)

@@ -22,13 +22,14 @@ from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, read_throws
-from throwcollect.dataset.trajectories import COLUMNS, Trajectories, read_trajectories
+from throwcollect.dataset.trajectories import Recorded, Trajectories, list_columns, read_trajectories
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
+from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sweep.arrow_column import find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
@@ -239,12 +240,16 @@ class Dataset(Sequence[Throw]):
         return replace(self, throws=select_throws(self.throws, which, self.directory))
 
     def trajectories(
-        self, columns: Iterable[str] = COLUMNS, *, joints: Iterable[str] | None = None, threads: int | None = None
+        self,
+        columns: Iterable[str] | None = None,
+        *,
+        joints: Iterable[str] | None = None,
+        threads: int | None = None,
     ) -> Trajectories:
         """Read the trajectories of all throws into one array for each column.
 
         Args:
-            columns: Which of `COLUMNS`; nothing else is copied.
+            columns: Which columns (``docs/reading.md``); nothing else is copied. None for all.
             joints: Joints that the columns of joints have, in this order; None for all. `moving_joints` leaves out the
                 constant ones.
             threads: How many threads read; None for one for each core, up to 4.
@@ -258,8 +263,9 @@ class Dataset(Sequence[Throw]):
         for joint in chosen:
             if joint not in known:
                 raise ConfigError(unknown_joint(joint, robot_of(self.config)))
-        wanted = tuple(columns)
-        return read_trajectories(trials, self._stored, wanted, known, chosen, threads=threads)
+        recorded = Recorded(known, moving_bodies_of(self.config))
+        wanted = tuple(list_columns(recorded.bodies) if columns is None else columns)
+        return read_trajectories(trials, self._stored, wanted, recorded, chosen, threads=threads)
 
     @property
     def joints(self) -> tuple[str, ...]:

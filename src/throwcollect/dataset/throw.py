@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,21 +17,17 @@ from throwcollect.config.schema import Config
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of
 from throwcollect.dataset.mcap_reader import EpisodePlace
-from throwcollect.dataset.motion import Ball, Joints
-from throwcollect.dataset.throws_table import Row, ball_state
+from throwcollect.dataset.motion import Body, Joints
+from throwcollect.dataset.throws_table import Row, body_state
 from throwcollect.dataset.trajectories import (
-    ATTRIBUTES,
-    BALL_COLUMNS,
-    BALL_COMPONENTS,
+    BODY_COMPONENTS,
     JOINT_COLUMNS,
-    STAMPS,
     TIMES,
     Column,
     name_components,
 )
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.episode.topics import BODY_PARTS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.robots.description import robot_of
@@ -45,8 +41,8 @@ pd = lazily("pandas")
 
 
 @dataclass(frozen=True, eq=False)
-class BallEvent:
-    """The ball at one instant, in world.
+class BodyEvent:
+    """The object at one instant, in world.
 
     Attributes:
         time_s: Time since the start of the trial [s].
@@ -61,10 +57,10 @@ class BallEvent:
 
 @dataclass(frozen=True)
 class ContactInterval:
-    """An interval in which the ball was pressed against one body.
+    """An interval in which the object was pressed against one body.
 
     Attributes:
-        body: Name of the tool, ``ground``, or the name of the robot's link.
+        body: Name of the tool, ``ground``, or the name of the robot's link or of the body of the scene.
         start_s: Time of its start, since the start of the trial [s].
         end_s: Time of its end [s]; None if it lasted to the end of the trial.
     """
@@ -75,7 +71,7 @@ class ContactInterval:
 
 
 class Events:
-    """What happened to the ball.
+    """What happened to the object.
 
     Attributes:
         release: When it left the tool; None if it never did.
@@ -93,7 +89,7 @@ class Events:
 
     @cached_property
     def contacts(self) -> tuple[ContactInterval, ...]:
-        """All contacts of the ball, by start time.
+        """All contacts of the object, by start time.
 
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
@@ -109,9 +105,14 @@ class Events:
         )
 
 
-def _make_event(row: Row, name: str) -> BallEvent | None:
-    state = ball_state(row, name)
-    return None if state is None else BallEvent(state.time_s, np.array(state.position), np.array(state.velocity))
+def _copy(array: Column) -> Column:
+    """Copy an array of samples into one that belongs to the caller."""
+    return np.array(array, order="C")
+
+
+def _make_event(row: Row, name: str) -> BodyEvent | None:
+    state = body_state(row, name)
+    return None if state is None else BodyEvent(state.time_s, np.array(state.position), np.array(state.velocity))
 
 
 class Throw:
@@ -215,7 +216,7 @@ class Throw:
 
     @cached_property
     def events(self) -> Events:
-        """Release, apex and landing, and the contacts of the ball."""
+        """Release, apex and landing, and the contacts of the object."""
         return Events(self.row, self)
 
     def read_episode(self) -> Episode:
@@ -259,14 +260,16 @@ class Throw:
             located.hint = located.hint or command("dataset", "verify", self._source)
             raise located from error
 
-    @cached_property
-    def ball(self) -> Ball:
-        """The ball over time.
+    @property
+    def object(self) -> Body:
+        """The body that the robot acts on, over time, such as the ball; it is one of `bodies`.
 
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        return Ball(*self._copy_columns(BALL_COLUMNS))
+        return self.bodies[self._config.acted_on]
+
+    ball = object
 
     @cached_property
     def joints(self) -> Joints:
@@ -275,26 +278,23 @@ class Throw:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        return Joints(robot_of(self._config).joints, *self._copy_columns(JOINT_COLUMNS))
+        header, samples = self.read_samples()
+        arrays = (getattr(samples, name) for name in ("stamps_ns", *JOINT_COLUMNS.values()))
+        return Joints(robot_of(self._config).joints, samples.seconds_since(header.start_ns), *map(_copy, arrays))
 
     @cached_property
-    def bodies(self) -> dict[str, Ball]:
-        """The bodies of the scene that move, over time, by name; empty if there are none.
+    def bodies(self) -> dict[str, Body]:
+        """All bodies that move, over time, by name: the object, and those of the scene.
 
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
         header, samples = self.read_samples()
         times = samples.seconds_since(header.start_ns)
-        moving = moving_bodies_of(self._config)
-        parts = (np.split(samples.bodies[:, number], BODY_PARTS, axis=1) for number in range(len(moving)))
-        return {name: Ball(times, samples.stamps_ns, *each) for name, each in zip(moving, parts, strict=True)}
-
-    def _copy_columns(self, names: Iterable[str]) -> list[Column]:
-        """Copy columns of the samples into arrays that belong to the caller, after those of times and stamps."""
-        header, samples = self.read_samples()
-        columns = (getattr(samples, ATTRIBUTES[name]) for name in (STAMPS, *names))
-        return [samples.seconds_since(header.start_ns), *(np.array(column, order="C") for column in columns)]
+        return {
+            name: Body(name, times, *map(_copy, (samples.stamps_ns, *samples.parts_of(number))))
+            for number, name in enumerate(moving_bodies_of(self._config))
+        }
 
     def to_pandas(self) -> DataFrame:
         """Make a DataFrame of the motion of joints and bodies: one row a sample, by time since the start of the trial.
@@ -308,12 +308,11 @@ class Throw:
         """
         columns: dict[str, NDArray[np.float64]] = {}
         sliding = robot_of(self._config).sliding
-        for name in (*JOINT_COLUMNS, *BALL_COLUMNS):
-            series, _, quantity = name.partition("_")
-            values = getattr(getattr(self, series), quantity)
+        for name, quantity in JOINT_COLUMNS.items():
+            values = getattr(self.joints, quantity)
             columns |= dict(zip(name_components(name, self.joints.names, sliding), values.T, strict=True))
         for body, motion in self.bodies.items():
-            for quantity, components in BALL_COMPONENTS.items():
+            for quantity, components in BODY_COMPONENTS.items():
                 names = (f"{body}_{component}" for component in components)
                 columns |= dict(zip(names, getattr(motion, quantity).T, strict=True))
-        return pd.DataFrame(columns, index=pd.Index(self.ball.time_s, name=TIMES))
+        return pd.DataFrame(columns, index=pd.Index(self.joints.time_s, name=TIMES))

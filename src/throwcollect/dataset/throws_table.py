@@ -24,9 +24,9 @@ from throwcollect.sweep.arrow_column import find_range, find_trial, make_table, 
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
-from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
-from throwcollect.tasks.result_columns import ball_columns, join_ball
+from throwcollect.tasks.result_columns import body_columns, join_body
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import ascii_unit, unit_of_name
 
@@ -51,13 +51,13 @@ def make_field(name: str, kind: pa.DataType, description: str, *, unit: str | No
     return pa.field(name, kind, metadata=metadata)
 
 
-def ball_state(row: Row, name: str) -> BallState | None:
+def body_state(row: Row, name: str) -> ObjectState | None:
     """Read the state of the ball at ``release``, ``apex`` or ``landing`` from a row of the table of throws.
 
     It is None if the trial came to no such event, or its task knows none.
     """
-    values: list[Any] = [row.get(column) for column in ball_columns(name)]
-    return None if None in values else join_ball(values)
+    values: list[Any] = [row.get(column) for column in body_columns(name)]
+    return None if None in values else join_body(values)
 
 
 def _check_task(task: Task[Any], columns: Sequence[str]) -> None:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 import mmap
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
-from throwcollect.episode.message_table import MessageTable, read_column
+from throwcollect.episode.message_table import MessageTable, list_body_fields, read_column
 from throwcollect.episode.topics import STAMP, read_stamps, rotate
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.units import NS_PER_S, name_sliding
@@ -25,24 +25,18 @@ from throwcollect.wording import format_count, suggest
 
 TIMES = "time_s"
 STAMPS = "stamps_ns"
-ATTRIBUTES = {
-    STAMPS: "stamps_ns",
-    "joints_position": "position",
-    "joints_velocity": "velocity",
-    "joints_effort": "effort",
-    "ball_position": "ball_position",
-    "ball_orientation_xyzw": "ball_orientation_xyzw",
-    "ball_velocity": "ball_linear_velocity",
-    "ball_angular_velocity": "ball_angular_velocity",
-}
-"""The attribute of `Samples` that each recorded column has."""
-COLUMNS = (TIMES, *ATTRIBUTES)
-"""All columns of a trajectory; ``docs/reading.md`` describes them."""
-JOINT_COLUMNS, BALL_COLUMNS = COLUMNS[2:5], COLUMNS[5:]
-_ORIENTATION, *_VELOCITIES = COLUMNS[6:]
+JOINT_COLUMNS = {"joints_position": "position", "joints_velocity": "velocity", "joints_effort": "effort"}
+"""Columns of joints, and the fields of `MessageTable.rows` that they are read from."""
 
 _JOINT_COMPONENTS = {"position": "position_rad", "velocity": "velocity_radps", "effort": "effort_nm"}
-BALL_COMPONENTS = {
+_BODY_QUANTITIES = {
+    "position": "position",
+    "orientation_xyzw": "orientation_xyzw",
+    "velocity": "linear_velocity",
+    "angular_velocity": "angular_velocity",
+}
+"""Quantities in columns of bodies, and what of a body they are read from (`BODY_FIELDS`)."""
+BODY_COMPONENTS = {
     "position": ("x_m", "y_m", "z_m"),
     "orientation_xyzw": ("qx", "qy", "qz", "qw"),
     "velocity": ("vx_mps", "vy_mps", "vz_mps"),
@@ -51,6 +45,8 @@ BALL_COMPONENTS = {
 
 Column = NDArray[Any]
 """float64, or int64 for stamps."""
+
+_ORIENTATION = "orientation_xyzw"
 
 _LARGE_BYTES = 4 << 20
 _BLOCK = 16
@@ -62,14 +58,29 @@ _MOST_THREADS = 4
 def name_components(column: str, joints: Sequence[str], sliding: Collection[str] = ()) -> tuple[str, ...]:
     """Name the components of a column, with units, for a table in which each has a column of its own.
 
-    The column is any of `COLUMNS` but times and stamps. A column of joints has the joints `joints`, of
-    which some may be `sliding`.
+    The column is one of `JOINT_COLUMNS`, which have the joints `joints`, of which some may be `sliding`.
     """
-    series, _, quantity = column.partition("_")
-    if series == "joints":
-        names = {joint: f"{joint}_{_JOINT_COMPONENTS[quantity]}" for joint in joints}
-        return tuple(name_sliding(name) if joint in sliding else name for joint, name in names.items())
-    return tuple(f"ball_{component}" for component in BALL_COMPONENTS[quantity])
+    names = {joint: f"{joint}_{_JOINT_COMPONENTS[JOINT_COLUMNS[column]]}" for joint in joints}
+    return tuple(name_sliding(name) if joint in sliding else name for joint, name in names.items())
+
+
+def list_columns(bodies: Sequence[str]) -> dict[str, str]:
+    """List the columns of trajectories in which these bodies move, with the fields of rows that they are read from.
+
+    ``docs/reading.md`` describes them.
+    """
+    columns = {TIMES: STAMPS, STAMPS: STAMPS, **JOINT_COLUMNS}
+    for number, name in enumerate(bodies):
+        fields = list_body_fields(number)
+        columns |= {f"{name}_{quantity}": fields[part] for quantity, part in _BODY_QUANTITIES.items()}
+    return columns
+
+
+class Recorded(NamedTuple):
+    """Names of what moves in the recordings of a dataset: the joints, and bodies with the object first."""
+
+    joints: tuple[str, ...]
+    bodies: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,31 +162,32 @@ def read_trajectories(
     trials: Sequence[int],
     places: Sequence[EpisodePlace | None],
     columns: Sequence[str],
-    known: tuple[str, ...],
+    recorded: Recorded,
     joints: tuple[str, ...],
     *,
     threads: int | None = None,
 ) -> Trajectories:
     """Read the trajectories of trials, whose episodes lie at these places; None for a trial that has none.
 
-    Episodes have the joints `known`. The other arguments are those of `Dataset.trajectories`.
+    The other arguments are those of `Dataset.trajectories`.
 
     Raises:
         ConfigError: If there is no such column.
         DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
     """
+    there = list_columns(recorded.bodies)
     for column in columns:
-        if column not in COLUMNS:
-            raise ConfigError(f"a trajectory has no column {column!r}{suggest(column, COLUMNS, 'docs/reading.md')}")
+        if column not in there:
+            raise ConfigError(f"a trajectory has no column {column!r}{suggest(column, there, 'docs/reading.md')}")
     stored = [place for place in places if place is not None]
     offsets = np.zeros(len(places) + 1, np.int64)
     np.cumsum([place.samples if place else 0 for place in places], out=offsets[1:])
-    found = _make_columns(columns, int(offsets[-1]), len(joints))
+    found = {name: _make_column(name, int(offsets[-1]), len(joints)) for name in columns}
     blocks = [stored[first : first + _BLOCK] for first in range(0, len(stored), _BLOCK)]
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 
     def read(block: Sequence[EpisodePlace], start: int, stop: int) -> None:
-        _fill({name: column[start:stop] for name, column in found.items()}, block, known, joints)
+        _fill({name: column[start:stop] for name, column in found.items()}, block, recorded, joints)
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:
@@ -185,14 +197,12 @@ def read_trajectories(
     return Trajectories(np.array(trials, np.int64), offsets, found, joints)
 
 
-def _make_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str, Column]:
-    """Make arrays for some of `COLUMNS`, by name; shape ``(samples,)`` or ``(samples, n)``.
-
-    `joints` is the number of joints that the columns of joints have.
-    """
-    widths = dict.fromkeys(JOINT_COLUMNS, joints) | {name: len(name_components(name, ())) for name in BALL_COLUMNS}
-    shapes = {name: (samples, widths[name]) if name in widths else (samples,) for name in columns}
-    return {name: _make_empty(shape, np.int64 if name == STAMPS else np.float64) for name, shape in shapes.items()}
+def _make_column(name: str, samples: int, joints: int) -> Column:
+    """Make the array of a column, shape ``(samples,)`` or ``(samples, n)``; columns of joints have so many joints."""
+    if name in (TIMES, STAMPS):
+        return _make_empty((samples,), np.int64 if name == STAMPS else np.float64)
+    width = joints if name in JOINT_COLUMNS else 4 if name.endswith(_ORIENTATION) else 3
+    return _make_empty((samples, width), np.float64)
 
 
 def _make_empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
@@ -206,26 +216,31 @@ def _make_empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
 
 
 def _fill(
-    columns: Mapping[str, Column], places: Sequence[EpisodePlace], known: tuple[str, ...], joints: tuple[str, ...]
+    columns: Mapping[str, Column], places: Sequence[EpisodePlace], recorded: Recorded, joints: tuple[str, ...]
 ) -> None:
     """Fill columns with those of some throws, one after the other.
 
     Args:
-        columns: Arrays with as many rows as the throws have samples, by name, as `_make_columns` makes them.
+        columns: Arrays with as many rows as the throws have samples, by name, as `_make_column` makes them.
         places: The throws.
-        known: Joints that are recorded.
+        recorded: What moves in the throws.
         joints: Joints that the columns of joints have; some of those that are recorded.
     """
-    velocities = [name for name in _VELOCITIES if name in columns]
+    fields, known = list_columns(recorded.bodies), recorded.joints
+    velocities = {
+        f"{body}_{_ORIENTATION}": [name for name in (f"{body}_velocity", f"{body}_angular_velocity") if name in columns]
+        for body in recorded.bodies
+    }
     # Velocities in world follow from orientations, and times from stamps, so these are read even if nobody asks.
-    sources = {_ORIENTATION: velocities, STAMPS: [name for name in (STAMPS, TIMES) if name in columns]}
+    sources = {**velocities, STAMPS: [name for name in (STAMPS, TIMES) if name in columns]}
     missing = {name for name, derived in sources.items() if derived} - columns.keys()
-    recorded = {**columns, **_make_columns(missing, sum(place.samples for place in places), 0)}
+    count = sum(place.samples for place in places)
+    copied = {**columns, **{name: _make_column(name, count, 0) for name in missing}}
     some = [] if joints == known else [name for name in JOINT_COLUMNS if name in columns]
     # Rows of whole columns are copied as runs of bytes.
     whole = [
-        (column.reshape(len(column), -1).view(f"V{column.strides[0]}")[:, 0], ATTRIBUTES[name])
-        for name, column in recorded.items()
+        (column.reshape(len(column), -1).view(f"V{column.strides[0]}")[:, 0], fields[name])
+        for name, column in copied.items()
         if name not in {TIMES, *some}
     ]
     indexes = np.array([known.index(joint) for joint in joints], np.intp)
@@ -243,17 +258,18 @@ def _fill(
                 for target, name in whole:
                     target[span] = rows[name]
                 for name in some:
-                    every = read_column(rows, ATTRIBUTES[name])
+                    every = read_column(rows, fields[name])
                     # With the default mode, NumPy would write to a buffer first; all indexes are valid.
                     np.take(every, indexes, axis=1, out=columns[name][span], mode="clip")
                 del rows, chunk  # the next ones then take their place in the caches
     if sources[STAMPS]:
-        stamps = recorded[STAMPS]
+        stamps = copied[STAMPS]
         stamps[:] = read_stamps(stamps.view(STAMP), "stamp")
         if TIMES in columns:
             starts, lengths = zip(*((place.start_ns, place.samples) for place in places), strict=True)
             np.divide(stamps - np.repeat(starts, lengths), NS_PER_S, out=columns[TIMES])
-    if velocities:
-        turned = rotate(recorded[_ORIENTATION], *(columns[name] for name in velocities), inverse=False)
-        for name, values in zip(velocities, turned, strict=True):
-            columns[name][:] = values
+    for orientation, names in velocities.items():
+        if names:
+            turned = rotate(copied[orientation], *(columns[name] for name in names), inverse=False)
+            for name, values in zip(names, turned, strict=True):
+                columns[name][:] = values

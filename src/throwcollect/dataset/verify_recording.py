@@ -197,10 +197,10 @@ def find_flight_problems(episode: Episode, config: Config) -> Iterator[str]:
     if len(samples) < 2:
         return
     position, velocity = ballistic_steps(
-        samples.ball_position[:-1], samples.ball_linear_velocity[:-1], steps=steps, config=config
+        samples.object_position[:-1], samples.object_linear_velocity[:-1], steps=steps, config=config
     )
-    apart_m = np.linalg.norm(samples.ball_position[1:] - position, axis=1)
-    apart_mps = np.linalg.norm(samples.ball_linear_velocity[1:] - velocity, axis=1)
+    apart_m = np.linalg.norm(samples.object_position[1:] - position, axis=1)
+    apart_mps = np.linalg.norm(samples.object_linear_velocity[1:] - velocity, axis=1)
     wrong = _find_free_intervals(episode.header, samples.stamps_ns, config.sim.physics_hz) & (
         (apart_m > _POSITION_M) | (apart_mps > _VELOCITY_MPS)
     )

@@ -23,7 +23,7 @@ _PLACES = frozenset({"trial", "chunk_offset"})
 """Columns of numbers that measure nothing."""
 _AXES = ("x", "y", "z")
 _JOINT_GROUPS = {"position_rad": "position", "velocity_radps": "velocity", "effort_nm": "effort"}
-_BALL_GROUPS = {"ball_position_m": "ball_position", "ball_velocity_mps": "ball_linear_velocity"}
+_OBJECT_GROUPS = {"position_m": "object_position", "velocity_mps": "object_linear_velocity"}
 """Name of a group of signals here, and the attribute of `Samples` that has them."""
 
 
@@ -72,7 +72,7 @@ class Statistics:
         episodes: Number of episodes.
         samples: Number of samples that the statistics of signals are over.
         samples_not_finite: Number of samples that are left out, because a number in them is not finite.
-        signals: Joints' positions [rad], velocities [rad/s] and torques [Nm], the ball's position [m] and velocity
+        signals: Joints' positions [rad], velocities [rad/s] and torques [Nm], the object's position [m] and velocity
             [m/s] in world: by group, such as ``position_rad``, then by joint or axis. Empty without samples.
     """
 
@@ -113,7 +113,7 @@ def statistics(directory: StrPath) -> Statistics:
         episodes=len(recorded),
         samples=moments.count if moments else 0,
         samples_not_finite=left_out,
-        signals=_summarise_signals(moments, dataset.joints) if moments else {},
+        signals=_summarise_signals(moments, dataset.joints, dataset.config.acted_on) if moments else {},
     )
 
 
@@ -144,14 +144,16 @@ def _summarise_columns(throws: pa.Table) -> Iterator[tuple[str, ColumnStatistics
 
 def _stack_signals(samples: Samples) -> NDArray[np.float64]:
     """Stack all signals side by side, shape ``(n_samples, n_signals)``."""
-    return np.hstack([getattr(samples, attribute) for attribute in (_JOINT_GROUPS | _BALL_GROUPS).values()])
+    return np.hstack([getattr(samples, attribute) for attribute in (*_JOINT_GROUPS.values(), *_OBJECT_GROUPS.values())])
 
 
-def _summarise_signals(moments: Moments, joints: tuple[str, ...]) -> dict[str, dict[str, SignalStatistics]]:
+def _summarise_signals(
+    moments: Moments, joints: tuple[str, ...], acted_on: str
+) -> dict[str, dict[str, SignalStatistics]]:
     # Rounding must not turn a constant into noise, because people divide by the deviation when they normalise.
     constant = moments.minimum == moments.maximum
     mean, std = np.where(constant, moments.minimum, moments.mean), np.where(constant, 0.0, moments.std)
     columns = (moments.minimum, moments.maximum, mean, std)
     summaries = (SignalStatistics(*numbers) for numbers in zip(*(column.tolist() for column in columns), strict=True))
-    groups = {**dict.fromkeys(_JOINT_GROUPS, joints), **dict.fromkeys(_BALL_GROUPS, _AXES)}
+    groups = {**dict.fromkeys(_JOINT_GROUPS, joints), **{f"{acted_on}_{each}": _AXES for each in _OBJECT_GROUPS}}
     return {group: dict(zip(names, islice(summaries, len(names)), strict=True)) for group, names in groups.items()}

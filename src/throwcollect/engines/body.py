@@ -72,6 +72,16 @@ class LinkShape:
     placement: Placement
     mesh: Mesh | None = None
 
+    @property
+    def radius_m(self) -> float:
+        """Radius of the sphere around a box, cylinder or sphere [m]."""
+        match self.kind, self.size:
+            case "box", (x, y, z):
+                return math.hypot(x / 2, y / 2, z / 2)
+            case "cylinder", (radius, length):
+                return math.hypot(radius, length / 2)
+        return self.size[0]
+
 
 def moments_of(kind: str, size: Sequence[float], mass_kg: float) -> tuple[float, float, float]:
     """Moments of inertia of a solid box, cylinder or sphere about its centre, along its own axes [kg m²]."""
@@ -82,7 +92,8 @@ def moments_of(kind: str, size: Sequence[float], mass_kg: float) -> tuple[float,
             across = radius * radius / 4 + length * length / 12
             moments = across, across, radius * radius / 2
         case _, (radius,):
-            moments = (0.4 * radius * radius,) * 3
+            # The bytes of throws depend on the order of these factors.
+            return (0.4 * mass_kg * radius**2,) * 3
     return mass_kg * moments[0], mass_kg * moments[1], mass_kg * moments[2]
 
 
@@ -99,6 +110,11 @@ class LinkInertia:
     mass_kg: float
     placement: Placement
     moments_kgm2: tuple[float, ...]
+
+    @property
+    def diagonal(self) -> list[float]:
+        """The moments about the axes x, y, z [kg m²]."""
+        return [self.moments_kgm2[number] for number, (row, column) in enumerate(INERTIA.values()) if row == column]
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import HERE, BodyLink, BodyModel, Placement, Vector, turn_of
+from throwcollect.engines.body import HERE, BodyLink, BodyModel, LinkInertia, Placement, Vector, turn_of
 
 Quaternion = tuple[float, float, float, float]
 
@@ -24,14 +25,14 @@ Box = tuple[Vector, Vector]
 
 Sample = tuple[float, ...]
 """The world at one instant: positions [rad], velocities [rad/s] and motor torques [Nm] of all moving joints, then
-position, orientation, linear and angular velocity of each body of the scene that moves, and of the ball. These are bare
-numbers, as an engine makes a sample every few steps and objects would slow it down."""
+position, orientation, linear and angular velocity of each body of the scene that moves, and of the object. These are
+bare numbers, as an engine makes a sample every few steps and objects would slow it down."""
 
 BODY_NUMBERS = 13
-"""How many numbers of a sample belong to a body; the last ones belong to the ball."""
+"""How many numbers of a sample belong to a body; the last ones belong to the object."""
 
 GROUND = "ground"
-"""Name of the ground in contacts of the ball."""
+"""Name of the ground in contacts of the object."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class BodyState:
     """A body at one instant.
 
     Attributes:
-        position: Its origin in world [m]; the origin of the ball is its centre.
+        position: Its origin in world [m]; that of a body of the scene is its centre.
         orientation_xyzw: Unit quaternion, body to world.
         linear_velocity: In world [m/s].
         angular_velocity: In world [rad/s].
@@ -53,14 +54,13 @@ class BodyState:
 
 @dataclass(frozen=True)
 class ToolLink:
-    """The tool that the robot throws with.
+    """The tool with which the robot acts on the object.
 
     Attributes:
         link: Its link in the robot's description.
-        name: Its name in contacts of the ball.
-        opening: Unit vector in the frame of the link; in this direction the tool is open and cannot hold the ball back.
-        seat: Centre in that frame of the ball that the tool holds until it lets go of it [m]; None if the ball lies in
-            the tool.
+        name: Its name in contacts of the object.
+        opening: Unit vector in the frame of the link; in this direction the tool is open and cannot hold the object.
+        seat: Centre in that frame of the object that the tool holds until it lets go of it [m]; None if it holds none.
     """
 
     link: str
@@ -71,19 +71,23 @@ class ToolLink:
 
 @dataclass(frozen=True)
 class SceneBody:
-    """A body of the world. The ball collides with it; one that moves collides with everything.
+    """A body of the world; one that moves collides with everything.
 
     Attributes:
         link: Its name, by which contacts are recorded, its shapes, and its inertia; without an inertia it never moves.
         placement: Its pose in world, at the start.
         friction: Coulomb friction [-], which is multiplied with that of what it touches.
         restitution: Coefficient of restitution [-], which is multiplied likewise.
+        rolling_friction_m: Lever arm with which a surface resists its rolling [m], over the friction of that surface.
+        velocity: Its velocity in world at the start [m/s].
     """
 
     link: BodyLink
     placement: Placement = HERE
     friction: float = 1.0
     restitution: float = 1.0
+    rolling_friction_m: float = 0.0
+    velocity: Vector = (0.0, 0.0, 0.0)
 
     @property
     def moves(self) -> bool:
@@ -95,6 +99,17 @@ class SceneBody:
         """The numbers of a sample for its pose at the start, at rest."""
         return (*self.placement.xyz, *turn_of(self.placement), *(0.0,) * 6)
 
+    @property
+    def radius_m(self) -> float:
+        """Radius of the sphere around a body of one shape [m]."""
+        (shape,) = self.link.shapes
+        return shape.radius_m
+
+    @property
+    def inertia(self) -> LinkInertia:
+        """The inertia of a body that moves."""
+        return cast("LinkInertia", self.link.inertia)
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -105,8 +120,8 @@ class Scene:
         moving: The joints that are commanded, in the order of every command and sample.
         base_height_m: Height of its fixed base above the ground.
         tool: The tool.
-        ground_is_solid: Whether the ground stops the ball in all steps.
-        ball_radius_m: Radius of the ball.
+        ground_is_solid: Whether the ground stops the object in all steps.
+        object: The body that the robot acts on, such as a ball; it has one shape.
         bodies: What else stands in the world.
     """
 
@@ -115,17 +130,17 @@ class Scene:
     base_height_m: float
     tool: ToolLink
     ground_is_solid: bool
-    ball_radius_m: float
+    object: SceneBody
     bodies: tuple[SceneBody, ...] = ()
 
     @property
     def moving_bodies(self) -> tuple[SceneBody, ...]:
-        """The bodies that samples hold, in their order there."""
+        """The bodies that samples hold before the object, in their order there."""
         return tuple(body for body in self.bodies if body.moves)
 
     def has_robot_of(self, other: Scene) -> bool:
-        """Whether nothing but the ball and the bodies differs from another scene."""
-        return replace(other, ball_radius_m=self.ball_radius_m, bodies=self.bodies) == self
+        """Whether nothing but the object and the bodies differs from another scene."""
+        return replace(other, object=self.object, bodies=self.bodies) == self
 
 
 @dataclass(frozen=True)
@@ -136,11 +151,6 @@ class Physics:
         hz: Physics steps per simulated second.
         solver_iterations: Iterations of the contact solver per step.
         gravity_mps2: Gravity, downwards.
-        ball_mass_kg: Mass of the ball.
-        ball_friction: Coulomb friction of the ball [-].
-        ball_restitution: Coefficient of restitution between the ball and everything that it touches [-].
-        ball_rolling_friction_m: Lever arm with which a surface resists the rolling of the ball [m], over the friction
-            of that surface.
         surface_friction: Coulomb friction of robot, tool and ground [-].
         efforts: Largest torque of each moving joint [Nm].
         position_gain_per_s: Velocity that a motor adds per radian of position error.
@@ -150,10 +160,6 @@ class Physics:
     hz: int
     solver_iterations: int
     gravity_mps2: float
-    ball_mass_kg: float
-    ball_friction: float
-    ball_restitution: float
-    ball_rolling_friction_m: float
     surface_friction: float
     efforts: tuple[float, ...]
     position_gain_per_s: float
@@ -165,8 +171,8 @@ class State:
     """A state that a world can be put into.
 
     Attributes:
-        sample: Robot and ball; the torques do not matter.
-        touching: Names of the bodies that press on the ball.
+        sample: Robot, bodies and object; the torques do not matter.
+        touching: Names of the bodies that press on the object.
     """
 
     sample: Sample
@@ -183,9 +189,9 @@ class Steps:
         velocities: Velocities that lead from each row to the next [rad/s], shape ``(n_steps, n_moving)``.
         first_sample: Number of the first step after which a sample is due; the first step is number 1.
         stride: Steps from one sample to the next.
-        drag_kgpm: Force of the air on the ball over the square of the ball's speed.
-        ground_is_solid: Whether the ground stops the ball in these steps, even if that of the scene does not.
-        held: Number of the last step in which a tool that holds the ball still does; 0 if it lets go at once.
+        drag_kgpm: Force of the air on the object over the square of its speed.
+        ground_is_solid: Whether the ground stops the object in these steps, even if that of the scene does not.
+        held: Number of the last step in which a tool that holds the object still does; 0 if it lets go at once.
     """
 
     targets: NDArray[np.float64]
@@ -201,7 +207,7 @@ class Observer:
     """Is called while an engine takes steps, and may stop it; this one ignores all calls."""
 
     def on_touch(self, step: int, bodies: frozenset[str]) -> None:
-        """Take note that other bodies than before press on the ball.
+        """Take note that other bodies than before press on the object.
 
         Args:
             step: Number of the first step in which they do.
@@ -244,7 +250,7 @@ class LoadedLink:
 
 
 class Engine(ABC):
-    """One world with a robot, a ball and the ground.
+    """One world with a robot, an object and the ground.
 
     What follows from a state and commands does not depend, in any bit, on what happened in the world before.
     """
@@ -274,27 +280,32 @@ class Engine(ABC):
         """Set all numbers of the physics, so that no earlier one remains."""
 
     @abstractmethod
-    def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put joints [rad], the ball at its seat in the tool's frame [m], and bodies at their start, all at rest."""
+    def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
+        """Put joints [rad], and object and bodies at their start, all at rest.
+
+        Args:
+            joints: Positions of the moving joints.
+            seat: Centre of the object in the frame of the tool [m]; None if it starts at its placement.
+        """
 
     @abstractmethod
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state, and leave no trace of earlier ones in the world."""
+        """Put robot, bodies and object into a state, and leave no trace of earlier ones in the world."""
 
     @property
     @abstractmethod
     def state(self) -> State:
-        """Robot and ball now."""
+        """Robot, bodies and object now."""
 
     @abstractmethod
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
 
-        A ball that a tool holds (`ToolLink.seat`) moves with it, which counts as touching it, and is free from the
+        An object that a tool holds (`ToolLink.seat`) moves with it, which counts as touching it, and is free from the
         first step after `Steps.held` on, or once it has been placed elsewhere; then the tool never holds it again.
 
-        Every engine moves a ball that nothing touches by the same arithmetic, which `dataset verify` repeats:
-        in each step of dt, v += (g - drag_kgpm / ball_mass_kg · |v| · v) · dt, and then x += v · dt.
+        Every engine moves an object that nothing touches by the same arithmetic, which `dataset verify` repeats:
+        in each step of dt, v += (g - drag_kgpm / mass_kg · |v| · v) · dt, and then x += v · dt.
 
         An engine may compute further steps, but its world ends in the state of the step at which the observer stopped.
 
@@ -303,12 +314,15 @@ class Engine(ABC):
         """
 
     @abstractmethod
-    def place_ball(self, ball: BodyState) -> None:
-        """Set pose and velocity of the ball, which no tool holds then."""
+    def place(self, number: int, state: BodyState) -> None:
+        """Set pose and velocity of a body: of the object, number 0, which no tool holds then, or of another one.
+
+        Other bodies that move count from 1, in the order of samples.
+        """
 
 
-def ball_of(sample: Sample) -> BodyState:
-    """Read the ball from a sample."""
+def object_in(sample: Sample) -> BodyState:
+    """Read the object from a sample."""
     return body_of(sample[-BODY_NUMBERS:])
 
 

@@ -11,12 +11,11 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.frames import FrameTree, read_frames
 from throwcollect.episode.topics import (
     Topic,
-    ball_odometry,
-    body_odometry,
     clock,
     controller_state,
     joint_states,
     make_fixed_transforms,
+    odometry,
     transforms,
 )
 from throwcollect.robots.description import robot_of
@@ -25,12 +24,12 @@ from throwcollect.robots.surroundings import moving_bodies_of
 ROBOT_DESCRIPTION_ID = 1
 TF_STATIC_ID = 2
 JOINT_STATES_ID = 3
-BALL_ODOMETRY_ID = 4
+OBJECT_ODOMETRY_ID = 4
 _CLOCK_ID = 5
 _TF_ID = 6
 _FIRST_CONTROLLER_ID = 7
 FIRST_BODY_ID = 200
-"""Bodies of the scene that move follow from this number on."""
+"""Bodies of the scene that move, other than the object, follow from this number on."""
 
 _INFINITE_S, _INFINITE_NS = 9223372036, 854775807
 """An infinite duration in rmw: 2^63 - 1 ns."""
@@ -141,9 +140,9 @@ class Channels:
 
 def _make_topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     chosen, robot = config.record.topics, robot_of(config)
-    topics = {JOINT_STATES_ID: joint_states(robot.joints), BALL_ODOMETRY_ID: ball_odometry()}
-    bodies = moving_bodies_of(config)
-    topics |= {FIRST_BODY_ID + number: body_odometry(name, number) for number, name in enumerate(bodies)}
+    topics, bodies = {JOINT_STATES_ID: joint_states(robot.joints)}, moving_bodies_of(config)
+    for number, name in enumerate(bodies):
+        topics[FIRST_BODY_ID + number - 1 if number else OBJECT_ODOMETRY_ID] = odometry(name, number)
     if "clock" in chosen:
         topics[_CLOCK_ID] = clock()
     if "tf" in chosen:

@@ -16,15 +16,16 @@ import zstandard
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from throwcollect.episode.channels import BALL_ODOMETRY_ID, FIRST_BODY_ID, JOINT_STATES_ID, Channels
+from throwcollect.episode.channels import FIRST_BODY_ID, JOINT_STATES_ID, OBJECT_ODOMETRY_ID, Channels
 from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, Chunk, encode_message_index
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.episode.topics import (
+    BODY_FIELDS,
     STAMP,
     Rows,
-    ball_odometry,
     joint_states,
-    read_body,
+    odometry,
+    read_body_name,
     read_joint_names,
     read_stamps,
     rotate,
@@ -42,31 +43,35 @@ _ALIKE_BYTES = 11
 """Size of opcode, length and channel, which are the same in all records of a channel."""
 
 
-_FIELDS = {
-    JOINT_STATES_ID: {
-        "stamps_ns": "header.stamp.sec",
-        "position": "position",
-        "velocity": "velocity",
-        "effort": "effort",
-    },
-    BALL_ODOMETRY_ID: {
-        "ball_position": "pose.pose.position",
-        "ball_orientation_xyzw": "pose.pose.orientation",
-        "ball_linear_velocity": "twist.twist.linear",
-        "ball_angular_velocity": "twist.twist.angular",
-    },
+_JOINT_FIELDS = {
+    "stamps_ns": "header.stamp.sec",
+    "position": "position",
+    "velocity": "velocity",
+    "effort": "effort",
 }
-"""By channel: the attributes of `Samples`, and the fields of its messages that hold them."""
+"""Attributes of `Samples`, and the fields of joint states that hold them."""
+
+
+def list_body_fields(number: int) -> dict[str, str]:
+    """List the fields of rows that belong to a body, by what they hold: the object, number 0, or another one."""
+    return {part: f"body_{number}_{part}" if number else f"object_{part}" for part in BODY_FIELDS}
 
 
 @cache
-def _make_row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
+def _make_row_type(
+    joints: tuple[str, ...], bodies: tuple[str, ...], starts: tuple[int, ...], size: int
+) -> np.dtype[np.void]:
     """Make the type of a row of `size` bytes with the messages of joint states and odometry at `starts`.
 
     Each field is a run of bytes, so that NumPy copies a whole row of it at a time, aligned or not.
     """
     names, formats, offsets = [], [], []
-    for topic, start, columns in zip((joint_states(joints), ball_odometry()), starts, _FIELDS.values(), strict=True):
+    topics = joint_states(joints), *(odometry(name, number) for number, name in enumerate(bodies))
+    fields = [_JOINT_FIELDS]
+    for number in range(len(bodies)):
+        held = list_body_fields(number)
+        fields.append({held[part]: field for part, field in BODY_FIELDS.items()})
+    for topic, start, columns in zip(topics, starts, fields, strict=True):
         places = dict(topic.layout.dtype.fields or {})
         for name, field in columns.items():
             kind, offset = places[field][:2]
@@ -159,28 +164,43 @@ class MessageTable:
     def rows(self, joints: tuple[str, ...]) -> Rows:
         """View the samples, which have these joints, shape ``(n_samples,)``: fields named as in `Samples`, as bytes.
 
-        Velocities of the ball are in its own frame. `read_column` copies a field.
+        Fields of other bodies than the object are named by `list_body_fields`. Velocities of bodies are in their own
+        frames. `read_column` copies a field.
         """
-        topics = {JOINT_STATES_ID: joint_states(joints), BALL_ODOMETRY_ID: ball_odometry()}
+        topics = {JOINT_STATES_ID: joint_states(joints)}
+        for number, (channel, name) in enumerate(self.bodies.items()):
+            topics[channel] = odometry(name, number)
         for channel, topic in topics.items():
             if not topic.layout.describes_message(self._read_first_message(channel, topic.name)):
                 raise DatasetError(
                     f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
                 )
         starts = tuple(self.columns[channel].start + MESSAGE_HEADER.size for channel in topics)
-        return np.frombuffer(self.contents, _make_row_type(joints, starts, self._table.shape[1]))
+        size, bodies = self._table.shape[1], tuple(self.bodies.values())
+        return np.frombuffer(self.contents, _make_row_type(joints, bodies, starts, size))
+
+    @cached_property
+    def bodies(self) -> dict[int, str]:
+        """Names of the bodies that move, by channel, with the object first."""
+        others = sorted(channel for channel in self.columns if channel >= FIRST_BODY_ID)
+        channels = (OBJECT_ODOMETRY_ID, *others)
+        return {channel: read_body_name(self._read_first_message(channel, "odometry")) for channel in channels}
 
     @cached_property
     def samples(self) -> Samples:
-        """The samples, copied from the records; velocities of the ball are turned back into world."""
+        """The samples, copied from the records; velocities of bodies are turned back into world."""
         rows = self.rows(self.joints)
         # The numbers of each joint and each axis lie side by side, as arithmetic with them is several times as fast.
         columns = {name: np.asfortranarray(read_column(rows, name)) for name in rows.dtype.names or ()}
-        velocities = ("ball_linear_velocity", "ball_angular_velocity")
-        turned = rotate(columns["ball_orientation_xyzw"], *(columns[name] for name in velocities), inverse=False)
-        samples = Samples(**{**columns, **dict(zip(velocities, turned, strict=True))})
-        bodies = [read_body(self.messages(channel))[1] for channel in sorted(self.columns) if channel >= FIRST_BODY_ID]
-        return replace(samples, bodies=np.stack(bodies, axis=1)) if bodies else samples
+        others = []
+        for number in range(len(self.bodies)):
+            _, turn, *velocities = list_body_fields(number).values()
+            turned = rotate(columns[turn], *(columns[name] for name in velocities), inverse=False)
+            columns |= dict(zip(velocities, turned, strict=True))
+            if number:
+                others.append(np.hstack([columns.pop(name) for name in list_body_fields(number).values()]))
+        samples = Samples(**columns)
+        return replace(samples, bodies=np.stack(others, axis=1)) if others else samples
 
 
 class ChunkEncoder:

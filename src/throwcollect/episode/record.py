@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Literal
 
@@ -14,6 +14,8 @@ from throwcollect.units import NS_PER_S
 
 Instant = Annotated[int, Field(ge=0, le=2**62)]
 """Simulated time [ns]; no clock shows later ones."""
+_BODY_PARTS = (3, 7, 10)
+"""Where orientation, linear and angular velocity of a body begin, behind its position."""
 _Name = Annotated[str, Field(max_length=256)]
 """Name of a link or a controller; those of robots are far shorter."""
 
@@ -27,21 +29,21 @@ class Samples:
         position: Joint positions [rad], shape ``(n_samples, n_joints)``, in the order of `Robot.joints`.
         velocity: Joint velocities [rad/s], shape ``(n_samples, n_joints)``.
         effort: Torques applied by the motors [Nm], shape ``(n_samples, n_joints)``; 0 for locked joints.
-        ball_position: Ball centre in world [m], shape ``(n_samples, 3)``.
-        ball_orientation_xyzw: Unit quaternion, ball to world, shape ``(n_samples, 4)``.
-        ball_linear_velocity: In world [m/s], shape ``(n_samples, 3)``.
-        ball_angular_velocity: In world [rad/s], shape ``(n_samples, 3)``.
-        bodies: The same four of each body of the scene that moves, side by side, shape ``(n_samples, n_bodies, 13)``.
+        object_position: Centre in world of the object that the robot acts on [m], shape ``(n_samples, 3)``.
+        object_orientation_xyzw: Unit quaternion, object to world, shape ``(n_samples, 4)``.
+        object_linear_velocity: In world [m/s], shape ``(n_samples, 3)``.
+        object_angular_velocity: In world [rad/s], shape ``(n_samples, 3)``.
+        bodies: The same four of each other body that moves, side by side, shape ``(n_samples, n_bodies, 13)``.
     """
 
     stamps_ns: NDArray[np.int64]
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
     effort: NDArray[np.float64]
-    ball_position: NDArray[np.float64]
-    ball_orientation_xyzw: NDArray[np.float64]
-    ball_linear_velocity: NDArray[np.float64]
-    ball_angular_velocity: NDArray[np.float64]
+    object_position: NDArray[np.float64]
+    object_orientation_xyzw: NDArray[np.float64]
+    object_linear_velocity: NDArray[np.float64]
+    object_angular_velocity: NDArray[np.float64]
     bodies: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 13)))
 
     def __post_init__(self) -> None:
@@ -53,6 +55,13 @@ class Samples:
 
     def __getitem__(self, rows: slice) -> Samples:
         return Samples(**{name: column[rows] for name, column in vars(self).items()})
+
+    def parts_of(self, number: int) -> Sequence[NDArray[np.float64]]:
+        """Position, orientation, linear and angular velocity of the object, number 0, or of another body that moves."""
+        if number:
+            return np.split(self.bodies[:, number - 1], _BODY_PARTS, axis=1)
+        turn = self.object_orientation_xyzw
+        return self.object_position, turn, self.object_linear_velocity, self.object_angular_velocity
 
     def seconds_since(self, instant_ns: int) -> NDArray[np.float64]:
         """Times of the samples, counted from an instant [s], shape ``(n_samples,)``."""
@@ -81,10 +90,10 @@ class ControllerSamples:
 
 @dataclass(frozen=True)
 class Contact:
-    """An interval in which the ball was pressed against one body (normal force above zero).
+    """An interval in which the object was pressed against one body (normal force above zero).
 
     Attributes:
-        body: Name of the tool, ``ground``, or the name of the robot link.
+        body: Name of the tool, ``ground``, or the name of the robot link or of the body of the scene.
         start_ns: Simulated time of the first physics step with force [ns].
         end_ns: Simulated time of the first physics step without [ns]; None when it lasted to the end.
     """
@@ -112,10 +121,10 @@ class GoalOutcome:
 
 
 EndReason = Literal["landed", "rest", "timeout"]
-"""Reasons for the end of a trial: the ball has crossed the landing plane; ball and arm rest; its time is over."""
+"""Reasons for the end of a trial: by the rule of its task; object and arm rest; its time is over."""
 REST_S = 0.5
 REST_SPEED_MPS = 0.01
-"""A ball rests that has been slower than this for so long."""
+"""An object rests that has been slower than this for so long."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +135,7 @@ class EpisodeHeader:
         trial: Number of the trial.
         start_ns: Simulated time of the first sample [ns].
         end_reason: Reason for its end.
-        contacts: All contacts of the ball, by start time.
+        contacts: All contacts of the object, by start time.
         goals: One entry per controller that had a goal.
         samples: Number of samples; the sequence numbers of message records can count up to this bound.
     """

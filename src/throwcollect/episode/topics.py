@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rclzenoh.interfaces import deserialize, get_message
+from throwcollect.config.scene import BALL
 from throwcollect.episode.frames import WORLD, Frame, MovingFrame
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
@@ -18,13 +19,15 @@ from throwcollect.errors import DatasetError
 from throwcollect.robots.robot import Robot
 from throwcollect.units import NS_PER_S
 
-BALL = "ball"
-"""Name of the ball's frame, fixed to the ball and at its centre."""
-
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 _ODOMETRY = "nav_msgs/msg/Odometry"
-BODY_PARTS = (3, 7, 10)
-"""Where orientation, linear and angular velocity of a body begin, behind its position."""
+BODY_FIELDS = {
+    "position": "pose.pose.position",
+    "orientation_xyzw": "pose.pose.orientation",
+    "linear_velocity": "twist.twist.linear",
+    "angular_velocity": "twist.twist.angular",
+}
+"""What is recorded of a body, in the order of samples, and the fields of its messages that hold it."""
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _MOST_ROBOTS = 8
 """Most robots with cached layouts; there has to be a limit, as files may name any number of robots."""
@@ -129,59 +132,36 @@ def _fill_joint_states(rows: Rows, samples: Samples, _: SetPoints) -> None:
     rows["effort"] = samples.effort
 
 
-@cache
-def ball_odometry() -> Topic:
-    """``/ball/odometry``: nav_msgs/Odometry; pose in world, twist in the ball's own frame, covariances 0 (unknown)."""
-
-    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
-        turn, linear, angular = (
-            samples.ball_orientation_xyzw,
-            samples.ball_linear_velocity,
-            samples.ball_angular_velocity,
-        )
-        _fill_odometry(rows, samples.stamps_ns, samples.ball_position, turn, linear, angular)
-
-    return Topic("/ball/odometry", _ODOMETRY, _lay_odometry_out(BALL), fill)
-
-
 @lru_cache(maxsize=64)
-def body_odometry(name: str, number: int) -> Topic:
-    """``/bodies/<name>/odometry``: as that of the ball, of the body with some number among those that move."""
+def odometry(name: str, number: int = 0) -> Topic:
+    """``/ball/odometry``, or ``/bodies/<name>/odometry`` of a body of the scene: nav_msgs/Odometry.
+
+    The pose is in world, the twist in the body's own frame, covariances are 0 (unknown). The object has the number 0,
+    other bodies that move count from 1.
+    """
+    layout = MessageLayout(
+        get_message(_ODOMETRY)(header=make_header(WORLD), child_frame_id=name), [*_STAMP, *BODY_FIELDS.values()]
+    )
 
     def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
-        position, turn, linear, angular = np.split(samples.bodies[:, number], BODY_PARTS, axis=1)
-        _fill_odometry(rows, samples.stamps_ns, position, turn, linear, angular)
+        put_stamps(rows, "header.stamp", samples.stamps_ns)
+        position, turn, *velocities = samples.parts_of(number)
+        rows["pose.pose.position"], rows["pose.pose.orientation"] = position, turn
+        turned = rotate(turn, *velocities, inverse=True)
+        rows["twist.twist.linear"], rows["twist.twist.angular"] = turned
 
-    return Topic(f"/bodies/{name}/odometry", _ODOMETRY, _lay_odometry_out(name), fill)
+    return Topic("/ball/odometry" if name == BALL else f"/bodies/{name}/odometry", _ODOMETRY, layout, fill)
 
 
-def read_body(messages: NDArray[np.uint8]) -> tuple[str, NDArray[np.float64]]:
-    """Read the messages of `body_odometry`: name, and the numbers as in samples, shape ``(n_samples, 13)``."""
+def read_body_name(message: bytes) -> str:
+    """Read the name of the body in a message of `odometry`."""
+    # Most bodies are balls, and comparing bytes is faster than reading the message.
+    if odometry(BALL).layout.describes_message(message):
+        return BALL
     try:
-        name = str(deserialize(messages[0].tobytes(), get_message(_ODOMETRY)).child_frame_id)
+        return str(deserialize(message, get_message(_ODOMETRY)).child_frame_id)
     except ValueError as error:
         raise DatasetError(f"chunk: {error}") from error
-    layout = _lay_odometry_out(name)
-    if not layout.describes_message(messages[0].tobytes()):
-        raise DatasetError(f"chunk: the messages of the body {name} have another layout than {_ODOMETRY} written here")
-    rows = np.ascontiguousarray(messages).view(layout.dtype)[:, 0]
-    turn = rows["pose.pose.orientation"]
-    turned = rotate(turn, rows["twist.twist.linear"], rows["twist.twist.angular"], inverse=False)
-    return name, np.hstack([rows["pose.pose.position"], turn, *turned])
-
-
-def _lay_odometry_out(frame: str) -> MessageLayout:
-    message = get_message(_ODOMETRY)(header=make_header(WORLD), child_frame_id=frame)
-    variable = [*_STAMP, "pose.pose.position", "pose.pose.orientation", "twist.twist.linear", "twist.twist.angular"]
-    return MessageLayout(message, variable)
-
-
-def _fill_odometry(rows: Rows, stamps_ns: NDArray[np.int64], *columns: NDArray[np.float64]) -> None:
-    """Write position, orientation, and the velocities in world, which are turned into the body's own frame."""
-    put_stamps(rows, "header.stamp", stamps_ns)
-    rows["pose.pose.position"], rows["pose.pose.orientation"], linear, angular = columns
-    turned = rotate(columns[1], linear, angular, inverse=True)
-    rows["twist.twist.linear"], rows["twist.twist.angular"] = turned
 
 
 def make_header(frame: str, stamp_ns: int = 0) -> Any:
@@ -202,11 +182,11 @@ def _fill_clock(rows: Rows, samples: Samples, _: SetPoints) -> None:
     put_stamps(rows, "clock", samples.stamps_ns)
 
 
-def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str], bodies: Sequence[str] = ()) -> Topic:
-    """``/tf``: tf2_msgs/TFMessage with ball and moving bodies in world, and every frame that a joint moves."""
+def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str], bodies: Sequence[str] = (BALL,)) -> Topic:
+    """``/tf``: tf2_msgs/TFMessage with object and moving bodies in world, and every frame that a joint moves."""
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]
-    free = [(WORLD, name, (0.0, 0.0, 0.0)) for name in (BALL, *bodies)]
+    free = [(WORLD, name, (0.0, 0.0, 0.0)) for name in bodies]
     pairs = [*free, *((frame.parent, frame.child, frame.translation) for frame in frames)]
     message = get_message(kind)(transforms=[_make_transform(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
     variable = [f"transforms.{n}.{path}" for n in range(len(pairs)) for path in (*_STAMP, "transform.rotation")]
@@ -218,12 +198,10 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str], bodies: S
     def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
         for number in range(len(pairs)):
             put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
-        rows["transforms.0.transform.translation"] = samples.ball_position
-        rows["transforms.0.transform.rotation"] = samples.ball_orientation_xyzw
         for number in range(len(bodies)):
-            position, rotation, *_velocities = np.split(samples.bodies[:, number], BODY_PARTS, axis=1)
-            rows[f"transforms.{number + 1}.transform.translation"] = position
-            rows[f"transforms.{number + 1}.transform.rotation"] = rotation
+            position, rotation, *_velocities = samples.parts_of(number)
+            rows[f"transforms.{number}.transform.translation"] = position
+            rows[f"transforms.{number}.transform.rotation"] = rotation
         for number, (frame, column) in enumerate(zip(frames, columns, strict=True), start=len(free)):
             position = samples.position[:, column]
             if frame.slides:

@@ -19,7 +19,6 @@ from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.throw import Throw
-from throwcollect.episode.topics import BALL
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
@@ -64,12 +63,10 @@ class Feature:
         return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
 
 
-def list_features(
-    moving: Sequence[str], targets: Sequence[TargetColumn], bodies: Sequence[str] = ()
-) -> dict[str, Feature]:
+def list_features(moving: Sequence[str], targets: Sequence[TargetColumn], bodies: Sequence[str]) -> dict[str, Feature]:
     """List features by name, in the order of their columns, for the joints that the task moves, and moving bodies."""
     positions = tuple(f"{joint}.pos" for joint in moving)
-    free = (f"{body}.{part}" for body in (BALL, *bodies) for part in ("x", "y", "z", "vx", "vy", "vz"))
+    free = (f"{body}.{part}" for body in bodies for part in ("x", "y", "z", "vx", "vy", "vz"))
     goal = tuple(f"target.{each.word.replace(' ', '_')}" for each in targets)
     return {
         "observation.state": Feature("float32", (*positions, *(f"{joint}.vel" for joint in moving))),
@@ -111,7 +108,7 @@ dataset = LeRobotDataset("me/throws", root=".")
             "|---|---|---|",
             "| `observation.state` | rad, rad/s | positions (`.pos`), velocities (`.vel`) of moving joints, measured |",
             "| `observation.effort` | N m | torques of their motors |",
-            "| `observation.environment_state` | m, m/s | position and velocity of ball and moving bodies, in world"
+            "| `observation.environment_state` | m, m/s | position and velocity of all that moves, in world"
             f"{_describe_goal(source)} |",
             "| `action` | rad | their commanded positions one frame later, on the trajectory sent to controllers |",
             f"| `next.reward` | 1 | 1 in the last frame of a throw that {success}, 0 in all others |",
@@ -184,7 +181,7 @@ def _compute_frames(
     count, signals, done = len(throw), throw.signals, throw.done
     moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
     index = np.arange(count)
-    bodies = (BALL, *moving_bodies_of(source.dataset.config))
+    bodies = moving_bodies_of(source.dataset.config)
     free = [f"{body}_{quantity}" for body in bodies for quantity in ("position_m", "velocity_mps")]
     targets = [each.name for each in source.targets]
     values = {

@@ -17,10 +17,9 @@ from throwcollect.arguments import refuse_argument
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.trajectories import BALL_COMPONENTS
+from throwcollect.dataset.trajectories import BODY_COMPONENTS
 from throwcollect.engines.engine import BODY_NUMBERS
 from throwcollect.episode.record import Samples
-from throwcollect.episode.topics import BALL, BODY_PARTS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.progress_log import ProgressLog
@@ -102,7 +101,7 @@ def list_signals(
         ),
         _describe_joints("command_velocity_radps", "Commanded velocities.", moving, sliding),
         _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving, sliding),
-        *(signal for body in (BALL, *bodies) for signal in _describe_body(body)),
+        *(signal for body in bodies for signal in _describe_body(body)),
         *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
     )
 
@@ -125,9 +124,9 @@ _BODY_SIGNALS = {
 
 
 def _describe_body(body: str) -> Iterator[Signal]:
-    """Describe the signals of the ball, or of another body that moves, by its name."""
+    """Describe the signals of a body that moves, by its name."""
     for ending, (description, quantity, axes) in _BODY_SIGNALS.items():
-        components = tuple(f"{body}_{component}" for component in BALL_COMPONENTS[quantity])
+        components = tuple(f"{body}_{component}" for component in BODY_COMPONENTS[quantity])
         yield Signal(f"{body}_{ending}", description.format(body), components, ", ".join(axes), ", ".join(components))
 
 
@@ -240,8 +239,8 @@ class ExportSource:
             trajectory = trajectory_of(self.dataset.config_of(throw))
             signals = _compute_signals(samples, trajectory, header.start_ns)
             for number, body in enumerate(moving_bodies_of(config)):
-                parts = np.split(samples.bodies[:, number], BODY_PARTS, axis=1)
-                signals |= dict(zip((f"{body}_{ending}" for ending in _BODY_SIGNALS), parts, strict=True))
+                names = (f"{body}_{ending}" for ending in _BODY_SIGNALS)
+                signals |= dict(zip(names, samples.parts_of(number), strict=True))
             signals |= {each.name: np.full((len(samples), 1), throw[each.name]) for each in self.targets}
             yield ThrowSeries(throw, throw.outcome == config.task.success, signals, trajectory)
             self.progress.note(throw.trial + 1)
@@ -264,10 +263,6 @@ def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: in
         "command_position_rad": position,
         "command_velocity_radps": velocity,
         "command_acceleration_radps2": acceleration,
-        "ball_position_m": samples.ball_position,
-        "ball_orientation_xyzw": samples.ball_orientation_xyzw,
-        "ball_velocity_mps": samples.ball_linear_velocity,
-        "ball_angular_velocity_radps": samples.ball_angular_velocity,
     }
 
 
@@ -284,9 +279,9 @@ def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
 def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     """Compute samples at a lower rate, or the same, from the first recorded one to the last instant within the record.
 
-    If the rate divides the recorded one, these are every n-th recorded sample. Otherwise positions of joints and ball
+    If the rate divides the recorded one, these are every n-th recorded sample. Otherwise positions of joints and bodies
     lie on the cubic through positions and velocities of both neighbours; all else is linear between them, and the
-    ball's orientation is normalised. Nothing is filtered.
+    orientations are normalised. Nothing is filtered.
     """
     if recorded_hz % rate_hz == 0:
         return samples[:: recorded_hz // rate_hz]
@@ -294,16 +289,10 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
     elsewhere = partial(_resample_body, places=places, recorded_hz=recorded_hz)
-    ball = (
-        samples.ball_position,
-        samples.ball_orientation_xyzw,
-        samples.ball_linear_velocity,
-        samples.ball_angular_velocity,
-    )
-    names = ("ball_position", "ball_orientation_xyzw", "ball_linear_velocity", "ball_angular_velocity")
-    found = dict(zip(names, elsewhere(*ball), strict=True))
-    numbers = range(samples.bodies.shape[1])
-    bodies = [np.hstack(elsewhere(*np.split(samples.bodies[:, each], BODY_PARTS, axis=1))) for each in numbers]
+    names = ("object_position", "object_orientation_xyzw", "object_linear_velocity", "object_angular_velocity")
+    found = dict(zip(names, elsewhere(*samples.parts_of(0)), strict=True))
+    numbers = range(1, samples.bodies.shape[1] + 1)
+    bodies = [np.hstack(elsewhere(*samples.parts_of(number))) for number in numbers]
     found["bodies"] = np.stack(bodies, axis=1) if bodies else np.zeros((count, 0, BODY_NUMBERS))
     found["position"] = _interpolate_cubically(samples.position, samples.velocity / recorded_hz, places)
     found |= {name: _interpolate_linearly(getattr(samples, name), places) for name in ("velocity", "effort")}
@@ -320,7 +309,7 @@ def _resample_body(
     places: NDArray[np.float64],
     recorded_hz: int,
 ) -> tuple[NDArray[np.float64], ...]:
-    """Compute the ball, or another body, between its samples; see `resample`."""
+    """Compute a body between its samples; see `resample`."""
     turn = _interpolate_linearly(_remove_flips(orientation), places)
     return (
         _interpolate_cubically(position, linear / recorded_hz, places),

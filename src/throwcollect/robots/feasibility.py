@@ -22,7 +22,7 @@ from throwcollect.robots.joint_model import joint_model, lock_joints, mount_of
 from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.robot import Robot
-from throwcollect.robots.surroundings import bodies_of
+from throwcollect.robots.surroundings import bodies_of, object_of, starts_in_tool
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tools.tool import Tool, tool_of
 
@@ -76,11 +76,12 @@ class Feasibility:
 
         The curve between the points is checked at 100 Hz and at 100 instants at least; for collisions, whenever a joint
         has moved on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques
-        are computed by inverse dynamics plus viscous friction; the tool and the ball count as part of the hand
-        throughout, even after the ball has left. The effort of locked joints is not limited, because they are simulated
-        as rigid. Angles are true ones (`robot.joint_offsets`), and motions have their true speed (`robot.speed_scale`).
-        Collisions are those of the robot and the tool, also with bodies of the scene; the task judges what the ball
-        hits. The tool has to move if the task throws, and to hold the ball in the start posture (see `Tool.way_out`).
+        are computed by inverse dynamics plus viscous friction; the tool and the object in it count as part of
+        the hand throughout, even after the object has left. The effort of locked joints is not limited, because they
+        are simulated as rigid. Angles are true ones (`robot.joint_offsets`), and motions have their true speed
+        (`robot.speed_scale`). Collisions are those of the robot and the tool, also with bodies of the scene; the task
+        judges what the object hits. The tool has to move if the task throws, and to hold what lies in it in the start
+        posture (see `Tool.way_out`).
 
         Returns:
             None if the trial is feasible. Otherwise one sentence with joint or links, instant, value and limit, about
@@ -154,9 +155,11 @@ class Feasibility:
         return None
 
     def _explain_loss(self, config: Config, posture: NDArray[np.float64]) -> str | None:
-        """Explain why the ball does not stay in the tool of the still robot; None if it stays."""
+        """Explain why the object does not stay in the tool of the still robot; None if it does, or starts elsewhere."""
         pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
-        tool, radius = self._tool_of(config), config.ball.radius_m
+        if not starts_in_tool(config):
+            return None
+        tool, radius = self._tool_of(config), object_of(config).radius_m
         # The last row of a rotation into world is the vertical of the world, along the axes of the frame.
         up = (self._data.oMi[self._hand] * self._hand_placement * mount_of(self._robot, tool)).rotation[2]
         slope = tool.way_out(radius, up)
@@ -262,9 +265,12 @@ class Dynamics:
         Returns:
             [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`; 0 for locked joints.
         """
-        seat = np.array(tool.ball_seat(config.ball.radius_m))
-        ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)
-        load = tool.inertia + pinocchio.SE3(np.eye(3), seat).act(ball)
+        load = tool.inertia
+        if starts_in_tool(config):
+            thing = object_of(config)
+            seat, inertia = np.array(tool.ball_seat(thing.radius_m)), thing.inertia
+            held = pinocchio.Inertia(inertia.mass_kg, np.zeros(3), np.diag(inertia.diagonal))
+            load += pinocchio.SE3(np.eye(3), seat).act(held)
         # The sum begins with the bare hand, because the model still holds the load of the previous trial.
         self._model.inertias[self._hand] = self._bare_hand + (self._hand_placement * mount_of(self._robot, tool)).act(
             load

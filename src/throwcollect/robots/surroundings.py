@@ -1,8 +1,9 @@
-"""The bodies of a scene as values, from their sections of the configuration: for engines, and how they look."""
+"""The object and the bodies of a scene as values, from their sections of the configuration, and how they look."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -10,9 +11,18 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.scene import AnyBody, BoxConfig, CylinderConfig
+from throwcollect.config.scene import BALL, AnyBody, BoxConfig, CylinderConfig, SphereConfig
 from throwcollect.config.schema import Config
-from throwcollect.engines.body import HERE, BodyLink, LinkInertia, LinkShape, Placement, Vector, moments_of
+from throwcollect.engines.body import (
+    HERE,
+    BodyLink,
+    LinkInertia,
+    LinkShape,
+    Placement,
+    Vector,
+    moments_of,
+    turn_of,
+)
 from throwcollect.engines.engine import SceneBody
 from throwcollect.reproducible_math import cos, matmul, sin
 
@@ -21,17 +31,52 @@ Outline = tuple[tuple[float, float], ...]
 
 _ROUND = 24
 """Number of corners with which a circle is drawn."""
+_BALL_COLOR = "#ff7300"
+
+
+def object_of(config: Config) -> SceneBody:
+    """Make the object that the robot acts on in a trial: the ball, or a body of the scene or of the task."""
+    return _make_body(config.acted_on, _list_sections(config))
 
 
 def bodies_of(config: Config) -> tuple[SceneBody, ...]:
-    """Make the bodies that stand in the world of a trial: those of the scene, and those of the task."""
-    sections = {**config.scene.bodies, **config.task.bodies}
-    return tuple(_make_body(name, section) for name, section in sections.items())
+    """Make the other bodies that stand in the world of a trial: those of the scene, and those of the task."""
+    sections = _list_sections(config)
+    return tuple(_make_body(name, sections) for name in sections if name != config.acted_on)
+
+
+def starts_in_tool(config: Config) -> bool:
+    """Whether the object lies in the tool at the start of a trial, or is held by it."""
+    return config.acted_on == BALL or _list_sections(config)[config.acted_on].lies_on == config.tool.name
+
+
+def moving_bodies_of(config: Config) -> tuple[str, ...]:
+    """Name all that moves besides the robot: the object, and then the other bodies in the order of samples."""
+    sections = config.bodies.items()
+    others = (name for name, section in sections if section.mass_kg is not None and name != config.acted_on)
+    return (config.acted_on, *others)
+
+
+def _list_sections(config: Config) -> Mapping[str, AnyBody]:
+    """List the sections of all bodies by name; the ball, if there is one, is a sphere."""
+    if config.acted_on != BALL:
+        return config.bodies
+    ball = config.ball
+    sphere = SphereConfig.model_construct(
+        shape="sphere",
+        radius_m=ball.radius_m,
+        mass_kg=ball.mass_kg,
+        friction=ball.friction,
+        restitution=ball.restitution,
+        rolling_friction_m=ball.rolling_friction_m,
+        color=_BALL_COLOR,
+    )
+    return {**config.bodies, BALL: sphere}
 
 
 @dataclass(frozen=True)
 class BodyLook:
-    """How a body of the scene looks.
+    """How a body looks.
 
     Attributes:
         name: Its name.
@@ -57,10 +102,10 @@ class BodyLook:
 
 
 def looks_of(config: Config) -> tuple[BodyLook, ...]:
-    """Describe how the bodies in the world of a trial look."""
-    looks = []
-    for name, section in {**config.scene.bodies, **config.task.bodies}.items():
-        body = _make_body(name, section)
+    """Describe how the bodies in the world of a trial look, with the object last."""
+    looks, sections = [], _list_sections(config)
+    for name in sorted(sections, key=lambda name: name == config.acted_on):
+        section, body = sections[name], _make_body(name, sections)
         (shape,), (place, turn) = body.link.shapes, body.placement
         size = shape.size
         if shape.kind != "box":
@@ -108,13 +153,8 @@ def _find_outline(points: NDArray[np.float64]) -> Outline:
     return tuple(dict.fromkeys(corners))
 
 
-def moving_bodies_of(config: Config) -> tuple[str, ...]:
-    """Name the bodies that move, in the order of samples."""
-    sections = {**config.scene.bodies, **config.task.bodies}
-    return tuple(name for name, section in sections.items() if section.mass_kg is not None)
-
-
-def _make_body(name: str, section: AnyBody) -> SceneBody:
+def _make_body(name: str, sections: Mapping[str, AnyBody]) -> SceneBody:
+    section = sections[name]
     size: tuple[float, ...] = (section.radius_m,) if not isinstance(section, BoxConfig) else tuple(section.size_m)
     if isinstance(section, CylinderConfig):
         size = (section.radius_m, section.length_m)
@@ -123,6 +163,25 @@ def _make_body(name: str, section: AnyBody) -> SceneBody:
         x, y, z = moments_of(section.shape, size, section.mass_kg)
         inertia = LinkInertia(section.mass_kg, HERE, (x, 0.0, 0.0, y, 0.0, z))
     link = BodyLink(name, inertia, (LinkShape(section.shape, size, HERE),))
-    (x, y, z), (roll, pitch, yaw) = section.position_m, section.rpy_rad
+    (x, y, z), (roll, pitch, yaw), (vx, vy, vz) = section.position_m, section.rpy_rad, section.velocity_mps
+    place = Placement((x, y, z), (roll, pitch, yaw))
+    if section.lies_on is not None and section.lies_on in sections:
+        below = _make_body(section.lies_on, sections)
+        middle, top = below.placement.xyz, _reach_up(below.link.shapes[0], below.placement)
+        rise = middle[2] + top + _reach_up(link.shapes[0], place)
+        place = Placement((middle[0] + x, middle[1] + y, rise + z), place.rpy)
     restitution = (1.0 if inertia is None else 0.0) if section.restitution is None else section.restitution
-    return SceneBody(link, Placement((x, y, z), (roll, pitch, yaw)), section.friction, restitution)
+    return SceneBody(link, place, section.friction, restitution, section.rolling_friction_m, (vx, vy, vz))
+
+
+def _reach_up(shape: LinkShape, placement: Placement) -> float:
+    """Compute how far a shape reaches above its centre [m]."""
+    x, y, z, w = turn_of(placement)
+    # The vertical of the world along the axes of the body.
+    up = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    match shape.kind, shape.size:
+        case "box", edges:
+            return sum(abs(axis) * edge for axis, edge in zip(up, edges, strict=True)) / 2
+        case "cylinder", (radius, length):
+            return abs(up[2]) * length / 2 + math.hypot(up[0], up[1]) * radius
+    return shape.size[0]

@@ -12,6 +12,7 @@ from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.description import joint_offsets, robot_of
 from throwcollect.robots.joint_model import joint_model, mount_of
 from throwcollect.robots.robot import Robot
+from throwcollect.robots.surroundings import object_of
 from throwcollect.tools.tool import tool_of
 
 
@@ -25,7 +26,7 @@ class ToolMotion:
     def __init__(self, config: Config) -> None:
         tool = tool_of(config)
         self._seat = mount_of(robot_of(config), tool) * pinocchio.SE3(
-            np.eye(3), np.array(tool.ball_seat(config.ball.radius_m))
+            np.eye(3), np.array(tool.ball_seat(object_of(config).radius_m))
         )
         self._model = _model_of(robot_of(config))
         self._offsets = joint_offsets(config)

@@ -12,6 +12,8 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import PLAN, config_path
 from throwcollect.episode.episode_message import Episode, unpack
@@ -30,8 +32,6 @@ from throwcollect.units import NS_PER_S
 _SPIN_S = 0.2
 _FLOAT_BYTES = 4
 _LENGTH = struct.Struct("<I")
-_POSE = 7
-"""How many numbers of a body are its centre and its quaternion, xyzw."""
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
@@ -44,10 +44,10 @@ def encode_throw(
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
-        joints [rad], shape ``(n_samples, n_joints)``, the ball's centre in the world [m], shape ``(n_samples, 3)``, and
-        centres and quaternions of the bodies that move, shape ``(n_samples, n_moving, 7)``; all little-endian. The
-        header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``, ``landing``, ``values``
-        and ``bodies``.
+        joints [rad], shape ``(n_samples, n_joints)``, the object's centre in world [m], shape ``(n_samples, 3)``, and
+        centres and quaternions of the bodies that move, with the object last, shape ``(n_samples, n_moving, 7)``; all
+        little-endian. The header has ``trial``, ``simulation``, ``outcome``, ``joints``, ``samples``, ``rate_hz``,
+        ``landing``, ``values`` and ``bodies``.
     """
     samples = episode.samples()
     result = json.loads(episode.result)
@@ -67,7 +67,9 @@ def encode_throw(
     text = json.dumps(header).encode()
     # In JavaScript, a typed array has to begin at a multiple of the size of its numbers.
     padding = b"\0" * (-(_LENGTH.size + len(text)) % _FLOAT_BYTES)
-    numbers = (samples.position, samples.ball_position, samples.bodies[:, :, :_POSE])
+    moving = (*range(1, samples.bodies.shape[1] + 1), 0)
+    poses = np.hstack([part for number in moving for part in samples.parts_of(number)[:2]])
+    numbers = (samples.position, samples.object_position, poses)
     return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))
 
 

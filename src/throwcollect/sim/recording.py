@@ -1,4 +1,4 @@
-"""Keeps what is recorded of a trial: the samples of the engine, and which bodies press on the ball, for how long."""
+"""Keeps what is recorded of a trial: the samples of the engine, and which bodies press on the object, for how long."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from throwcollect.engines.engine import BODY_NUMBERS, Sample
 from throwcollect.episode.record import Contact, Samples
 
-BALL_POSITION = slice(-13, -10)
-BALL_LINEAR_VELOCITY = slice(-6, -3)
+OBJECT_POSITION = slice(-13, -10)
+OBJECT_LINEAR_VELOCITY = slice(-6, -3)
 _NUMBER_BYTES = 8
 
 
@@ -54,7 +54,7 @@ class SampleLog:
 
 
 class ContactLog:
-    """Intervals, counted in physics steps, in which bodies press on the ball."""
+    """Intervals, counted in physics steps, in which bodies press on the object."""
 
     def __init__(self) -> None:
         self._open: dict[str, int] = {}
@@ -62,11 +62,11 @@ class ContactLog:
 
     @property
     def bodies(self) -> Collection[str]:
-        """Names of the bodies that press on the ball now."""
+        """Names of the bodies that press on the object now."""
         return self._open.keys()
 
     def update(self, bodies: Set[str], step: int) -> None:
-        """Note the names of all bodies that press on the ball from a step on; steps must ascend from call to call."""
+        """Note the names of all bodies that press on the object from a step on; steps must ascend from call to call."""
         for body in self._open.keys() - bodies:
             self._closed.append((self._open.pop(body), body, step))
         for body in bodies - self._open.keys():
@@ -114,9 +114,9 @@ def to_samples(
         position=position,
         velocity=velocity,
         effort=effort,
-        ball_position=table[:, BALL_POSITION],
-        ball_orientation_xyzw=table[:, -10:-6],
-        ball_linear_velocity=table[:, BALL_LINEAR_VELOCITY],
-        ball_angular_velocity=table[:, -3:],
+        object_position=table[:, OBJECT_POSITION],
+        object_orientation_xyzw=table[:, -10:-6],
+        object_linear_velocity=table[:, OBJECT_LINEAR_VELOCITY],
+        object_angular_velocity=table[:, -3:],
         bodies=others[:, :-BODY_NUMBERS].reshape(len(table), others.shape[1] // BODY_NUMBERS - 1, BODY_NUMBERS),
     )

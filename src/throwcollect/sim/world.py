@@ -1,9 +1,10 @@
-"""The rules of a trial, on any physics engine: one robot with a tool, one ball, from the start state to the end."""
+"""The rules of a trial, on any physics engine: one robot with a tool, one object, from the start state to the end."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,12 @@ from throwcollect.engines.engine import (
     Observer,
     Sample,
     Scene,
-    SceneBody,
     State,
     Steps,
-    ball_of,
+    body_of,
+    object_in,
+    split_bodies,
 )
-from throwcollect.episode.frames import quaternion_of
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
 from throwcollect.extras import require_engine
 from throwcollect.members import explain_failure, load_member
@@ -36,8 +37,8 @@ from throwcollect.robots.description import (
     start_posture,
 )
 from throwcollect.sim.motors import Motors
-from throwcollect.sim.recording import BALL_LINEAR_VELOCITY, ContactLog, SampleLog, to_samples
-from throwcollect.sim.scene import drag_of, physics_of, scene_of
+from throwcollect.sim.recording import OBJECT_LINEAR_VELOCITY, ContactLog, SampleLog, to_samples
+from throwcollect.sim.scene import drag_of, physics_of, scene_of, seat_of
 from throwcollect.tasks.task import EndRule, task_of
 from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
@@ -49,8 +50,8 @@ class World(Observer):
     `reset` puts it into the start state of a trial, which is a pure function of the trial's configuration, bit for bit.
     `run` then takes physics steps until the trial ends:
 
-    - ``landed``: by the rule of the task (`Task.end_rule`), by default when the ball has crossed the landing plane;
-    - ``rest``: the arm has moved and stands still, and the ball has been lying on something for half a second;
+    - ``landed``: by the rule of the task (`Task.end_rule`), by default when the object has crossed the landing plane;
+    - ``rest``: the arm has moved and stands still, and the object has been lying on something for half a second;
     - ``timeout``: the longest duration is over.
 
     A trial ends with a sample, so that the recorded samples enclose the crossing.
@@ -75,7 +76,7 @@ class World(Observer):
     steps: int
     end_reason: EndReason | None
     _ends: EndRule
-    _bodies: tuple[SceneBody, ...]
+    _scene: Scene
     _contacts: ContactLog
     _start: Sequence[float]
     _offsets: NDArray[np.float64]
@@ -118,7 +119,7 @@ class World(Observer):
     def reset(self, trial: Config, *, start_ns: int = 0) -> None:
         """Put the world into the start state of a trial and record it as the first sample.
 
-        This is cheap if the trial has the physics and the start posture of the previous trial. Otherwise the ball
+        This is cheap if the trial has the physics and the start posture of the previous trial. Otherwise the object
         settles anew, and if the robot, its tool, or the locked joints have changed, everything is loaded anew.
 
         Args:
@@ -128,7 +129,7 @@ class World(Observer):
         # Of `task.end`, only the names of joints count, because they say which joints are locked.
         bodies = trial.task.bodies
         key = (
-            *(trial.robot, trial.tool.without_release(), trial.ball, trial.scene, trial.sim),
+            *(trial.robot, trial.tool.without_release(), trial.ball, trial.object, trial.scene, trial.sim),
             *(trial.task.start, tuple(trial.task.end), bodies),
         )
         if key != self._start_key:
@@ -163,7 +164,7 @@ class World(Observer):
         Args:
             commands: For each step, the position of each moving joint wanted at its end [rad], shape
                 ``(n_steps, n_moving)``.
-            stop_at_end: Whether to take no more steps once the trial has ended. Otherwise the ground stops the ball.
+            stop_at_end: Whether to take no more steps once the trial has ended. Otherwise the ground stops the object.
 
         Returns:
             Number of steps taken.
@@ -190,7 +191,7 @@ class World(Observer):
         return taken
 
     def on_touch(self, step: int, bodies: frozenset[str]) -> None:
-        """Note the bodies that press on the ball since a step of the present `run`."""
+        """Note the bodies that press on the object since a step of the present `run`."""
         self._touching = bodies
         self._contacts.update(bodies, self._first_step + step)
 
@@ -222,7 +223,7 @@ class World(Observer):
         self._log.forget()
 
     def contacts(self) -> tuple[Contact, ...]:
-        """List all intervals in which something pressed on the ball, by start time."""
+        """List all intervals in which something pressed on the object, by start time."""
         return self._contacts.intervals(self._stamp_ns)
 
     def joints(self) -> tuple[Sample, Sample]:
@@ -242,32 +243,40 @@ class World(Observer):
 
     @property
     def bodies(self) -> Mapping[str, BodyState]:
-        """The bodies of the scene, which never move, by name."""
-        placed = ((body.link.name, body.placement) for body in self._bodies)
-        return {name: BodyState(xyz, quaternion_of(*rpy)) for name, (xyz, rpy) in placed}
+        """The object and all other bodies now, by name, with the object first."""
+        sample, still = self.engine.state.sample, (body for body in self._scene.bodies if not body.moves)
+        others = split_bodies(sample, len(self.moving))
+        states = (object_in(sample), *map(body_of, others))
+        fixed = {body.link.name: body_of(body.start) for body in still}
+        return {**dict(zip(self.free, states, strict=True)), **fixed}
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the bodies that move, with the object first."""
+        return tuple(body.link.name for body in (self._scene.object, *self._scene.moving_bodies))
+
+    def place(self, name: str, state: BodyState) -> None:
+        """Set pose and velocity of a body that moves; before the first step, the start state is recorded anew."""
+        self.engine.place(self.free.index(name), state)
+        if self.steps == 0:
+            self._record_start()
 
     @property
     def rests(self) -> bool:
-        """Whether the arm has been standing still, and the ball lying on something, for half a second."""
+        """Whether the arm has been standing still, and the object lying on something, for half a second."""
         return self.steps - self._resting_since >= REST_S * self._hz
 
     @property
-    def ball(self) -> BodyState:
-        """The ball now; if it is set before the first step, the start state is recorded anew."""
-        return ball_of(self.engine.state.sample)
-
-    @ball.setter
-    def ball(self, state: BodyState) -> None:
-        self.engine.place_ball(state)
-        if self.steps == 0:
-            self._record_start()
+    def object(self) -> BodyState:
+        """The object now."""
+        return object_in(self.engine.state.sample)
 
     def _begin(self, start_ns: int, present: Sample) -> None:
         """Begin to count from the present state."""
         self._start_ns = start_ns
         self.steps = 0
         self._first_step = 0
-        self._start_joints = present[:-BODY_NUMBERS]
+        self._start_joints = present[: 3 * len(self.moving)]
         self._record_start()
         self._contacts = ContactLog()
         self._contacts.update(self._touching, 0)
@@ -277,7 +286,7 @@ class World(Observer):
         self.end_reason = None
 
     def _settle(self, trial: Config) -> None:
-        """Let the ball come to rest in the tool of the still robot, and keep that state."""
+        """Let the object come to rest where it starts, with the robot still, and keep that state."""
         description = self._describe(trial)
         self._load(scene_of(trial, description), trial.sim.engine)
         self.moving, self._locked = description.moving, description.locked
@@ -285,21 +294,24 @@ class World(Observer):
         offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
         self._offsets = np.array([offsets[joint] for joint in self.moving])
         self._start = [posture[joint] + offsets[joint] for joint in self.moving]
-        tool = tool_of(trial)
-        seat = tool.ball_seat(trial.ball.radius_m)
         self.engine.configure(physics_of(trial, self.moving))
-        self.engine.rest(self._start, seat)
+        self.engine.rest(self._start, seat_of(trial))
         # At least one step is taken, because contact forces and motor torques are known only after a step.
         steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
         targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
         # The first sample is due one step after the last step, so no sample is recorded.
         self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1, held=steps), Observer())
+        # What has a velocity at the start has not moved meanwhile.
+        for number, body in enumerate((self._scene.object, *self._scene.moving_bodies)):
+            if any(body.velocity):
+                start = body_of(body.start)
+                self.engine.place(number, replace(start, linear_velocity=body.velocity))
         self._settled = self.engine.state
 
     def _load(self, scene: Scene, engine: str) -> None:
         self.engine.load(scene)
-        self._bodies = scene.bodies
-        # The robot as it was loaded stays, while only the ball is another one.
+        self._scene = scene
+        # The robot as it was loaded stays, while only the object is another one.
         if scene.robot != self._compared:
             check_loaded(self.engine, engine, scene)
             self._compared = scene.robot
@@ -317,7 +329,7 @@ class World(Observer):
 
     def _record_start(self) -> None:
         # The motor torques are taken from the settled state, because engines have none before the first step.
-        self._log = SampleLog((*self._start_joints, *self.engine.state.sample[-BODY_NUMBERS:]))
+        self._log = SampleLog((*self._start_joints, *self.engine.state.sample[len(self._start_joints) :]))
 
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * NS_PER_S // self._hz
@@ -328,7 +340,7 @@ class World(Observer):
         self._sampled_target = target
         self._has_moved |= not stands_still
         lies = stands_still and self._touching
-        if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < REST_SPEED_MPS):
+        if not (lies and math.hypot(*now[OBJECT_LINEAR_VELOCITY]) < REST_SPEED_MPS):
             self._resting_since = self.steps
         if (reason := self._ends(before[-BODY_NUMBERS:], now[-BODY_NUMBERS:], self._contacts.bodies)) is not None:
             return reason

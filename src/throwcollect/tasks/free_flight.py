@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.config.scene import BALL
 from throwcollect.config.schema import Config
 
 
@@ -67,6 +68,8 @@ def ballistic_steps(
 
 def _drag_per_m(config: Config) -> float:
     """Compute the ball's deceleration by the air over the square of its speed [1/m]."""
+    if config.acted_on != BALL:
+        return 0.0
     ball = config.ball
     area = math.pi * ball.radius_m**2
     return 0.5 * config.scene.air_density_kgpm3 * ball.drag_coefficient * area / ball.mass_kg

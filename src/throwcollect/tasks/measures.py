@@ -8,7 +8,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class BallState:
+class ObjectState:
     """The ball at one instant; world frame.
 
     Attributes:

@@ -2,7 +2,7 @@
 
 A field of a result declares its columns by the function that makes it::
 
-    release: BallState | None = measured(BallColumns("when it left the {tool}"))
+    release: ObjectState | None = measured(BodyColumns("when it left the {tool}"))
     flight_time_s: float | None = measured(Number("From release to landing [s]."))
 
 A description may name the ``{tool}``, by which contacts with it are recorded.
@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field
 from typing import Any, ClassVar, Literal
 
-from throwcollect.tasks.measures import BallState, Peak, Vector
+from throwcollect.tasks.measures import ObjectState, Peak, Vector
 
 _DECLARED = "columns"
 
@@ -74,8 +74,8 @@ class Count(Number):
 
 
 @dataclass(frozen=True)
-class BallColumns(Columns):
-    """A `BallState`: ``<field>_time_s``, ``<field>_x_m`` and so on.
+class BodyColumns(Columns):
+    """A `ObjectState`: ``<field>_time_s``, ``<field>_x_m`` and so on.
 
     Attributes:
         when: The instant, as the end of a sentence.
@@ -90,26 +90,26 @@ class BallColumns(Columns):
             *(f"Ball centre in world {self.when}, {axis} [m]." for axis in "xyz"),
             *(f"Velocity of the ball in world {self.when}, {axis} [m/s]." for axis in "xyz"),
         ]
-        return [Column(column, "number", text) for column, text in zip(ball_columns(name), descriptions, strict=True)]
+        return [Column(column, "number", text) for column, text in zip(body_columns(name), descriptions, strict=True)]
 
-    def split(self, value: BallState, joints: Sequence[str]) -> Sequence[object]:
+    def split(self, value: ObjectState, joints: Sequence[str]) -> Sequence[object]:
         """Return time, position and velocity; see `Columns`."""
         return (value.time_s, *value.position, *value.velocity)
 
     def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
         """Return the state; see `Columns`."""
-        return join_ball(values)
+        return join_body(values)
 
 
-def ball_columns(name: str) -> list[str]:
-    """List the names of the columns of a `BallState`: time, position and velocity."""
+def body_columns(name: str) -> list[str]:
+    """List the names of the columns of a `ObjectState`: time, position and velocity."""
     return [f"{name}_time_s", *(f"{name}_{axis}_m" for axis in "xyz"), *(f"{name}_v{axis}_mps" for axis in "xyz")]
 
 
-def join_ball(values: Sequence[float]) -> BallState:
+def join_body(values: Sequence[float]) -> ObjectState:
     """Make a state of the ball from the values of its columns."""
     time_s, x, y, z, vx, vy, vz = values
-    return BallState(time_s, (x, y, z), (vx, vy, vz))
+    return ObjectState(time_s, (x, y, z), (vx, vy, vz))
 
 
 @dataclass(frozen=True)

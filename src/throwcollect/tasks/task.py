@@ -13,6 +13,7 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.record import EndReason, EpisodeHeader, Samples
 from throwcollect.members import explain_failure, load_part
 from throwcollect.robots.description import robot_of
+from throwcollect.robots.surroundings import object_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
@@ -28,7 +29,7 @@ from throwcollect.tasks.result import (
 )
 
 EndRule = Callable[[Sequence[float], Sequence[float], Collection[str]], EndReason | None]
-"""Gets the ball in one sample and in the next one, each as the last numbers of an engine's `Sample`, and the names of
+"""Gets the object in one sample and in the next one, each as the last numbers of an engine's `Sample`, and the names of
 what presses on it; returns why the trial ends with the later sample, None if it goes on."""
 _HEIGHT = 2
 
@@ -114,7 +115,7 @@ class Task(ABC, Generic[AnyResult]):
         """
         success = self.results(self.outcomes(self.config.task.success))
         measured = measure_joints(success, samples, header.start_ns, config=self.config, trajectory=trajectory)
-        if not (measured and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
+        if not (measured and math.isfinite(samples.object_position.sum() + samples.object_linear_velocity.sum())):
             reason = "the samples hold numbers that are not finite"
             return self.results(self.outcomes(TRACKING_FAILED), reason=reason)
         result, failure = self.assess(measured, samples, header)
@@ -129,12 +130,13 @@ class Task(ABC, Generic[AnyResult]):
     def end_rule(self) -> EndRule:
         """Make the rule by which a trial ends as ``landed``; trials also end when all is at rest, or time is over.
 
-        By default, the ball's lowest point has crossed the landing plane downwards, while neither the tool nor a body
-        of the scene pressed on it: a ball that hits a thin body at speed gets into it for a moment.
+        By default, the object's lowest point has crossed the landing plane downwards, while neither the tool nor a body
+        of the scene pressed on it: what hits a thin body at speed gets into it for a moment. The
+        lowest point is that of the sphere around the object.
         """
         config = self.config
-        plane_m = config.scene.landing_height_m + config.ball.radius_m
-        holders = {config.tool.name, *config.scene.bodies, *config.task.bodies}
+        plane_m = config.scene.landing_height_m + object_of(config).radius_m
+        holders = {config.tool.name, *config.bodies}
 
         def has_landed(before: Sequence[float], now: Sequence[float], touching: Collection[str]) -> EndReason | None:
             return "landed" if now[_HEIGHT] < plane_m <= before[_HEIGHT] and holders.isdisjoint(touching) else None
@@ -147,7 +149,7 @@ class Task(ABC, Generic[AnyResult]):
 
         Args:
             result: A success, with the measures of the joints.
-            samples: The recorded trial, at least two samples; joints' numbers and the ball's path are finite.
+            samples: The recorded trial, at least two samples; joints' numbers and the object's path are finite.
             header: Contacts, goals and start of the trial.
 
         Returns:

@@ -1,4 +1,4 @@
-"""Draws a stored throw as an animated picture: robot and ball as recorded, bodies, ground, and path of the ball."""
+"""Draws a stored throw as an animated picture: robot and bodies as recorded, ground, and path of the object."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.surroundings import bodies_of, looks_of
-from throwcollect.view.drawn_robot import BALL_RGBA, draw_bodies_of, draw_robot_of
+from throwcollect.robots.surroundings import bodies_of, looks_of, object_of
+from throwcollect.view.drawn_robot import draw_bodies_of, draw_robot_of
 from throwcollect.view.viewer_directory import choose_throws
 
 _OUTWARD = np.array([0.32, -1.0, 0.22])
@@ -101,13 +101,12 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     released_s = throw.row.get("release_time_s")
     released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
     colours = (shape.rgba for shape in draw_bodies_of(config))
-    bodies = list(zip(bodies_of(config), colours, strict=True))
-    drawn = robot.urdf_with_files, config.robot.base_height_m, config.ball.radius_m, BALL_RGBA
-    with Renderer(*drawn, bodies) as renderer:
+    bodies = list(zip((*bodies_of(config), object_of(config)), colours, strict=True))
+    with Renderer(robot.urdf_with_files, config.robot.base_height_m, bodies) as renderer:
         # The mount, or the feet, stand at the origin.
-        points = [samples.ball_position, np.zeros((1, 3))]
+        points = [samples.object_position, np.zeros((1, 3))]
         # What the task is about is always in the picture; other bodies may be as large as a room.
-        for look in (each for each in looks_of(config) if each.name in config.task.bodies):
+        for look in (each for each in looks_of(config) if each.name in config.task.bodies and not each.moves):
             low, *_, high = sorted(z for _, z in look.side_m)
             points.append(np.array([(*corner, z) for corner in look.above_m for z in (low, high)]))
         for number in shown:
@@ -117,16 +116,16 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
         everything = np.concatenate(points)
         # The box around the feet would reach below the ground, where there is nothing to see.
         everything[:, 2] = np.maximum(everything[:, 2], 0)
-        camera = camera_on(everything, _WIDTH / _HEIGHT, _find_heading(samples.ball_position[released:]))
+        camera = camera_on(everything, _WIDTH / _HEIGHT, _find_heading(samples.object_position[released:]))
         ground = _Ground(camera, everything[:, :2].mean(axis=0))
         pictures = []
         for number in shown:
             _place(renderer, joints, samples, number)
             picture = ground.picture()
-            ball = samples.ball_position[: number + 1]
-            ground.mark(picture, ball[-1], landing.position if landing and number == shown[-1] else None)
-            ground.trace(picture, ball[: released + 1], _HELD)
-            ground.trace(picture, ball[released:], _FLOWN)
+            path = samples.object_position[: number + 1]
+            ground.mark(picture, path[-1], landing.position if landing and number == shown[-1] else None)
+            ground.trace(picture, path[: released + 1], _HELD)
+            ground.trace(picture, path[released:], _FLOWN)
             seen = renderer.draw(*ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
             body = images.fromarray(seen)
             # The picture of the robot is its own mask, because it is transparent where nothing was drawn.
@@ -161,13 +160,14 @@ def _reduce_colours(pictures: list[Any]) -> list[Any]:
 
 def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number: int) -> None:
     angles = map(float, samples.position[number])
-    x, y, z = map(float, samples.ball_position[number])
-    bodies = [body_of(tuple(numbers)) for numbers in samples.bodies[number].tolist()]
-    renderer.place(dict(zip(joints, angles, strict=True)), (x, y, z), bodies)
+    row = samples[number : number + 1]
+    moving = (*range(1, samples.bodies.shape[1] + 1), 0)
+    bodies = [body_of(tuple(np.hstack(row.parts_of(each))[0].tolist())) for each in moving]
+    renderer.place(dict(zip(joints, angles, strict=True)), bodies)
 
 
 class _Ground:
-    """Draws the ground, with lines every half metre, and everything on it but robot and ball.
+    """Draws the ground, with lines every half metre, and everything on it but robot and bodies.
 
     `middle` is the middle of the ground in world [m], shape ``(2,)``.
     """
@@ -196,14 +196,14 @@ class _Ground:
         return self._empty.copy()
 
     def trace(self, picture: Any, path: NDArray[np.float64], color: tuple[int, int, int]) -> None:
-        """Draw a path of the ball's centre in world [m], shape ``(n, 3)``."""
+        """Draw a path of the object's centre in world [m], shape ``(n, 3)``."""
         if len(path) > 1:
             drawing.Draw(picture).line(self._find_pixels(path), fill=color, width=3, joint="curve")
 
-    def mark(self, picture: Any, ball: NDArray[np.float64], landing: NDArray[np.float64] | None) -> None:
-        """Draw the shadow of the ball, and a cross where it landed."""
+    def mark(self, picture: Any, place: NDArray[np.float64], landing: NDArray[np.float64] | None) -> None:
+        """Draw the shadow of the object, and a cross where it landed."""
         pen = drawing.Draw(picture)
-        ((x, y),) = self._find_pixels(ball[np.newaxis] * [1, 1, 0])
+        ((x, y),) = self._find_pixels(place[np.newaxis] * [1, 1, 0])
         pen.ellipse((x - 9, y - 3, x + 9, y + 3), fill=_LINE)
         if landing is not None:
             for step in (np.array([0.1, 0.1, 0.0]), np.array([0.1, -0.1, 0.0])):

@@ -1,4 +1,4 @@
-"""What viewers draw of robot, ball and bodies: URDF texts without collision shapes, their shapes, files of meshes."""
+"""What viewers draw of robot and bodies: URDF texts without collision shapes, their shapes, files of meshes."""
 
 from __future__ import annotations
 
@@ -6,23 +6,19 @@ import re
 import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from throwcollect.config.scene import BallConfig
 from throwcollect.config.schema import Config
+from throwcollect.engines.body import BodyModel
 from throwcollect.episode.frames import WORLD, quaternion_of
-from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description, robot_of
-from throwcollect.robots.surroundings import looks_of, moving_bodies_of
+from throwcollect.robots.surroundings import looks_of, moving_bodies_of, object_of
 from throwcollect.robots.urdf import PACKAGE, parse_xml, read_visual
 from throwcollect.tools.tool import tool_of
 
 Rgba = tuple[float, float, float, float]
-
-BALL_RGBA: Rgba = (1.0, 0.45, 0.0, 1.0)
-"""Colour of the ball."""
 
 _TOOL_RGBA: Rgba = (0.55, 0.35, 0.2, 1.0)
 _DEFAULT_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
@@ -138,13 +134,13 @@ def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
     return tuple(shapes)
 
 
-def ball_urdf(ball: BallConfig) -> str:
-    """URDF text of the ball, whose only link is its frame."""
-    robot = ElementTree.Element("robot", name=BALL)
-    shape = ElementTree.SubElement(ElementTree.SubElement(robot, "link", name=BALL), "visual")
-    geometry = ElementTree.SubElement(shape, "geometry")
-    ElementTree.SubElement(geometry, "sphere", radius=repr(ball.radius_m))
-    shape.append(_make_material(BALL, BALL_RGBA))
+def draw_object_of(config: Config) -> str:
+    """URDF text of the object, whose only link is its frame."""
+    link, colour = object_of(config).link, draw_bodies_of(config)[-1].rgba
+    robot = ElementTree.fromstring(BodyModel(link.name, (replace(link, inertia=None),)).write_urdf())  # noqa: S314
+    for shape in robot.iter("collision"):
+        shape.tag = "visual"
+        shape.append(_make_material(link.name, colour))
     return ElementTree.tostring(robot, encoding="unicode")
 
 

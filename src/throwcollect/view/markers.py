@@ -1,4 +1,4 @@
-"""Markers: robot, bodies, the ball, its paths, where it was released, highest and landed, and the landing plane."""
+"""Markers: robot, bodies, the path of the object, where it was released, highest and landed, and the landing plane."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from rclzenoh.interfaces import get_message
 from throwcollect.config.schema import Config
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import Row, ball_state
+from throwcollect.dataset.throws_table import Row, body_state
 from throwcollect.episode.frames import WORLD
-from throwcollect.episode.topics import BALL, make_header
+from throwcollect.episode.topics import make_header
 from throwcollect.errors import ConfigError
-from throwcollect.view.drawn_robot import BALL_RGBA, DrawnShape, Rgba, draw_bodies_of
+from throwcollect.view.drawn_robot import DrawnShape, Rgba, draw_bodies_of
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
 _SUCCEEDED: Rgba = (0.0, 0.75, 0.35, 1.0)
@@ -40,7 +40,7 @@ class ShownThrow:
 
     Attributes:
         start_ns: Stamp of its first sample in the file that viewers open [ns].
-        path: Ball centre in world [m], shape ``(n_samples, 3)``.
+        path: Centre of the object in world [m], shape ``(n_samples, 3)``.
     """
 
     throw: Throw
@@ -80,9 +80,7 @@ def throw_markers(throw: ShownThrow) -> Any:
     """A visualization_msgs/MarkerArray of the throw that is shown, which replaces the markers of the throw before."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throw.start_ns
-    ball = _make_marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
-    ball.header.frame_id, ball.frame_locked = BALL, True
-    markers = [marker(header=make_header(WORLD, stamp), action=marker.DELETEALL), ball]
+    markers = [marker(header=make_header(WORLD, stamp), action=marker.DELETEALL)]
     markers += shape_markers("bodies", draw_bodies_of(throw.config), Path, stamp).markers
     markers.append(_make_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
     for point in ("release", "apex", "landing"):
@@ -122,7 +120,7 @@ def path_cloud(throw: ShownThrow) -> Any:
 
 
 def _make_path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
-    """A line, grey while the ball was held, with the colour of the outcome from its release on."""
+    """A line, grey while the object was held, with the colour of the outcome from its release on."""
     point, color = get_message("geometry_msgs/msg/Point"), get_message("std_msgs/msg/ColorRGBA")
     rate, released, last = throw.config.record.rate_hz, throw.throw.row.get("release_time_s"), len(throw.path) - 1
     chosen = [*range(0, last, max(1, rate // _POINTS_PER_S)), last]
@@ -140,7 +138,7 @@ def _make_path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float
 
 def _make_point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     """A dot with a label; nothing if the throw has no such point."""
-    state = ball_state(row, name)
+    state = body_state(row, name)
     if state is None:
         return []
     (x, y, z), speed = state.position, math.hypot(*state.velocity)
@@ -154,7 +152,7 @@ def _make_point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     label = _make_marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text
     _place(dot, x, y, z)
-    # The label of the release is below its dot, because the apex of a ball released on its way down is at the same
+    # The label of the release is below its dot, because the apex of what is released on its way down is at the same
     # place.
     _place(label, x, y, z + (-1.5 if name == "release" else 1.5) * _TEXT_M)
     return [dot, label]

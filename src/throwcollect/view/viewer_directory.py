@@ -103,7 +103,7 @@ def _schedule(dataset: Dataset, throws: Dataset) -> Iterator[tuple[ShownThrow, S
     start = _FIRST_NS
     for throw in throws:
         _, samples = throw.read_samples()
-        yield ShownThrow(throw, dataset.config_of(throw), start, samples.ball_position.copy()), samples
+        yield ShownThrow(throw, dataset.config_of(throw), start, samples.object_position.copy()), samples
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
 
 
@@ -113,7 +113,7 @@ def layout(joints: Sequence[str]) -> bytes:
     height = _describe_series("/ball/odometry.pose.pose.position.z", "height [m]")
     panels = {
         _SCENE: _describe_scene(),
-        _BALL: _describe_plot([height, _describe_series("/view/ball_speed.data", "speed [m/s]")], "Ball"),
+        _BALL: _describe_plot([height, _describe_series("/view/object_speed.data", "speed [m/s]")], "Ball"),
         _LIMITS: _describe_plot(
             [*shares, _describe_series("-1", "lower limit"), _describe_series("1", "upper limit")],
             "Joint positions within their limits",

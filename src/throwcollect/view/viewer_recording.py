@@ -24,10 +24,10 @@ from throwcollect.episode.topics import (
     Rows,
     SetPoints,
     Topic,
-    ball_odometry,
     joint_states,
     make_fixed_transforms,
     make_header,
+    odometry,
     put_stamps,
     transforms,
 )
@@ -36,7 +36,7 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.tools.tool import tool_of
-from throwcollect.view.drawn_robot import ball_urdf, draw_robot_of
+from throwcollect.view.drawn_robot import draw_object_of, draw_robot_of
 from throwcollect.view.markers import ShownThrow, all_markers, path_cloud, shape_markers, throw_markers
 
 FACTS_NAME = "throw"
@@ -47,7 +47,7 @@ _SAMPLED = Qos("volatile", 100)
 _LATCHED = Qos("transient_local", 1)
 _LATCHED_TYPES = {
     "/robot_description": "std_msgs/msg/String",
-    "/view/ball/robot_description": "std_msgs/msg/String",
+    "/view/object/robot_description": "std_msgs/msg/String",
     "/tf_static": "tf2_msgs/msg/TFMessage",
     "/view/robot": "visualization_msgs/msg/MarkerArray",
     "/view/tool": "visualization_msgs/msg/MarkerArray",
@@ -71,8 +71,8 @@ class ViewRecording:
         self._topics = [
             transforms(_read_frames(config).moving, robot.joints, moving_bodies_of(config)),
             joint_states(robot.joints),
-            ball_odometry(),
-            _ball_speed(),
+            odometry(config.acted_on),
+            _object_speed(),
             _range_shares(robot, tuple(config.task.end)),
         ]
         declared = [(name, kind, _LATCHED) for name, kind in _LATCHED_TYPES.items()]
@@ -115,15 +115,15 @@ class ViewRecording:
         return FileSummary(name, *self._times, dict(sorted(self._counts.items())))
 
     def _put_looks(self, throw: ShownThrow) -> None:
-        """Write how robot, tool and ball of a throw look, unless they look like those of the throw before."""
+        """Write how robot, tool and object of a throw look, unless they look like those of the throw before."""
         config, start = throw.config, throw.start_ns
-        looks = full_description(config), ball_urdf(config.ball), config.robot.base_height_m
+        looks = full_description(config), draw_object_of(config), config.robot.base_height_m
         if looks == self._looks:
             return
         string = get_message("std_msgs/msg/String")
         robot, tool = draw_robot_of(config), tool_of(config).link
         self._put("/robot_description", start, string(data=robot.urdf))
-        self._put("/view/ball/robot_description", start, string(data=ball_urdf(config.ball)))
+        self._put("/view/object/robot_description", start, string(data=looks[1]))
         self._put("/tf_static", start, make_fixed_transforms(_read_frames(config).fixed, start))
         parts = {"tool": [shape for shape in robot.shapes if shape.link == tool]}
         if self._looks is None:
@@ -152,14 +152,14 @@ class ViewRecording:
 
 
 @cache
-def _ball_speed() -> Topic:
-    """``/view/ball_speed``: std_msgs/Float64, speed of the ball's centre [m/s]."""
+def _object_speed() -> Topic:
+    """``/view/object_speed``: std_msgs/Float64, speed of the object's centre [m/s]."""
     kind = "std_msgs/msg/Float64"
 
     def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
-        rows["data"] = np.linalg.norm(samples.ball_linear_velocity, axis=1)
+        rows["data"] = np.linalg.norm(samples.object_linear_velocity, axis=1)
 
-    return Topic("/view/ball_speed", kind, MessageLayout(get_message(kind)(), ["data"]), fill)
+    return Topic("/view/object_speed", kind, MessageLayout(get_message(kind)(), ["data"]), fill)
 
 
 def _range_shares(robot: Robot, joints: tuple[str, ...]) -> Topic:

@@ -71,10 +71,10 @@ def throw(config: Config, trial: int) -> tuple[Samples, EpisodeHeader]:
         position=position,
         velocity=velocity,
         effort=effort,
-        ball_position=np.concatenate([np.tile(HOLDING, (held, 1)), path[:flown]]),
-        ball_orientation_xyzw=_product(turns, quaternion / np.linalg.norm(quaternion)),
-        ball_linear_velocity=ball_velocity,
-        ball_angular_velocity=np.tile([0.0, SPIN_RADPS, 0.0], (count, 1)),
+        object_position=np.concatenate([np.tile(HOLDING, (held, 1)), path[:flown]]),
+        object_orientation_xyzw=_product(turns, quaternion / np.linalg.norm(quaternion)),
+        object_linear_velocity=ball_velocity,
+        object_angular_velocity=np.tile([0.0, SPIN_RADPS, 0.0], (count, 1)),
     )
     release = start_ns + round(RELEASE_S * 1e9)
     status = 4 if times[-1] >= trajectory.times[-1] else 2

@@ -61,7 +61,7 @@ def carrying(drawn: Path, place: Path) -> Path:
 def test_throws_whose_points_were_exported_are_the_same_bit_for_bit(drawn: Path, carrying: Path) -> None:
     assert info(carrying).digest == info(drawn).digest
     for one, other in zip(Dataset.open(drawn).episodes(), Dataset.open(carrying).episodes(), strict=True):
-        assert np.array_equal(one.samples().ball_position, other.samples().ball_position)
+        assert np.array_equal(one.samples().object_position, other.samples().object_position)
     # The plans differ, as the second one varies the motion.
     assert "task.trajectory.motion" in Dataset.open(carrying).plan.keys
 

@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from throwcollect.dataset import reader, throw, trajectories
-from throwcollect.dataset.trajectories import COLUMNS
+from throwcollect.dataset.trajectories import list_columns
+
+COLUMNS = tuple(list_columns(["ball"]))
 
 PAGE = (Path(__file__).parents[3] / "docs" / "reading.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)

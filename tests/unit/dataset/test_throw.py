@@ -27,7 +27,7 @@ def tumbling(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeH
     turns = random.normal(size=(len(samples), 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
     spin = random.normal(size=(len(samples), 3))
-    return replace(samples, ball_orientation_xyzw=turns, ball_angular_velocity=spin), header
+    return replace(samples, object_orientation_xyzw=turns, object_angular_velocity=spin), header
 
 
 @pytest.fixture(scope="module")
@@ -83,10 +83,10 @@ def test_a_throw_has_the_samples_of_its_episode_in_arrays_of_its_own(tumbled: Pa
         (throw.joints.effort, samples.effort),
         (throw.joints.stamps_ns, samples.stamps_ns),
         (throw.ball.stamps_ns, samples.stamps_ns),
-        (throw.ball.position, samples.ball_position),
-        (throw.ball.velocity, samples.ball_linear_velocity),
-        (throw.ball.orientation_xyzw, samples.ball_orientation_xyzw),
-        (throw.ball.angular_velocity, samples.ball_angular_velocity),
+        (throw.ball.position, samples.object_position),
+        (throw.ball.velocity, samples.object_linear_velocity),
+        (throw.ball.orientation_xyzw, samples.object_orientation_xyzw),
+        (throw.ball.angular_velocity, samples.object_angular_velocity),
     ]
     for found, expected in pairs:
         assert np.array_equal(found, expected)

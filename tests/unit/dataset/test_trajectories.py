@@ -10,9 +10,11 @@ import pytest
 
 import throwcollect
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.trajectories import COLUMNS
+from throwcollect.dataset.trajectories import list_columns
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.talos import TALOS
+
+COLUMNS = tuple(list_columns(["ball"]))
 
 
 @pytest.fixture(scope="module")

@@ -249,8 +249,8 @@ def kick_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episode
     """In the middle of the flight the ball gains a micrometre per second without a contact."""
     half = (len(samples) + 100) // 2
     seconds = np.maximum(0, np.arange(len(samples)) - half) / 250
-    position = samples.ball_position + 1e-6 * seconds[:, np.newaxis] * np.array([1.0, 0, 0])
-    return replace(samples, ball_position=position), header
+    position = samples.object_position + 1e-6 * seconds[:, np.newaxis] * np.array([1.0, 0, 0])
+    return replace(samples, object_position=position), header
 
 
 def late(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:

@@ -22,8 +22,8 @@ def test_statistics_of_signals_cover_the_samples_of_all_episodes(collected: Path
         ("position_rad", "position", TALOS.joints),
         ("velocity_radps", "velocity", TALOS.joints),
         ("effort_nm", "effort", TALOS.joints),
-        ("ball_position_m", "ball_position", "xyz"),
-        ("ball_velocity_mps", "ball_linear_velocity", "xyz"),
+        ("ball_position_m", "object_position", "xyz"),
+        ("ball_velocity_mps", "object_linear_velocity", "xyz"),
     ):
         table = np.concatenate([getattr(each, attribute) for each in samples])
         assert list(found.signals[group]) == list(names)

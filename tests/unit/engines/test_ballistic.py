@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from tests.unit.engines.test_engine_contract import scene_with
 
 from throwcollect.config.schema import Config
 from throwcollect.engines.ballistic.tool_path import ToolPath
@@ -32,10 +33,13 @@ PLANAR = """<robot name="planar">
 </robot>"""
 
 
+BALL = scene_with(radius_m=0.02).object
+
+
 def planar(kind: str = "revolute") -> Scene:
     tool = ToolLink("tip", "tip", (1.0, 0.0, 0.0))
     robot = read_urdf(parse_xml(PLANAR.format(kind=kind), "planar"), "planar").model
-    return Scene(robot, ("elbow", "shoulder"), 1.0, tool, ground_is_solid=False, ball_radius_m=0.02)
+    return Scene(robot, ("elbow", "shoulder"), 1.0, tool, ground_is_solid=False, object=BALL)
 
 
 def test_the_path_of_the_tool_of_a_planar_arm_agrees_with_trigonometry() -> None:
@@ -75,8 +79,8 @@ def test_the_ball_stays_in_the_spoon_until_the_spoon_brakes() -> None:
     spoon = ToolMotion(config)
     held = int(np.searchsorted(samples.stamps_ns, contact.end_ns))
     for row in range(0, held, 10):
-        assert samples.ball_position[row] == pytest.approx(spoon.place(samples.position[row]), abs=1e-9)
-    assert samples.ball_position[held + 5] != pytest.approx(spoon.place(samples.position[held + 5]), abs=1e-4)
+        assert samples.object_position[row] == pytest.approx(spoon.place(samples.position[row]), abs=1e-9)
+    assert samples.object_position[held + 5] != pytest.approx(spoon.place(samples.position[held + 5]), abs=1e-4)
     assert world.end_reason == "landed"
     assert not samples.effort.any()
 

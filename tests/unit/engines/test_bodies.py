@@ -7,16 +7,26 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import pytest
-from tests.unit.engines.test_engine_contract import PHYSICS, SCENE, SEAT, START, Watcher, begin, still, swing
+from tests.unit.engines.test_engine_contract import (
+    PHYSICS,
+    SCENE,
+    SEAT,
+    START,
+    Watcher,
+    begin,
+    scene_with,
+    still,
+    swing,
+)
 
 from throwcollect.engines.body import HERE, BodyLink, LinkInertia, LinkShape, Placement, moments_of
-from throwcollect.engines.engine import BodyState, Engine, Observer, SceneBody, ball_of, body_of, split_bodies
+from throwcollect.engines.engine import BodyState, Engine, Observer, SceneBody, body_of, object_in, split_bodies
 from throwcollect.errors import ConfigError
 from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member
 
-RADIUS = SCENE.ball_radius_m
-ROLLING = replace(PHYSICS, ball_rolling_friction_m=0.002)
+RADIUS = SCENE.object.radius_m
+ROLLING = scene_with(rolling_friction_m=0.002)
 
 
 def body(kind: str, size: Sequence[float], xyz: Sequence[float], *, rpy=(0.0, 0.0, 0.0), **surface: float) -> SceneBody:
@@ -37,12 +47,12 @@ def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
     made.close()
 
 
-def drop(engine: Engine, *bodies: SceneBody, physics=PHYSICS, height_m: float = 1.2, steps: int = 500) -> Watcher:
+def drop(engine: Engine, *bodies: SceneBody, scene=SCENE, height_m: float = 1.2, steps: int = 500) -> Watcher:
     """Let the ball fall over the middle of the bodies, at rest at first."""
-    engine.load(replace(SCENE, bodies=bodies))
-    engine.configure(physics)
+    engine.load(replace(scene, bodies=bodies))
+    engine.configure(PHYSICS)
     engine.rest(START.tolist(), SEAT)
-    engine.place_ball(BodyState((1.0, 0.0, height_m)))
+    engine.place(0, BodyState((1.0, 0.0, height_m)))
     seen = Watcher()
     engine.run(still(engine, steps), seen)
     return seen
@@ -50,14 +60,14 @@ def drop(engine: Engine, *bodies: SceneBody, physics=PHYSICS, height_m: float = 
 
 @pytest.mark.parametrize("standing", [BOX, CYLINDER, SPHERE], ids=lambda each: each.link.name)
 def test_a_ball_that_falls_on_a_body_rests_on_top_of_it(engine: Engine, standing: SceneBody) -> None:
-    seen = drop(engine, standing, physics=ROLLING)
-    assert ball_of(seen.samples[-1][1]).position == pytest.approx((1.0, 0.0, 0.8 + RADIUS), abs=2e-3)
+    seen = drop(engine, standing, scene=ROLLING)
+    assert object_in(seen.samples[-1][1]).position == pytest.approx((1.0, 0.0, 0.8 + RADIUS), abs=2e-3)
     assert seen.touches[-1][1] == {standing.link.name}
 
 
 def test_a_ball_slides_down_a_body_that_is_turned(engine: Engine) -> None:
     tilted = replace(BOX, placement=Placement((1.0, 0.0, 0.75), (0.0, 0.5, 0.0)), friction=0.0)
-    x, y, z = ball_of(drop(engine, tilted, steps=250).samples[-1][1]).position
+    x, y, z = object_in(drop(engine, tilted, steps=250).samples[-1][1]).position
     # A positive turn about y lowers the side at higher x.
     assert x > 1.05
     assert z < 0.8
@@ -65,24 +75,24 @@ def test_a_ball_slides_down_a_body_that_is_turned(engine: Engine) -> None:
 
 
 def test_the_restitution_of_a_body_is_multiplied_with_that_of_the_ball(engine: Engine) -> None:
-    bouncy = replace(PHYSICS, ball_restitution=0.8)
+    bouncy = scene_with(restitution=0.8)
     heights = []
     for restitution in (1.0, 0.5, 0.0):
-        seen = drop(engine, replace(BOX, restitution=restitution), physics=bouncy, steps=400)
+        seen = drop(engine, replace(BOX, restitution=restitution), scene=bouncy, steps=400)
         first = seen.touches[0][0]
-        heights.append(max(ball_of(sample).position[2] for step, sample in seen.samples if step > first + 5))
+        heights.append(max(object_in(sample).position[2] for step, sample in seen.samples if step > first + 5))
     assert heights[0] > heights[1] + 0.05 > heights[2] + 0.1
     assert heights[2] < 0.85
 
 
 def test_friction_with_a_body_is_the_product_of_both(engine: Engine) -> None:
     def slide(ball: float, surface: float) -> float:
-        engine.load(replace(SCENE, bodies=(replace(BOX, friction=surface),)))
-        engine.configure(replace(PHYSICS, ball_friction=ball))
+        engine.load(replace(scene_with(friction=ball), bodies=(replace(BOX, friction=surface),)))
+        engine.configure(PHYSICS)
         engine.rest(START.tolist(), SEAT)
-        engine.place_ball(BodyState((0.8, 0.0, 0.8 + RADIUS), linear_velocity=(1.0, 0.0, 0.0)))
+        engine.place(0, BodyState((0.8, 0.0, 0.8 + RADIUS), linear_velocity=(1.0, 0.0, 0.0)))
         engine.run(still(engine, 100), Observer())
-        return ball_of(engine.state.sample).linear_velocity[0]
+        return object_in(engine.state.sample).linear_velocity[0]
 
     assert slide(1.0, 0.0) == pytest.approx(1.0, abs=1e-3)
     # A ball that rolls without sliding keeps 5/7 of the speed at which it slid.
@@ -93,13 +103,14 @@ def test_friction_with_a_body_is_the_product_of_both(engine: Engine) -> None:
 
 def test_rolling_friction_stops_a_ball_after_the_way_that_it_implies(engine: Engine) -> None:
     lever, speed = 0.002, 0.5
-    engine.load(replace(SCENE, bodies=(replace(BOX, friction=1.0, link=replace(BOX.link)),)))
-    engine.configure(replace(PHYSICS, ball_friction=1.0, ball_rolling_friction_m=lever))
+    rolling = scene_with(friction=1.0, rolling_friction_m=lever)
+    engine.load(replace(rolling, bodies=(replace(BOX, friction=1.0, link=replace(BOX.link)),)))
+    engine.configure(PHYSICS)
     engine.rest(START.tolist(), SEAT)
     spin = (0.0, speed / RADIUS, 0.0)
-    engine.place_ball(BodyState((0.75, 0.0, 0.8 + RADIUS), linear_velocity=(speed, 0.0, 0.0), angular_velocity=spin))
+    engine.place(0, BodyState((0.75, 0.0, 0.8 + RADIUS), linear_velocity=(speed, 0.0, 0.0), angular_velocity=spin))
     engine.run(still(engine, 750), Observer())
-    ball = ball_of(engine.state.sample)
+    ball = object_in(engine.state.sample)
     # Rolling takes 7/5 of the energy of sliding, and loses weight times lever over radius on each metre.
     assert ball.position[0] - 0.75 == pytest.approx(0.7 * speed**2 / (9.81 * lever / RADIUS), rel=0.05)
     assert math.hypot(*ball.linear_velocity) < 1e-3
@@ -116,11 +127,11 @@ def test_a_changed_body_gives_the_same_bits_as_a_new_world(engine: Engine) -> No
         for each in others
         for shape in each.link.shapes
     )
-    bouncy = replace(PHYSICS, ball_restitution=0.5)
+    bouncy = scene_with(restitution=0.5)
     drop(engine, BOX, CYLINDER, SPHERE)
-    kept = [drop(engine, *others, physics=bouncy), drop(engine, *smaller), drop(engine, *others, physics=bouncy)]
+    kept = [drop(engine, *others, scene=bouncy), drop(engine, *smaller), drop(engine, *others, scene=bouncy)]
     fresh = type(engine)()
-    assert drop(fresh, *others, physics=bouncy) == kept[0] == kept[2]
+    assert drop(fresh, *others, scene=bouncy) == kept[0] == kept[2]
     assert kept[0].touches != kept[1].touches
     fresh.close()
 
@@ -167,22 +178,22 @@ def test_a_body_rests_on_the_ground_even_if_that_does_not_stop_the_ball(engine: 
     engine.load(replace(SCENE, bodies=(LOWER,), ground_is_solid=False))
     engine.configure(PHYSICS)
     engine.rest(START.tolist(), SEAT)
-    engine.place_ball(BodyState((2.0, 0.0, 1.0)))
+    engine.place(0, BodyState((2.0, 0.0, 1.0)))
     seen = Watcher()
     engine.run(still(engine, 500), seen)
     assert bodies_after(seen)[0].position[2] == pytest.approx(0.05, abs=3e-3)
-    assert ball_of(seen.samples[-1][1]).position[2] < -1.0
+    assert object_in(seen.samples[-1][1]).position[2] < -1.0
 
 
 def test_a_ball_pushes_a_body_that_it_hits_and_keeps_the_momentum(engine: Engine) -> None:
     light = replace(moving(CUBE, 0.05, "light", xyz=(1.0, 0.0, 0.85)), friction=0.0)
-    engine.load(replace(SCENE, bodies=(replace(BOX, friction=0.0), light)))
-    engine.configure(replace(PHYSICS, ball_mass_kg=0.05))
+    engine.load(replace(scene_with(mass_kg=0.05), bodies=(replace(BOX, friction=0.0), light)))
+    engine.configure(PHYSICS)
     engine.rest(START.tolist(), SEAT)
-    engine.place_ball(BodyState((0.8, 0.0, 0.86), linear_velocity=(2.0, 0.0, 0.0)))
+    engine.place(0, BodyState((0.8, 0.0, 0.86), linear_velocity=(2.0, 0.0, 0.0)))
     seen = Watcher()
     engine.run(still(engine, 75), seen)
-    (hit,), ball = bodies_after(seen), ball_of(seen.samples[-1][1])
+    (hit,), ball = bodies_after(seen), object_in(seen.samples[-1][1])
     assert "light" in {name for _, names in seen.touches for name in names}
     assert hit.linear_velocity[0] > 0.8
     assert hit.linear_velocity[0] + ball.linear_velocity[0] == pytest.approx(2.0, abs=0.05)
@@ -192,7 +203,7 @@ def test_the_robot_pushes_a_body(engine: Engine) -> None:
     engine.load(SCENE)
     engine.configure(PHYSICS)
     engine.rest(START.tolist(), SEAT)
-    x, y, z = ball_of(engine.state.sample).position
+    x, y, z = object_in(engine.state.sample).position
     # In the way of the spoon, whose swing goes forwards.
     engine.load(replace(SCENE, bodies=(moving(CUBE, 0.1, "box", xyz=(x + 0.25, y, z + 0.2)),)))
     engine.configure(replace(PHYSICS, gravity_mps2=0.01))

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.engines.engine import GROUND, BodyState, Engine, Observer, Sample, State, Steps, ball_of
+from throwcollect.engines.engine import GROUND, BodyState, Engine, Observer, Sample, Scene, State, Steps, object_in
 from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import physics_description, start_posture
+from throwcollect.robots.surroundings import object_of
 from throwcollect.sim.scene import physics_of, scene_of
 from throwcollect.tools.tool import tool_of
 
@@ -27,6 +28,12 @@ START = np.array([start_posture(CONFIG)[joint] for joint in MOVING])
 END = np.array([CONFIG.task.end[joint] for joint in MOVING])
 SPOON = SCENE.tool.name
 STRIDE = 2
+
+
+def scene_with(scene: Scene = SCENE, **ball: float) -> Scene:
+    """Make a scene whose ball has other values of its keys."""
+    changed = CONFIG.model_copy(update={"ball": CONFIG.ball.model_copy(update=ball)})
+    return replace(scene, object=object_of(changed))
 
 
 @dataclass
@@ -96,10 +103,10 @@ def test_the_ball_rests_in_the_tool_of_the_still_robot(engine: Engine) -> None:
     assert state.touching == {SPOON}
     assert state.sample[: len(MOVING)] == pytest.approx(START, abs=1e-4)
     assert len(state.sample) == 3 * len(MOVING) + 13
-    ball = ball_of(state.sample)
+    ball = object_in(state.sample)
     assert ball.linear_velocity == pytest.approx((0, 0, 0), abs=1e-4)
     engine.run(still(engine, 100), Observer())
-    assert ball_of(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
+    assert object_in(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
 
 
 def test_a_decimal_comma_of_the_process_changes_no_throw(name: str, use_decimal_comma: Callable[[], str]) -> None:
@@ -131,12 +138,12 @@ def test_a_throw_from_a_restored_state_does_not_depend_on_what_ran_before(name: 
     first = watch_throw(engine)
     engine.reset(settled)
     assert watch_throw(engine) == first
-    engine.place_ball(BodyState((0.0, 0.05, 2.2), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0)))
+    engine.place(0, BodyState((0.0, 0.05, 2.2), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0)))
     engine.run(still(engine, 100), Observer())
     begin(engine)
     assert watch_throw(engine) == first
-    engine.load(replace(SCENE, ball_radius_m=0.03))
-    engine.configure(replace(PHYSICS, gravity_mps2=3.0, ball_mass_kg=0.2))
+    engine.load(scene_with(radius_m=0.03, mass_kg=0.2))
+    engine.configure(replace(PHYSICS, gravity_mps2=3.0))
     engine.rest(END.tolist(), SEAT)
     engine.run(swing(50), Observer())
     begin(engine)
@@ -192,19 +199,19 @@ def test_a_thrown_ball_leaves_the_tool_and_only_changes_of_touch_are_reported(en
     states = [frozenset({SPOON}), *(bodies for _, bodies in seen.touches)]
     assert all(one != other for one, other in pairwise(states))
     assert 200 < steps[-1] < 500
-    forward, _, height = ball_of(engine.state.sample).position
+    forward, _, height = object_in(engine.state.sample).position
     assert forward > 1.0
     assert height < 1.5
 
 
 def test_a_free_ball_gets_its_velocity_from_gravity_before_it_moves(engine: Engine) -> None:
-    engine.place_ball(BodyState((3.0, 0.0, 2.0), linear_velocity=(1.0, -0.5, 2.0)))
+    engine.place(0, BodyState((3.0, 0.0, 2.0), linear_velocity=(1.0, -0.5, 2.0)))
     seen = Watcher()
     engine.run(still(engine, 100), seen)
     assert seen.touches == [(1, frozenset())]
     n = 100
     dt = 1 / PHYSICS.hz
-    ball = ball_of(engine.state.sample)
+    ball = object_in(engine.state.sample)
     fallen = PHYSICS.gravity_mps2 * dt * dt * n * (n + 1) / 2
     assert ball.position == pytest.approx((3.0 + n * dt, -0.5 * n * dt, 2.0 + 2.0 * n * dt - fallen), abs=1e-12)
     assert ball.linear_velocity == pytest.approx((1.0, -0.5, 2.0 - PHYSICS.gravity_mps2 * n * dt), abs=1e-12)
@@ -212,25 +219,25 @@ def test_a_free_ball_gets_its_velocity_from_gravity_before_it_moves(engine: Engi
 
 def test_drag_slows_the_ball_by_the_square_of_its_speed(engine: Engine) -> None:
     speed, drag_kgpm = 4.0, 0.01
-    engine.place_ball(BodyState((3.0, 0.0, 2.0), linear_velocity=(speed, 0.0, 0.0)))
+    engine.place(0, BodyState((3.0, 0.0, 2.0), linear_velocity=(speed, 0.0, 0.0)))
     engine.run(still(engine, 1, drag_kgpm=drag_kgpm), Observer())
-    lost = drag_kgpm * speed**2 / PHYSICS.ball_mass_kg / PHYSICS.hz
-    assert ball_of(engine.state.sample).linear_velocity[0] == pytest.approx(speed - lost, rel=1e-9)
+    lost = drag_kgpm * speed**2 / SCENE.object.inertia.mass_kg / PHYSICS.hz
+    assert object_in(engine.state.sample).linear_velocity[0] == pytest.approx(speed - lost, rel=1e-9)
 
 
 def test_only_solid_ground_stops_the_ball(engine: Engine) -> None:
     low = BodyState((2.0, 0.0, 0.2), linear_velocity=(0.0, 0.0, -2.0))
-    engine.place_ball(low)
+    engine.place(0, low)
     engine.run(still(engine, 100), Observer())
     assert engine.state.touching == {GROUND}
-    assert ball_of(engine.state.sample).position[2] == pytest.approx(SCENE.ball_radius_m, abs=2e-3)
+    assert object_in(engine.state.sample).position[2] == pytest.approx(SCENE.object.radius_m, abs=2e-3)
     engine.load(replace(SCENE, ground_is_solid=False))
     engine.configure(PHYSICS)
     engine.rest(START.tolist(), SEAT)
-    engine.place_ball(low)
+    engine.place(0, low)
     engine.run(still(engine, 100), Observer())
     assert engine.state.touching == frozenset()
-    assert ball_of(engine.state.sample).position[2] < -0.2
+    assert object_in(engine.state.sample).position[2] < -0.2
 
 
 def test_ground_can_be_solid_for_some_steps_alone_and_leaves_no_trace(engine: Engine) -> None:
@@ -242,18 +249,18 @@ def test_ground_can_be_solid_for_some_steps_alone_and_leaves_no_trace(engine: En
     engine.reset(settled)
     first = watch_throw(engine)
     for _ in range(2):
-        engine.place_ball(BodyState((2.0, 0.0, 0.2), linear_velocity=(0.0, 0.0, -2.0)))
+        engine.place(0, BodyState((2.0, 0.0, 0.2), linear_velocity=(0.0, 0.0, -2.0)))
         engine.run(replace(still(engine, 100), ground_is_solid=True), Observer())
         assert engine.state.touching == {GROUND}
-        assert ball_of(engine.state.sample).position[2] == pytest.approx(SCENE.ball_radius_m, abs=2e-3)
-    engine.place_ball(BodyState((2.0, 0.0, 0.2)))
+        assert object_in(engine.state.sample).position[2] == pytest.approx(SCENE.object.radius_m, abs=2e-3)
+    engine.place(0, BodyState((2.0, 0.0, 0.2)))
     engine.run(still(engine, 200), Observer())
-    assert ball_of(engine.state.sample).position[2] < -0.2
+    assert object_in(engine.state.sample).position[2] < -0.2
     engine.reset(settled)
     assert watch_throw(engine) == first
 
 
 def test_a_placed_ball_has_exactly_the_given_state(engine: Engine) -> None:
     put = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3))
-    engine.place_ball(put)
-    assert ball_of(engine.state.sample) == put
+    engine.place(0, put)
+    assert object_in(engine.state.sample) == put

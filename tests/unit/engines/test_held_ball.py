@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.engines.test_engine_contract import PHYSICS, START, STRIDE, Watcher, still, swing
+from tests.unit.engines.test_engine_contract import PHYSICS, START, STRIDE, Watcher, scene_with, still, swing
 
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import Vector
-from throwcollect.engines.engine import BodyState, Engine, Observer, Sample, State, Steps, ball_of
+from throwcollect.engines.engine import BodyState, Engine, Observer, Sample, State, Steps, object_in
 from throwcollect.engines.grip import carry
 from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member, names_of
@@ -27,9 +27,9 @@ HELD = 350
 """Number of the last step in which the ball is held."""
 
 
-def begin(engine: Engine, *, physics=PHYSICS) -> State:
-    engine.load(SCENE)
-    engine.configure(physics)
+def begin(engine: Engine, *, scene=SCENE) -> State:
+    engine.load(scene)
+    engine.configure(PHYSICS)
     assert SCENE.tool.seat is not None
     engine.rest(START.tolist(), SCENE.tool.seat)
     engine.run(replace(still(engine, 25), held=25), Observer())
@@ -69,7 +69,7 @@ def test_a_held_ball_moves_with_the_tool_and_is_free_after_the_last_step_in_whic
     assert engine.state.touching == {"claw"}
     seen = watch_throw(engine)
     assert seen.touches == [(HELD + 1, frozenset())]
-    balls = {step: ball_of(sample) for step, sample in seen.samples}
+    balls = {step: object_in(sample) for step, sample in seen.samples}
     for step, sample in seen.samples:
         if step <= HELD:
             assert balls[step].position == pytest.approx(find_seat(sample), abs=1e-6)
@@ -95,9 +95,9 @@ def test_a_throw_has_the_same_bits_whatever_ran_before(engine: Engine) -> None:
     engine.reset(settled)
     assert watch_throw(engine) == first
     engine.reset(settled)
-    engine.place_ball(BodyState((1.0, 0.0, 2.0)))
+    engine.place(0, BodyState((1.0, 0.0, 2.0)))
     engine.run(swing_and_let_go(100), Observer())
-    begin(engine, physics=replace(PHYSICS, ball_mass_kg=0.2))
+    begin(engine, scene=scene_with(SCENE, mass_kg=0.2))
     watch_throw(engine)
     begin(engine)
     assert watch_throw(engine) == first
@@ -113,10 +113,10 @@ def test_single_steps_give_the_same_throw_as_many_at_once(engine: Engine) -> Non
 
 
 def test_a_ball_that_is_placed_elsewhere_is_not_held_any_more(engine: Engine) -> None:
-    engine.place_ball(BodyState((1.0, 0.0, 2.0)))
+    engine.place(0, BodyState((1.0, 0.0, 2.0)))
     seen = Watcher()
     engine.run(replace(still(engine, 50), held=50), seen)
-    x, y, z = ball_of(engine.state.sample).position
+    x, y, z = object_in(engine.state.sample).position
     assert (x, y) == (1.0, 0.0)
     assert z == pytest.approx(2.0 - PHYSICS.gravity_mps2 * (50 / PHYSICS.hz) ** 2 / 2, rel=0.01)
     assert seen.touches == [(1, frozenset())]
@@ -128,7 +128,7 @@ def test_the_arm_bears_the_ball_until_the_release_alone(name: str) -> None:
     made: Engine = load_member("engines", name)()
     efforts = {}
     for mass_kg in (0.02, 0.12):
-        begin(made, physics=replace(PHYSICS, ball_mass_kg=mass_kg))
+        begin(made, scene=scene_with(SCENE, mass_kg=mass_kg))
         seen = Watcher()
         made.run(replace(still(made, 200), held=100), seen)
         efforts[mass_kg] = np.array([sample[2 * MOVING : 3 * MOVING] for _, sample in seen.samples])
@@ -147,7 +147,7 @@ def test_both_engines_with_contacts_throw_alike() -> None:
         made: Engine = load_member("engines", name)()
         begin(made)
         watch_throw(made)
-        ends.append(ball_of(made.state.sample).position)
+        ends.append(object_in(made.state.sample).position)
         made.close()
     assert ends[0] == pytest.approx(ends[1], abs=5e-4)
 

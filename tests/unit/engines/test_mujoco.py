@@ -18,19 +18,21 @@ from tests.unit.engines.test_engine_contract import (
     START,
     Watcher,
     begin,
+    scene_with,
     still,
     swing,
 )
 
-from throwcollect.engines.engine import BodyState, Observer, Physics, Scene, ball_of
+from throwcollect.engines.body import HERE, LinkShape
+from throwcollect.engines.engine import BodyState, Observer, Physics, Scene, object_in
 from throwcollect.engines.mujoco.mujoco_engine import MujocoEngine
-from throwcollect.engines.mujoco.scenery import make_spec, resize_ball
+from throwcollect.engines.mujoco.scenery import make_spec, resize_object
 from throwcollect.errors import ConfigError
 
 TRIALS: list[tuple[Scene, Physics]] = [
     (SCENE, PHYSICS),
-    (replace(SCENE, ball_radius_m=0.02), replace(PHYSICS, ball_mass_kg=0.06)),
-    (SCENE, replace(PHYSICS, ball_friction=0.2, ball_restitution=0.6, velocity_gain=0.7)),
+    (scene_with(radius_m=0.02, mass_kg=0.06), PHYSICS),
+    (scene_with(friction=0.2, restitution=0.6), replace(PHYSICS, velocity_gain=0.7)),
     (SCENE, replace(PHYSICS, gravity_mps2=3.0, efforts=tuple(0.7 * effort for effort in PHYSICS.efforts))),
     (replace(SCENE, ground_is_solid=False), replace(PHYSICS, surface_friction=1.0, solver_iterations=10)),
 ]
@@ -119,19 +121,30 @@ def test_motors_that_are_too_weak_give_no_more_than_their_largest_effort(engine:
 def test_a_ball_bounces_off_the_ground_by_its_restitution(
     engine: MujocoEngine, restitution: float, speed: float
 ) -> None:
-    engine.configure(replace(PHYSICS, ball_restitution=restitution, gravity_mps2=1e-9))
-    engine.place_ball(BodyState((2.0, 0.0, 0.1), linear_velocity=(0.0, 0.0, -speed)))
+    engine.load(scene_with(restitution=restitution))
+    engine.configure(replace(PHYSICS, gravity_mps2=1e-9))
+    engine.place(0, BodyState((2.0, 0.0, 0.1), linear_velocity=(0.0, 0.0, -speed)))
     seen = Watcher()
     engine.run(still(engine, 120), seen)
-    assert ball_of(seen.samples[-1][1]).linear_velocity[2] == pytest.approx(restitution * speed, abs=0.01 * speed)
-    assert min(ball_of(sample).position[2] for _, sample in seen.samples) > SCENE.ball_radius_m - 1e-3
+    assert object_in(seen.samples[-1][1]).linear_velocity[2] == pytest.approx(restitution * speed, abs=0.01 * speed)
+    assert min(object_in(sample).position[2] for _, sample in seen.samples) > SCENE.object.radius_m - 1e-3
 
 
-def test_a_resized_ball_gives_the_same_model_as_one_compiled_at_that_size() -> None:
-    spec, _ = make_spec(SCENE)
+@pytest.mark.parametrize(
+    ("kind", "before", "after"),
+    [("sphere", (0.03,), (0.04,)), ("cylinder", (0.03, 0.02), (0.04, 0.05)), ("box", (0.1, 0.2, 0.3), (0.2, 0.1, 0.1))],
+)
+def test_a_resized_object_gives_the_same_model_as_one_compiled_at_that_size(
+    kind: str, before: tuple[float, ...], after: tuple[float, ...]
+) -> None:
+    one, other = (
+        replace(SCENE.object, link=replace(SCENE.object.link, shapes=(LinkShape(kind, size, HERE),)))
+        for size in (before, after)
+    )
+    spec, _ = make_spec(replace(SCENE, object=one))
     resized = spec.compile()
-    resize_ball(resized, 0.04)
-    spec, _ = make_spec(replace(SCENE, ball_radius_m=0.04))
+    resize_object(resized, other)
+    spec, _ = make_spec(replace(SCENE, object=other))
     compiled = spec.compile()
     # These arrays are computed from the inertia, which is set with the mass.
     derived = ("inertia", "inertia0", "invweight0", "M0", "acc0", "stat")
@@ -148,7 +161,7 @@ def test_a_diverging_world_has_numbers_that_are_not_finite_and_can_begin_again(
     monkeypatch.chdir(tmp_path)
     whole = Watcher()
     engine.run(swing(600), whole)
-    engine.place_ball(BodyState((1.0, 2.0, 3.0), linear_velocity=(1e300, 0.0, 0.0)))
+    engine.place(0, BodyState((1.0, 2.0, 3.0), linear_velocity=(1e300, 0.0, 0.0)))
     engine.run(still(engine, 20), Observer())
     assert not np.isfinite(engine.state.sample).all()
     begin(engine)

@@ -50,7 +50,7 @@ def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> 
     assert (episode.result, episode.conditions) == (RESULT, CONDITIONS)
     assert (episode.header, episode.chunk) == (sent.header, sent.chunk)
     assert episode.digest == sent.digest
-    assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
+    assert episode.samples().object_position.tolist() == make_samples(50).object_position.tolist()
 
 
 def test_the_message_of_an_episode_is_a_standard_array_that_names_its_parts(sent: Episode) -> None:

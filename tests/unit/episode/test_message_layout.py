@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rclzenoh.interfaces import get_message, message_definition
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
-from throwcollect.episode.topics import Topic, ball_odometry, controller_state, joint_states, transforms
+from throwcollect.episode.topics import Topic, controller_state, joint_states, odometry, transforms
 from throwcollect.robots.talos import TALOS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -65,7 +65,7 @@ def test_joint_states_have_the_bytes_that_rosbags_writes(count: int) -> None:
 
 @given(st.integers(0, 2**31 - 1), st.integers(0, 999_999_999), st.lists(st.floats(), min_size=13, max_size=13))
 def test_odometry_has_the_bytes_that_rosbags_writes(sec: int, nanosec: int, numbers: list[float]) -> None:
-    layout = ball_odometry().layout
+    layout = odometry("ball").layout
     message = np.frombuffer(bytearray(layout.template), layout.dtype)
     message["header.stamp.sec"], message["header.stamp.nanosec"] = sec, nanosec
     message["pose.pose.position"], message["pose.pose.orientation"] = numbers[:3], numbers[3:7]
@@ -103,8 +103,8 @@ def test_transforms_without_moving_frames_hold_only_the_ball(make_samples: Any) 
     for row, message in enumerate(messages_of(topic, samples)):
         (ball,) = STORE.deserialize_cdr(message, topic.type_name).transforms
         assert (ball.header.frame_id, ball.child_frame_id) == ("world", "ball")
-        assert ball.transform.translation.x == samples.ball_position[row, 0]
-        assert ball.transform.rotation.w == samples.ball_orientation_xyzw[row, 3]
+        assert ball.transform.translation.x == samples.object_position[row, 0]
+        assert ball.transform.rotation.w == samples.object_orientation_xyzw[row, 3]
 
 
 def test_fields_after_fields_of_every_kind_are_found() -> None:

@@ -89,10 +89,10 @@ def throws_of(directory: Path, step: int = 1) -> Iterator[tuple[int, Arrays]]:
                 "command_position_rad": path,
                 "command_velocity_radps": speed,
                 "command_acceleration_radps2": acceleration,
-                "ball_position_m": samples.ball_position,
-                "ball_orientation_xyzw": samples.ball_orientation_xyzw,
-                "ball_velocity_mps": samples.ball_linear_velocity,
-                "ball_angular_velocity_radps": samples.ball_angular_velocity,
+                "ball_position_m": samples.object_position,
+                "ball_orientation_xyzw": samples.object_orientation_xyzw,
+                "ball_velocity_mps": samples.object_linear_velocity,
+                "ball_angular_velocity_radps": samples.object_angular_velocity,
             },
         )
 

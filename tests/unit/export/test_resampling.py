@@ -20,10 +20,10 @@ def polynomial(rate_hz: int, count: int) -> Samples:
         position=rate * t**2 - t**3,
         velocity=2 * rate * t - 3 * t**2,
         effort=rate * t - 1,
-        ball_position=axis * t**3 + 1,
-        ball_orientation_xyzw=turn,
-        ball_linear_velocity=3 * axis * t**2,
-        ball_angular_velocity=axis * t,
+        object_position=axis * t**3 + 1,
+        object_orientation_xyzw=turn,
+        object_linear_velocity=3 * axis * t**2,
+        object_angular_velocity=axis * t,
     )
 
 
@@ -43,10 +43,10 @@ def test_resampling_interpolates_positions_by_cubics_and_the_rest_linearly(rate_
     assert (count - 1) / rate_hz <= 100 / 250 < count / rate_hz
     exact = polynomial(rate_hz, count)
     assert np.abs(given.stamps_ns - exact.stamps_ns).max() <= 1
-    for name in ("position", "effort", "ball_position", "ball_angular_velocity"):
+    for name in ("position", "effort", "object_position", "object_angular_velocity"):
         np.testing.assert_allclose(getattr(given, name), getattr(exact, name), rtol=0, atol=1e-12, err_msg=name)
     # Velocities are parabolas here: a chord departs from them by their second derivative times the spacing squared / 8.
-    for name, curvature in (("velocity", 6.0), ("ball_linear_velocity", 18.0)):
+    for name, curvature in (("velocity", 6.0), ("object_linear_velocity", 18.0)):
         np.testing.assert_allclose(
             getattr(given, name), getattr(exact, name), rtol=0, atol=curvature / 250**2 / 8 + 1e-12, err_msg=name
         )
@@ -54,11 +54,11 @@ def test_resampling_interpolates_positions_by_cubics_and_the_rest_linearly(rate_
 
 def test_resampled_orientations_stay_unit_quaternions_when_signs_flip() -> None:
     recorded = polynomial(250, 101)
-    recorded.ball_orientation_xyzw[40:70] *= -1
+    recorded.object_orientation_xyzw[40:70] *= -1
     given = resample(recorded, recorded_hz=250, rate_hz=240)
-    exact = polynomial(240, len(given)).ball_orientation_xyzw
-    np.testing.assert_allclose(np.linalg.norm(given.ball_orientation_xyzw, axis=1), 1, atol=1e-15)
-    np.testing.assert_allclose(np.abs(np.sum(given.ball_orientation_xyzw * exact, axis=1)), 1, atol=1e-9)
+    exact = polynomial(240, len(given)).object_orientation_xyzw
+    np.testing.assert_allclose(np.linalg.norm(given.object_orientation_xyzw, axis=1), 1, atol=1e-15)
+    np.testing.assert_allclose(np.abs(np.sum(given.object_orientation_xyzw * exact, axis=1)), 1, atol=1e-9)
 
 
 @pytest.mark.parametrize("rate_hz", [240, 100, 1])

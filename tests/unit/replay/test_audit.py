@@ -22,10 +22,10 @@ SAMPLES = Samples(
     position=np.ones((COUNT, 32)),
     velocity=np.zeros((COUNT, 32)),
     effort=np.zeros((COUNT, 32)),
-    ball_position=np.ones((COUNT, 3)),
-    ball_orientation_xyzw=np.tile([0.0, 0.0, 0.0, 1.0], (COUNT, 1)),
-    ball_linear_velocity=np.zeros((COUNT, 3)),
-    ball_angular_velocity=np.zeros((COUNT, 3)),
+    object_position=np.ones((COUNT, 3)),
+    object_orientation_xyzw=np.tile([0.0, 0.0, 0.0, 1.0], (COUNT, 1)),
+    object_linear_velocity=np.zeros((COUNT, 3)),
+    object_angular_velocity=np.zeros((COUNT, 3)),
 )
 HEADER = EpisodeHeader(0, 16_000_000_000, "landed", (Contact("spoon", 16_000_000_000, None),), (), COUNT)
 
@@ -43,10 +43,10 @@ def test_an_episode_has_no_differences_from_itself_and_some_from_one_with_other_
 
 
 def test_a_difference_in_the_last_bit_is_reported_with_its_time_and_size() -> None:
-    position = SAMPLES.ball_position.copy()
+    position = SAMPLES.object_position.copy()
     position[3, 1] = np.nextafter(1.0, 2.0)
-    found = compare(episode(), episode(replace(SAMPLES, ball_position=position)))
-    assert found.differences == ("ball_position: from 0.012 s on, by up to 2.22e-16",)
+    found = compare(episode(), episode(replace(SAMPLES, object_position=position)))
+    assert found.differences == ("object_position: from 0.012 s on, by up to 2.22e-16",)
     assert found.stored != found.again
 
 

@@ -13,7 +13,7 @@ from throwcollect.robots.surroundings import BodyLook, looks_of
 
 def look_of(shape: str, **keys: Any) -> BodyLook:
     body = {"shape": shape, "position_m": [1.0, 2.0, 3.0], **keys}
-    (look,) = looks_of(Config.model_validate({"scene": {"bodies": {"body": body}}}))
+    look, _ball = looks_of(Config.model_validate({"scene": {"bodies": {"body": body}}}))
     return look
 
 
@@ -57,5 +57,5 @@ def test_bodies_of_a_task_follow_those_of_the_scene() -> None:
     bodies = {"post": {"shape": "sphere", "position_m": [1, 2, 3], "radius_m": 0.1, "color": "#102030"}}
     looks = looks_of(Config.model_validate({"scene": {"bodies": bodies}, "task": {"name": "throw_into", "wall": {}}}))
     names = [look.name for look in looks]
-    assert names == ["post", "bin_floor", "bin_front", "bin_back", "bin_right", "bin_left", "wall"]
-    assert (looks[0].color, looks[-1].color) == ("#102030", "#7a7f87")
+    assert names == ["post", "bin_floor", "bin_front", "bin_back", "bin_right", "bin_left", "wall", "ball"]
+    assert (looks[0].color, looks[-2].color) == ("#102030", "#7a7f87")

@@ -109,7 +109,7 @@ function watch(lacks) {
       const what = path.split("/").at(-1);
       asked.push(what);
       if (lacks.has(what)) throw new Error(`no ${what} for a moment`);
-      return { json: async () => ({ base_height_m: 1, target_distance_m: null }), text: async () => "<robot/>" };
+      return { json: async () => ({ base_height_m: 1, target_distance_m: null, bodies: [{ name: "ball", moves: true, above_m: [] }] }), text: async () => "<robot/>" };
     },
   };
   const station = { robot: null, setRobot: (robot) => Object.assign(station, { robot }) };
@@ -321,7 +321,7 @@ test("a zoom of a replay stays from throw to throw, and one of live values ends 
   const panel = new PlotPanel({ simulation: "sim_0", field: "ball", name: "z", link: "hand" }, false, () => {});
   const zoomIn = made.find(({ textContent }) => textContent === "+");
   const makeThrow = (trial) => ({
-    trial, simulation: "sim_0", joints: [], samples: 201, rate_hz: 100, duration: 2, positions: new Float32Array(), ball: new Float32Array(603),
+    trial, simulation: "sim_0", joints: [], samples: 201, rate_hz: 100, duration: 2, positions: new Float32Array(), path: new Float32Array(603),
   });
   /** Where the middle of a replay is in the plot, and how far it is from there to its end. */
   const measure = async (shown) => {

@@ -34,7 +34,9 @@ def test_the_javascript_tests_of_the_page_pass(tmp_path: Path, script: str) -> N
         pytest.skip("needs node, which runs modules of the page without a browser")
     header = {"trial": 7, "outcome": "landed", "joints": ["elbow", "wrist"], "samples": 3, "rate_hz": 100.0}
     text = json.dumps({**header, "landing": [1.5, -0.25, 0.0]}).encode()
-    numbers = [0, 10, 1, 11, 2, 12, *(0, 1, 2), *(1, 2, 3), *(2, 3, 4)]
+    path = [(0, 1, 2), (1, 2, 3), (2, 3, 4)]
+    poses = [number for place in path for number in (*place, 0, 0, 0, 1)]
+    numbers = [0, 10, 1, 11, 2, 12, *(number for place in path for number in place), *poses]
     message = (
         struct.pack("<I", len(text)) + text + b"\0" * (-len(text) % 4) + struct.pack(f"<{len(numbers)}f", *numbers)
     )

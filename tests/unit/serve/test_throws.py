@@ -85,7 +85,7 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     header = json.loads(frame[4 : 4 + size])
     assert header["landing"] == [1.0, -0.5, 0.02]
     assert header["values"] == {"ball.mass_kg": 0.05}
-    assert [(each["name"], each["size_m"]) for each in header["bodies"]] == [("post", [0.2, 0.2, 0.2])]
+    assert [(each["name"], each["size_m"]) for each in header["bodies"]] == [("post", [0.2] * 3), ("ball", [0.05] * 3)]
     assert (header["trial"], header["outcome"], header["samples"]) == (0, "landed", len(samples))
     assert header["rate_hz"] == pytest.approx(1e9 / (samples.stamps_ns[1] - samples.stamps_ns[0]))
     begin = 4 + size + (-(4 + size) % 4)
@@ -93,7 +93,9 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     numbers = np.frombuffer(frame[begin:], "<f4")
     joints = len(samples) * len(header["joints"])
     assert np.allclose(numbers[:joints].reshape(len(samples), -1), samples.position)
-    assert np.allclose(numbers[joints:].reshape(-1, 3), samples.ball_position)
+    path, poses = np.split(numbers[joints:], [3 * len(samples)])
+    assert np.allclose(path.reshape(-1, 3), samples.object_position)
+    assert np.allclose(poses.reshape(-1, 7)[:, 3:], samples.object_orientation_xyzw)
     fell = json.dumps({**result, "landing_z_m": None})
     told = encode_throw(Episode(episode.header, episode.chunk, result=fell), "sim_0", {}, None)
     header = json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])
@@ -109,15 +111,17 @@ def test_an_encoded_throw_holds_the_poses_of_bodies_that_move(collected: Path) -
     chunk, _ = ChunkEncoder(channels, level=1).encode(replace(episode.samples(), bodies=bodies))
     frame = encode_throw(Episode(episode.header, chunk, result='{"outcome": "landed"}'), "sim_0", {}, looks_of(config))
     header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
-    assert [(each["name"], each["moves"]) for each in header["bodies"]] == [("can", True), ("post", False)]
-    poses = np.frombuffer(frame[-len(bodies) * 7 * 4 :], "<f4").reshape(-1, 7)
-    np.testing.assert_allclose(poses, bodies[:, 0, :7], rtol=1e-6)
+    moves = {each["name"]: each["moves"] for each in header["bodies"]}
+    assert moves == {"can": True, "post": False, "ball": True}
+    poses = np.frombuffer(frame[-len(bodies) * 14 * 4 :], "<f4").reshape(-1, 14)
+    np.testing.assert_allclose(poses[:, :7], bodies[:, 0, :7], rtol=1e-6)
+    np.testing.assert_allclose(poses[:, 7:10], episode.samples().object_position, rtol=1e-6)
 
 
 def test_planned_values_come_from_the_plan(collected: Path, tmp_path: Path) -> None:
     planned = PlannedTrials(collected)
     for trial in Dataset.open(collected).plan.trials:
-        assert planned.of(trial.number) == (trial.values, ())
+        assert planned.of(trial.number) == (trial.values, looks_of(Dataset.open(collected).plan.config_of(trial)))
     assert set(planned.of(0)[0]) == {"task.end.arm_right_4_joint", "task.duration_s", "ball.mass_kg"}
     assert planned.of(99) == ({}, None)
     assert PlannedTrials(tmp_path).of(0) == ({}, None)

@@ -161,10 +161,10 @@ def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then
     simulation = LiveSimulator(config)
     # The second fall begins after the longest duration of a trial.
     for number, duration_s in enumerate((7.0, 0.02)):
-        simulation.world.ball = BodyState((2.0, 0.0, 1.0))
+        simulation.world.place("ball", BodyState((2.0, 0.0, 1.0)))
         assert simulation.submit(ARM, number, goal(ARM, duration_s)) is None
         run(simulation)
-        ball = simulation.world.ball
+        ball = simulation.world.object
         assert ball.position == pytest.approx((2.0, 0.0, config.ball.radius_m), abs=2e-3)
         assert np.hypot(*ball.linear_velocity[:2]) + abs(ball.linear_velocity[2]) < 0.01
     simulation.close()
@@ -173,7 +173,7 @@ def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then
 def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_trial(simulation: LiveSimulator) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     run(simulation)
-    rolling = simulation.world.ball
+    rolling = simulation.world.object
     assert rolling.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
     assert rolling.linear_velocity[0] > 1.0
     assert simulation.now_ns / 1e9 == pytest.approx(1.0 + CONFIG.sim.max_trial_s, abs=0.1)
@@ -185,7 +185,7 @@ def test_after_a_trial_the_ground_stops_the_ball(simulation: LiveSimulator) -> N
     assert simulation.take_recording() is not None
     assert simulation.submit(ARM, 3, swing()) is None
     run(simulation)
-    assert simulation.world.ball.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
+    assert simulation.world.object.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
 
 
 def test_a_motion_by_hand_leaves_no_trace_in_a_later_trial(simulation: LiveSimulator) -> None:
@@ -202,7 +202,7 @@ def test_a_motion_by_hand_leaves_no_trace_in_a_later_trial(simulation: LiveSimul
     assert fresh is not None
     assert later is not None
     assert later[0] == fresh[0]
-    assert np.array_equal(later[1].ball_position, fresh[1].ball_position)
+    assert np.array_equal(later[1].object_position, fresh[1].object_position)
 
 
 def test_a_run_of_a_trajectory_without_a_goal_ends(simulation: LiveSimulator) -> None:
@@ -308,10 +308,10 @@ def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: LiveSimulator)
     simulation.step(250)
     simulation.reset(state=False)
     before = simulation.world.joints()[0]
-    ball = simulation.world.ball
+    ball = simulation.world.object
     assert simulation.now_ns == 0
     assert simulation.world.recorded == 1
-    assert simulation.world.samples().ball_position[0].tolist() == list(ball.position)
+    assert simulation.world.samples().object_position[0].tolist() == list(ball.position)
     # Stopped at full speed, joints whose effort is limited give way for a moment.
     simulation.step(500)
     assert simulation.world.joints()[0] == pytest.approx(before, abs=2e-3)

@@ -73,6 +73,6 @@ def test_samples_have_the_bodies_that_move_even_if_there_are_none(rows: int, bod
     table = np.arange(rows * (6 + 13 * (bodies + 1)), dtype=np.float64).reshape(rows, -1 if rows else 19 + 13 * bodies)
     samples = to_samples(table, np.arange(rows), joints, joints, {}, np.zeros(2))
     assert samples.bodies.shape == (rows, bodies, 13)
-    assert samples.ball_position.shape == (rows, 3)
+    assert samples.object_position.shape == (rows, 3)
     if rows and bodies:
         assert samples.bodies[0].ravel().tolist() == [*range(6, 6 + 26)]

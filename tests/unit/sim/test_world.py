@@ -56,7 +56,7 @@ def test_the_first_sample_is_the_start_posture_with_the_ball_at_rest_in_the_spoo
     start = world.samples()
     assert start.stamps_ns.tolist() == [17]
     assert start.position[0] == pytest.approx([start_posture(CONFIG)[joint] for joint in TALOS.joints], abs=1e-5)
-    assert np.linalg.norm(start.ball_linear_velocity[0]) < 1e-4
+    assert np.linalg.norm(start.object_linear_velocity[0]) < 1e-4
     assert world.contacts()[0].body == "spoon"
     assert world.contacts()[0].start_ns == 17
     # The elbow bears forearm, spoon and ball.
@@ -109,7 +109,7 @@ def test_running_commands_one_by_one_equals_running_all_at_once(world):
 
 def test_a_throw_ends_with_the_first_sample_below_the_landing_plane(world):
     samples = throw(world)
-    lowest = samples.ball_position[:, 2] - CONFIG.ball.radius_m
+    lowest = samples.object_position[:, 2] - CONFIG.ball.radius_m
     assert world.end_reason == "landed"
     assert (lowest[:-1] >= 0).all()
     assert lowest[-1] < 0
@@ -119,7 +119,7 @@ def test_a_throw_ends_with_the_first_sample_below_the_landing_plane(world):
 def test_the_ground_does_not_touch_a_ball_that_lands_at_height_zero(world):
     samples = throw(world)
     assert [contact.body for contact in world.contacts()] == ["spoon"]
-    assert samples.ball_linear_velocity[-1, 0] == samples.ball_linear_velocity[-20, 0]
+    assert samples.object_linear_velocity[-1, 0] == samples.object_linear_velocity[-20, 0]
 
 
 def test_steps_go_on_after_the_end_of_a_throw_on_demand(world):
@@ -131,7 +131,7 @@ def test_steps_go_on_after_the_end_of_a_throw_on_demand(world):
 def test_a_raised_landing_plane_is_crossed_downwards_after_the_throw():
     trial = config(scene={"landing_height_m": 1.9})
     world = World(trial)
-    lowest = throw(world, trial).ball_position[:, 2] - trial.ball.radius_m
+    lowest = throw(world, trial).object_position[:, 2] - trial.ball.radius_m
     assert lowest[0] < 1.9 < lowest.max()
     assert world.end_reason == "landed"
     assert lowest[-1] < 1.9 <= lowest[-2]
@@ -143,11 +143,11 @@ def test_a_ball_that_never_rises_above_the_landing_plane_comes_to_rest_on_the_gr
     world = World(trial)
     commands = motion(trial, world.moving, seconds=5)
     world.run(commands[:50])
-    world.ball = BodyState((1.0, 0.0, 0.2))
+    world.place("ball", BodyState((1.0, 0.0, 0.2)))
     world.run(commands[50:])
     assert world.end_reason == "rest"
     assert [contact.body for contact in world.contacts()] == ["spoon", "ground"]
-    assert world.ball.position[2] == pytest.approx(trial.ball.radius_m, abs=1e-3)
+    assert world.object.position[2] == pytest.approx(trial.ball.radius_m, abs=1e-3)
     world.close()
 
 
@@ -201,21 +201,21 @@ def test_effort_scale_limits_the_effort_of_a_joint(world):
 def test_the_ball_can_be_put_anywhere(world):
     world.reset(CONFIG)
     state = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
-    world.ball = state
+    world.place("ball", state)
     for name, value in vars(state).items():
-        assert getattr(world.ball, name) == pytest.approx(value, abs=1e-15)
+        assert getattr(world.object, name) == pytest.approx(value, abs=1e-15)
     assert world.recorded == 1
     start = world.samples()
-    assert start.ball_position.tolist() == [[1, 2, 3]]
-    assert start.ball_angular_velocity[0] == pytest.approx((1, 2, 3), abs=1e-15)
+    assert start.object_position.tolist() == [[1, 2, 3]]
+    assert start.object_angular_velocity[0] == pytest.approx((1, 2, 3), abs=1e-15)
     world.run(still(CONFIG, world, 2))
     assert world.contacts()[0].end_ns == 2_000_000
-    assert world.ball.linear_velocity == pytest.approx([0.1, 0.2, 0.3 - 9.81 * 0.004])
+    assert world.object.linear_velocity == pytest.approx([0.1, 0.2, 0.3 - 9.81 * 0.004])
 
 
 def test_a_ball_on_the_robot_touches_the_link_by_name(world):
     world.reset(CONFIG)
-    world.ball = BodyState((0.0, 0.05, 2.2))
+    world.place("ball", BodyState((0.0, 0.05, 2.2)))
     world.run(still(CONFIG, world, 300))
     assert "torso_2_link" not in world.moving
     assert {contact.body for contact in world.contacts()} >= {"spoon", "torso_1_link"}
@@ -225,10 +225,10 @@ def test_a_ball_on_the_robot_touches_the_link_by_name(world):
 def test_the_bounce_of_the_ball_follows_its_restitution(restitution, least, most):
     trial = config(scene={"landing_height_m": 1.9}, ball={"restitution": restitution})
     world = World(trial)
-    world.ball = BodyState((1.0, 0.0, 0.5))
+    world.place("ball", BodyState((1.0, 0.0, 0.5)))
     world.run(still(trial, world, 200))
     # Bullet takes from the bounce what the ball still has to fall when the step of the impact begins.
-    assert least <= world.samples().ball_linear_velocity[:, 2].max() / np.sqrt(2 * 9.81 * 0.475) <= most
+    assert least <= world.samples().object_linear_velocity[:, 2].max() / np.sqrt(2 * 9.81 * 0.475) <= most
     world.close()
 
 
@@ -237,13 +237,13 @@ def test_a_reset_with_another_posture_rebuilds_the_robot(world):
     leaning = world.samples()
     world.reset(CONFIG)
     assert leaning.position[0, TALOS.joints.index("torso_2_joint")] == 0.3
-    assert leaning.ball_position[0, 0] - world.samples().ball_position[0, 0] > 0.1
+    assert leaning.object_position[0, 0] - world.samples().object_position[0, 0] > 0.1
 
 
 def test_a_ball_that_the_spoon_cannot_hold_is_refused(world):
     with pytest.raises(ConfigError, match="falls through the floor of the cup"):
         world.reset(config(tool={"cup_floor_radius_m": 0.03}))
-    assert throw(world).ball_position[-1, 0] == pytest.approx(1.69, abs=0.02)
+    assert throw(world).object_position[-1, 0] == pytest.approx(1.69, abs=0.02)
 
 
 @pytest.mark.parametrize("engine", ["bullet", "mujoco", "ballistic"])

@@ -27,7 +27,7 @@ from throwcollect.view.drawn_robot import draw_robot_of
 from throwcollect.view.viewer_directory import View, view
 
 CHOSEN = [5, 0]
-SAMPLED = ["/tf", "/joint_states", "/ball/odometry", "/view/ball_speed", "/view/limits"]
+SAMPLED = ["/tf", "/joint_states", "/ball/odometry", "/view/object_speed", "/view/limits"]
 
 Messages = dict[str, list[tuple[int, Any]]]
 
@@ -89,7 +89,7 @@ def test_throws_follow_one_another_in_the_chosen_order(collected: Path, messages
         assert [stamp for stamp, _ in states[:count]] == stamps.tolist()
         assert np.array_equal([state.position for _, state in states[:count]], samples.position)
         shown = [fields(state.pose.pose.position, *"xyz") for _, state in odometry[:count]]
-        assert np.array_equal(shown, samples.ball_position)
+        assert np.array_equal(shown, samples.object_position)
         assert odometry[0][1].header.stamp.sec * 10**9 + odometry[0][1].header.stamp.nanosec == start
         states, odometry = states[count:], odometry[count:]
         start = int(stamps[-1]) + 1_000_000_000
@@ -98,8 +98,8 @@ def test_throws_follow_one_another_in_the_chosen_order(collected: Path, messages
 
 def test_the_ball_speed_is_that_of_the_samples(collected: Path, messages: Messages) -> None:
     samples = Dataset.open(collected).episode(CHOSEN[0]).samples()
-    shown = [speed.data for _, speed in messages["/view/ball_speed"][: len(samples)]]
-    assert shown == pytest.approx(np.linalg.norm(samples.ball_linear_velocity, axis=1))
+    shown = [speed.data for _, speed in messages["/view/object_speed"][: len(samples)]]
+    assert shown == pytest.approx(np.linalg.norm(samples.object_linear_velocity, axis=1))
 
 
 def test_joints_are_shown_within_their_limits(collected: Path, messages: Messages) -> None:
@@ -222,12 +222,12 @@ def test_each_throw_is_shown_with_its_own_tool_and_ball(make_collection: Any, tm
     shown = messages_of(view(dataset, tmp_path / "view").recording)
     # Each of the four throws looks unlike the one before, but the robot without its tool is always the same.
     starts = [start for start, _ in shown["/view/throw"]]
-    changing = ("/robot_description", "/view/ball/robot_description", "/tf_static", "/view/tool")
+    changing = ("/robot_description", "/view/object/robot_description", "/tf_static", "/view/tool")
     assert [[start for start, _ in shown[topic]] for topic in changing] == [starts] * 4
     assert len(shown["/view/robot"]) == 1
     plan = Dataset.open(dataset).plan
     for trial, (_, description), (_, ball) in zip(
-        plan.trials, shown["/robot_description"], shown["/view/ball/robot_description"], strict=True
+        plan.trials, shown["/robot_description"], shown["/view/object/robot_description"], strict=True
     ):
         config = plan.config_of(trial)
         assert description.data == draw_robot_of(config).urdf
@@ -241,8 +241,8 @@ def test_bodies_are_shown_where_they_stand_in_each_throw(make_collection: Any, t
     settings = {"trials": None, "scene": {"bodies": {"pole": pole}}, "sweep": {"sampler": "grid", "parameters": swept}}
     shown = messages_of(view(make_collection(settings).collect(tmp_path / "a"), tmp_path / "view").recording)
     found = [[each for each in array.markers if each.ns == "bodies"] for _, array in shown["/view/throw"]]
-    assert [fields(each.pose.position, "x", "y", "z") for (each,) in found] == [[1.0, 2.0, 0.5], [1.5, 2.0, 0.5]]
-    ((marker,), _) = found
+    assert [fields(each.pose.position, "x", "y", "z") for each, _ball in found] == [[1.0, 2.0, 0.5], [1.5, 2.0, 0.5]]
+    ((marker, _), _) = found
     assert (marker.type, fields(marker.scale, "x", "y", "z")) == (marker.CYLINDER, [0.2, 0.2, 0.9])
     assert fields(marker.color, "r", "g", "b", "a") == pytest.approx([1.0, 128 / 255, 0.0, 1.0])
     assert (marker.header.frame_id, marker.action) == ("world", marker.ADD)
@@ -258,7 +258,7 @@ def test_a_throw_that_was_not_released_has_no_points(make_collection: Any, tmp_p
     dataset = make_collection({"trials": 1}).collect(tmp_path / "dataset", change=hold_ball)
     shown = messages_of(view(dataset, tmp_path / "view").recording)
     (_, array), (_, facts) = shown["/view/throw"][0], shown["/view/facts"][0]
-    assert [marker.ns for marker in array.markers] == ["", "ball", "path"]
+    assert [marker.ns for marker in array.markers] == ["", "bodies", "path"]
     assert {round(color.g - color.r, 6) for color in array.markers[2].colors} == {0.0}
     assert facts.status[0].level == facts.status[0].WARN
     assert facts.status[0].message.startswith("trial 0 not_released")

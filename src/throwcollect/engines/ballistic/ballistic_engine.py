@@ -19,7 +19,7 @@ from throwcollect.engines.engine import (
     Scene,
     State,
     Steps,
-    ball_of,
+    object_in,
 )
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.reproducible_math import matmul
@@ -28,7 +28,7 @@ _FREE: frozenset[str] = frozenset()
 _ON_GROUND = frozenset({GROUND})
 
 _Moment = tuple[Vector, Vector, frozenset[str]]
-"""Position and velocity of the ball after a step, and the names of the bodies that touch it."""
+"""Position and velocity of the object after a step, and the names of the bodies that touch it."""
 
 
 class BallisticEngine(Engine):
@@ -36,11 +36,11 @@ class BallisticEngine(Engine):
 
     - At the end of each step, the arm is at the commanded positions, at the velocity that led there. Motors have no
       torques and no limits.
-    - The ball moves with its seat in the tool as long as the tool pushes it. From the first step on in which the tool
+    - The object moves with its seat in the tool as long as the tool pushes it. From the first step on in which the tool
       would have to pull the ball back along its opening, or that lets go of it, it is free and keeps its velocity.
-    - In each step, gravity and drag accelerate a free ball, which then moves at its new velocity, as in Bullet. It
+    - In each step, gravity and drag accelerate a free object, which then moves at its new velocity, as in Bullet. It
       touches nothing but solid ground, where it stays.
-    - The ball never spins, and nothing touches the robot.
+    - The object never spins, and nothing touches the robot.
     """
 
     _scene: Scene
@@ -66,28 +66,35 @@ class BallisticEngine(Engine):
                 [Problem(f"should be left out, as the engine ballistic knows no contacts: {names}", "scene.bodies")],
                 hint="--set sim.engine=mujoco simulates contacts",
             )
+        if scene.object.link.shapes[0].kind != "sphere":
+            raise ConfigError(
+                [Problem("should be left out, as the engine ballistic throws balls only", "object")],
+                hint="--set sim.engine=mujoco simulates contacts",
+            )
         self._tool_path = ToolPath(scene)
         self._opening = np.array(scene.tool.opening).reshape(3, 1)
         self._carried_by = frozenset({scene.tool.name})
         self._scene = scene
 
     def configure(self, physics: Physics) -> None:
-        """Set the numbers of the physics; this engine uses rate, gravity and the ball's mass."""
+        """Set the numbers of the physics; this engine uses rate and gravity."""
         self._physics = physics
 
-    def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints into positions and the ball into the tool, all at rest."""
-        place, turn = self._tool_path.along(np.array([joints]))
-        centre = (place + matmul(turn, np.array(seat).reshape(3, 1))).ravel().tolist()
+    def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
+        """Put joints and object at their start, all at rest."""
+        placed, touching = self._scene.object.start, _FREE
+        if seat is not None:
+            place, turn = self._tool_path.along(np.array([joints]))
+            centre = (place + matmul(turn, np.array(seat).reshape(3, 1))).ravel().tolist()
+            placed, touching = (*centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), self._carried_by
         still = (0.0,) * len(joints)
-        ball = (*centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6)
-        self.reset(State((*joints, *still, *still, *ball), self._carried_by))
+        self.reset(State((*joints, *still, *still, *placed), touching))
 
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state; the place of a ball that touches the tool becomes its seat."""
+        """Put robot and object into a state; the place of an object that touches the tool becomes its seat."""
         count = len(self._scene.moving)
         self._joints, self._velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
-        self.place_ball(ball_of(state.sample))
+        self.place(0, object_in(state.sample))
         self._touching = self._reported = state.touching
         place, turn = self._tool_path.along(self._joints[np.newaxis])
         away = np.array(self._position).reshape(3, 1) - place[0]
@@ -95,7 +102,7 @@ class BallisticEngine(Engine):
 
     @property
     def state(self) -> State:
-        """Robot and ball now."""
+        """Robot and object now."""
         return State(self._sample(), self._touching)
 
     def run(self, steps: Steps, observer: Observer) -> int:
@@ -114,19 +121,19 @@ class BallisticEngine(Engine):
                     break
         return number
 
-    def place_ball(self, ball: BodyState) -> None:
-        """Set pose and velocity of the ball, which is free then; it does not spin."""
-        self._position, self._velocity = ball.position, ball.linear_velocity
-        self._orientation = ball.orientation_xyzw
+    def place(self, number: int, state: BodyState) -> None:  # noqa: ARG002 - nothing else moves
+        """Set pose and velocity of the object, which is free then; it does not spin."""
+        self._position, self._velocity = state.position, state.linear_velocity
+        self._orientation = state.orientation_xyzw
         self._touching = _FREE
 
     def _sample(self) -> Sample:
         torques = (0.0,) * len(self._joints)
-        ball = (*self._position, *self._orientation, *self._velocity, 0.0, 0.0, 0.0)
-        return (*self._joints.tolist(), *self._velocities.tolist(), *torques, *ball)
+        moved = (*self._position, *self._orientation, *self._velocity, 0.0, 0.0, 0.0)
+        return (*self._joints.tolist(), *self._velocities.tolist(), *torques, *moved)
 
     def _compute_path(self, steps: Steps) -> Iterator[_Moment]:
-        """Compute the ball after each step."""
+        """Compute the object after each step."""
         moment = self._position, self._velocity, self._touching
         steps_left = len(steps.velocities)
         if self._touching == self._carried_by:
@@ -139,14 +146,14 @@ class BallisticEngine(Engine):
             yield moment
 
     def _carry(self, steps: Steps) -> Iterator[_Moment]:
-        """Compute the ball in its seat, up to the step in which the tool would have to pull it, or lets go of it."""
+        """Compute the object in its seat, up to the step in which the tool would have to pull it, or lets go of it."""
         place, turn = self._tool_path.along(steps.targets[1:])
         hz = self._physics.hz
         # Joints follow their commands without delay, so the path of the seat is known for all steps at once.
         path = np.vstack((self._position, (place + matmul(turn, self._seat))[:, :, 0]))
         velocities = np.vstack((self._velocity, np.diff(path, axis=0) * hz))
         push = np.diff(velocities, axis=0) * hz
-        # The tool has to give the ball the acceleration of its path, less that of gravity.
+        # The tool has to give the object the acceleration of its path, less that of gravity.
         push[:, 2] += self._physics.gravity_mps2
         # The components are added here and not by a matrix product, whose rounding depends on the processor.
         x, y, z = (push * matmul(turn, self._opening)[:, :, 0]).T
@@ -158,16 +165,16 @@ class BallisticEngine(Engine):
             yield tuple(position), tuple(velocity), self._carried_by
 
     def _fly(self, position: Vector, velocity: Vector, steps: Steps) -> _Moment:
-        """Compute the ball one step of free flight later, or on the ground if that stops it."""
+        """Compute the object one step of free flight later, or on the ground if that stops it."""
         dt = 1 / self._physics.hz
         (x, y, z), (vx, vy, vz) = position, velocity
-        braking = steps.drag_kgpm / self._physics.ball_mass_kg * math.sqrt(vx * vx + vy * vy + vz * vz)
+        braking = steps.drag_kgpm / self._scene.object.inertia.mass_kg * math.sqrt(vx * vx + vy * vy + vz * vz)
         # Bullet takes these operations in this order, and so does `tasks.free_flight`, with which flights are compared.
         vx -= braking * vx * dt
         vy -= braking * vy * dt
         vz -= (self._physics.gravity_mps2 + braking * vz) * dt
         x, y, z = x + vx * dt, y + vy * dt, z + vz * dt
-        radius = self._scene.ball_radius_m
+        radius = self._scene.object.link.shapes[0].size[0]
         if (self._scene.ground_is_solid or steps.ground_is_solid) and z < radius:
             return (x, y, radius), (0.0, 0.0, 0.0), _ON_GROUND
         return (x, y, z), (vx, vy, vz), _FREE

@@ -14,8 +14,8 @@ from throwcollect.engines.bullet.scenery import (
     Surface,
     connect,
     describe_links,
-    load_ball,
     load_bodies,
+    load_object,
     load_scenery,
     renew_moving,
     renew_pairs,
@@ -33,8 +33,8 @@ from throwcollect.engines.engine import (
     State,
     Steps,
     ToolLink,
-    ball_of,
     body_of,
+    object_in,
     split_bodies,
 )
 from throwcollect.engines.grip import carry, find_held
@@ -52,16 +52,16 @@ class BulletEngine(Engine):
 
     _scenery: Scenery
     _bodies: dict[int, SceneBody]
+    _object: SceneBody
+    _object_id: int
     _moving: list[int]
     _names: dict[Surface, str]
-    _ball: int
     _has_floor: bool
     _forces: list[float]
     _position_gains: list[float]
     _velocity_gains: list[float]
     _physics: Physics
     _tool: ToolLink
-    _radius: float
     _held: BodyState | None
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class BulletEngine(Engine):
         self._scene: Scene | None = None
         self._placed: Sample = ()
         self._touching: frozenset[str] = frozenset()
-        # The surfaces that pressed on the ball in the last step; None if there was no step since the last reset.
+        # The surfaces that pressed on the object in the last step; None if there was no step since the last reset.
         self._pressing: set[Surface] | None = None
 
     def close(self) -> None:
@@ -77,7 +77,7 @@ class BulletEngine(Engine):
         pybullet.disconnect(self._client)
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but the ball and the bodies differs, only these are made anew."""
+        """Make the world of a scene; if nothing but the object and the bodies differs, only these are made anew."""
         # Forget the scene until the world is loaded: if loading fails, the next call must not keep anything of it.
         kept, self._scene = self._scene, None
         if kept == scene:
@@ -87,15 +87,14 @@ class BulletEngine(Engine):
             self._scenery = load_scenery(self._client, scene)
         else:
             # All of them, so that they follow each other in the same order as in a new world.
-            for body in (*self._bodies, self._ball):
+            for body in (*self._bodies, self._object_id):
                 pybullet.removeBody(body, physicsClientId=self._client)
         self._bodies = load_bodies(self._client, scene.bodies)
         self._names = self._scenery.names | {(each, BASE): body.link.name for each, body in self._bodies.items()}
-        self._ball = load_ball(self._client, scene.ball_radius_m)
+        self._object_id = load_object(self._client, scene.object)
         self._moving = [number for number, body in self._bodies.items() if body.moves]
         self._placed = tuple(part for body in scene.moving_bodies for part in body.start)
-        self._tool, self._radius = scene.tool, scene.ball_radius_m
-        self._scene = scene
+        self._tool, self._object, self._scene = scene.tool, scene.object, scene
 
     def describe_robot(self) -> list[LoadedLink]:
         """Describe the robot's links as Bullet has them."""
@@ -103,39 +102,48 @@ class BulletEngine(Engine):
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
-        set_physics(self._client, self._scenery, self._ball, self._bodies, physics)
+        mass_kg, client = self._object.inertia.mass_kg, self._client
+        # Bullet computes the inertia of the object from its shape.
+        pybullet.changeDynamics(self._object_id, BASE, mass=mass_kg, physicsClientId=client)
+        set_physics(client, self._scenery, {self._object_id: self._object, **self._bodies}, physics)
         self._physics, self._forces = physics, list(physics.efforts)
         # Bullet divides the error of a position by the time step before it multiplies it by the gain.
         self._position_gains = [physics.position_gain_per_s / physics.hz] * len(physics.efforts)
         self._velocity_gains = [physics.velocity_gain] * len(physics.efforts)
 
-    def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints into positions and the ball into the tool, all at rest."""
+    def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
+        """Put joints, object and bodies at their start, all at rest."""
         client, scenery = self._client, self._scenery
         for joint, angle in zip(scenery.joints, joints, strict=True):
             pybullet.resetJointState(scenery.robot, joint, angle, physicsClientId=client)
-        tool = pybullet.getLinkState(scenery.robot, scenery.tool, computeForwardKinematics=True, physicsClientId=client)
-        # Fields 4 and 5 are the pose of the link's frame. Those before are of its centre of mass.
-        centre, _ = pybullet.multiplyTransforms(tool[4], tool[5], seat, _UPRIGHT)
-        still, turn, touching = (0.0,) * len(joints), _UPRIGHT, frozenset[str]()
-        if self._tool.seat is not None:
-            turn, touching = tool[5], frozenset({self._tool.name})
-        self.reset(State((*joints, *still, *still, *self._placed, *centre, *turn, *(0.0,) * 6), touching))
+        placed, touching = self._object.start, frozenset[str]()
+        if seat is not None:
+            tool = pybullet.getLinkState(
+                scenery.robot, scenery.tool, computeForwardKinematics=True, physicsClientId=client
+            )
+            # Fields 4 and 5 are the pose of the link's frame. Those before are of its centre of mass.
+            centre, _ = pybullet.multiplyTransforms(tool[4], tool[5], seat, _UPRIGHT)
+            turn = _UPRIGHT
+            if self._tool.seat is not None:
+                turn, touching = tool[5], frozenset({self._tool.name})
+            placed = (*centre, *turn, *(0.0,) * 6)
+        still = (0.0,) * len(joints)
+        self.reset(State((*joints, *still, *still, *self._placed, *placed), touching))
 
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state, and leave no trace of earlier ones in the world.
+        """Put robot, bodies and object into a state, and leave no trace of earlier ones in the world.
 
         Bullet's own snapshots do not achieve that: they keep pairs of shapes that once came close, and with them the
         order in which contacts are solved. `renew_pairs` forgets those.
         """
         client, joints = self._client, self._scenery.joints
         positions, velocities = state.sample[: len(joints)], state.sample[len(joints) :]
-        # Torques and ball follow the velocities in a sample, and `zip` stops before them.
+        # Torques and bodies follow the velocities in a sample, and `zip` stops before them.
         for joint, position, velocity in zip(joints, positions, velocities, strict=False):
             pybullet.resetJointState(self._scenery.robot, joint, position, velocity, physicsClientId=client)
-        renew_pairs(client, self._ball)
+        renew_pairs(client, self._object_id)
         self._has_floor = False
-        self._place(self._ball, ball_of(state.sample))
+        self._place(self._object_id, object_in(state.sample))
         for number, numbers in zip(self._moving, split_bodies(state.sample, len(joints)), strict=True):
             renew_moving(client, number)
             self._place(number, body_of(numbers))
@@ -144,7 +152,7 @@ class BulletEngine(Engine):
 
     @property
     def state(self) -> State:
-        """Robot and ball now; right after `reset` without torques, as Bullet has none before a step."""
+        """Robot, bodies and object now; right after `reset` without torques, as Bullet has none before a step."""
         if self._pressing is None:
             return State(self._sample(), self._touching)
         return State(self._sample(), self._name(self._pressing))
@@ -153,9 +161,9 @@ class BulletEngine(Engine):
         """Take steps until the observer stops them."""
         if steps.ground_is_solid != self._has_floor:
             self._has_floor = steps.ground_is_solid
-            renew_pairs(self._client, self._ball, floor=self._has_floor)
+            renew_pairs(self._client, self._object_id, floor=self._has_floor)
         # Local names, arguments by position and a single loop, because every operation here costs time in every step.
-        client, ball, robot, joints = self._client, self._ball, self._scenery.robot, self._scenery.joints
+        client, object_id, robot, joints = self._client, self._object_id, self._scenery.robot, self._scenery.joints
         forces, position_gains, velocity_gains = self._forces, self._position_gains, self._velocity_gains
         aim, mode = pybullet.setJointMotorControlArray, pybullet.POSITION_CONTROL
         take_step, points_on = pybullet.stepSimulation, pybullet.getContactPoints
@@ -178,7 +186,7 @@ class BulletEngine(Engine):
             take_step(client)
             number += 1
             # Bullet also lists points that are close without touching; those have no normal force (field 9).
-            points = points_on(ball, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
+            points = points_on(object_id, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
             pressing = {(point[2], point[4]) for point in points if point[9] > 0} if points else nothing
             if self._held is not None:
                 self._carry(self._held)
@@ -192,33 +200,37 @@ class BulletEngine(Engine):
                     break
         return number
 
-    def place_ball(self, ball: BodyState) -> None:
-        """Set pose and velocity of the ball."""
-        self._hold(None)
-        self._place(self._ball, ball)
+    def place(self, number: int, state: BodyState) -> None:
+        """Set pose and velocity of a body."""
+        if not number:
+            self._hold(None)
+        self._place((self._object_id, *self._moving)[number], state)
 
     def _place(self, number: int, body: BodyState) -> None:
         place, turn, client = body.position, body.orientation_xyzw, self._client
         pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
         pybullet.resetBaseVelocity(number, body.linear_velocity, body.angular_velocity, physicsClientId=client)
 
-    def _hold(self, ball: BodyState | None) -> None:
-        """Let the tool hold a ball, whose mass the arm bears, or none."""
-        self._held = ball
+    def _hold(self, held: BodyState | None) -> None:
+        """Let the tool hold the object, whose mass the arm bears, or none."""
+        self._held = held
         if self._scenery.held is not None:
-            mass_kg = self._physics.ball_mass_kg if ball else 0.0
-            sphere = {"mass": mass_kg, "localInertiaDiagonal": [0.4 * mass_kg * self._radius**2] * 3}
-            pybullet.changeDynamics(self._scenery.robot, self._scenery.held, physicsClientId=self._client, **sphere)
+            inertia, share = self._object.inertia, 1.0 if held else 0.0
+            load = {
+                "mass": share * inertia.mass_kg,
+                "localInertiaDiagonal": [share * moment for moment in inertia.diagonal],
+            }
+            pybullet.changeDynamics(self._scenery.robot, self._scenery.held, physicsClientId=self._client, **load)
 
-    def _carry(self, ball: BodyState) -> None:
-        """Move the held ball to where the tool is after a step."""
-        robot, held = self._scenery.robot, self._scenery.held
-        place = pybullet.getLinkState(robot, held, computeForwardKinematics=True, physicsClientId=self._client)
-        self._held = carry(ball, place[4], place[5], self._physics.hz)
-        self._place(self._ball, self._held)
+    def _carry(self, held: BodyState) -> None:
+        """Move the held object to where the tool is after a step."""
+        robot, link = self._scenery.robot, self._scenery.held
+        place = pybullet.getLinkState(robot, link, computeForwardKinematics=True, physicsClientId=self._client)
+        self._held = carry(held, place[4], place[5], self._physics.hz)
+        self._place(self._object_id, self._held)
 
     def _report_touch(self, step: int, observer: Observer) -> None:
-        """Tell the observer which bodies press on the ball now, unless only other surfaces of the same bodies do."""
+        """Tell the observer which bodies press on the object now, unless only other surfaces of the same bodies do."""
         touching = self._name(self._pressing or ())
         if touching != self._touching:
             self._touching = touching
@@ -233,17 +245,17 @@ class BulletEngine(Engine):
         # Each joint has four values here, so nothing has to be strict. Adding tuples is the fastest way to join them.
         positions, velocities, _, torques = zip(*joints)  # noqa: B905
         sample: Sample = positions + velocities + torques
-        for body in (*self._moving, self._ball):
+        for body in (*self._moving, self._object_id):
             place, turn = pybullet.getBasePositionAndOrientation(body, client)
             linear, angular = pybullet.getBaseVelocity(body, client)
             sample += place + turn + linear + angular
         return sample
 
     def _apply_drag(self, drag_kgpm: float) -> None:
-        position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
-        velocity, _ = pybullet.getBaseVelocity(self._ball, physicsClientId=self._client)
+        position, _ = pybullet.getBasePositionAndOrientation(self._object_id, physicsClientId=self._client)
+        velocity, _ = pybullet.getBaseVelocity(self._object_id, physicsClientId=self._client)
         factor = -drag_kgpm * math.hypot(*velocity)
         force = [factor * component for component in velocity]
         pybullet.applyExternalForce(
-            self._ball, BASE, force, position, pybullet.WORLD_FRAME, physicsClientId=self._client
+            self._object_id, BASE, force, position, pybullet.WORLD_FRAME, physicsClientId=self._client
         )

@@ -1,4 +1,4 @@
-"""Pictures of robot, ball and bodies by Bullet's software renderer: no screen, no GPU, and nothing is simulated."""
+"""Pictures of robot and bodies by Bullet's software renderer: no screen, no GPU, and nothing is simulated."""
 
 from __future__ import annotations
 
@@ -19,17 +19,14 @@ from throwcollect.errors import ConfigError
 Rgba = tuple[float, float, float, float]
 
 _BACKGROUND = -1
-_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class Renderer:
-    """A robot, a ball and bodies in poses that a camera sees; a context manager.
+    """A robot and bodies in poses that a camera sees; a context manager.
 
     Args:
         urdf: URDF text of the robot; paths of meshes are absolute.
         base_height_m: Height of its base above the ground [m].
-        ball_radius_m: Radius of the ball [m].
-        ball_rgba: Its colour.
         bodies: Bodies that stand in the world, each with its colour.
 
     Raises:
@@ -41,8 +38,6 @@ class Renderer:
         self,
         urdf: str,
         base_height_m: float,
-        ball_radius_m: float,
-        ball_rgba: Rgba,
         bodies: Sequence[tuple[SceneBody, Rgba]] = (),
     ) -> None:
         heavy = _add_masses(urdf)
@@ -59,14 +54,10 @@ class Renderer:
             for number in links(self._client, self._robot)
             if number != BASE
         }
-        sphere = pybullet.createVisualShape(
-            pybullet.GEOM_SPHERE, radius=ball_radius_m, rgbaColor=ball_rgba, physicsClientId=self._client
-        )
         loaded = load_bodies(self._client, [body for body, _ in bodies])
         for number, (_, rgba) in zip(loaded, bodies, strict=True):
             pybullet.changeVisualShape(number, BASE, rgbaColor=rgba, physicsClientId=self._client)
         self._moving = [number for number, body in loaded.items() if body.moves]
-        self._ball = pybullet.createMultiBody(0, baseVisualShapeIndex=sphere, physicsClientId=self._client)
 
     def __enter__(self) -> Renderer:
         return self
@@ -74,15 +65,15 @@ class Renderer:
     def __exit__(self, *_: object) -> None:
         pybullet.disconnect(self._client)
 
-    def place(self, joints: Mapping[str, float], ball: Vector, bodies: Sequence[BodyState] = ()) -> None:
-        """Put joints at angles [rad], and the centre of the ball at a place in world [m]; other joints stay at 0.
+    def place(self, joints: Mapping[str, float], bodies: Sequence[BodyState]) -> None:
+        """Put joints at angles [rad], and bodies that move into their poses, in the order in which they were given.
 
-        Bodies that move are put into their poses, in the order in which they were given.
+        Other joints stay at 0.
         """
         for name, angle in joints.items():
             pybullet.resetJointState(self._robot, self._joints[name], angle, physicsClientId=self._client)
-        poses = [(ball, _UPRIGHT), *((body.position, body.orientation_xyzw) for body in bodies)]
-        for number, pose in zip((self._ball, *self._moving), poses, strict=True):
+        for number, body in zip(self._moving, bodies, strict=True):
+            pose = body.position, body.orientation_xyzw
             pybullet.resetBasePositionAndOrientation(number, *pose, physicsClientId=self._client)
 
     def find_frames(self) -> list[Vector]:
@@ -105,7 +96,7 @@ class Renderer:
             light: Direction from which the light comes.
 
         Returns:
-            Red, green, blue, and 255 for robot, ball and bodies, 0 for the background; shape ``(height, width, 4)``.
+            Red, green, blue, and 255 for robot and bodies, 0 for the background; shape ``(height, width, 4)``.
         """
         _, _, colors, _, objects = pybullet.getCameraImage(
             width,

@@ -1,7 +1,7 @@
-"""Sets up a Bullet world: ground, robot with its tool, ball, and bodies of the scene.
+"""Sets up a Bullet world: ground, robot with its tool, the object, and bodies of the scene.
 
-Only the ball and bodies that move collide with other things. Shapes of a robot may overlap each other at rest, and with
-these few pairs the order in which Bullet solves contacts does not depend on earlier trials.
+Only the object and bodies that move collide with other things. Shapes of a robot may overlap each other at rest, and
+with these few pairs the order in which Bullet solves contacts does not depend on earlier trials.
 """
 
 from __future__ import annotations
@@ -29,9 +29,14 @@ UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 BASE = -1
 """Link number of the first link of a body."""
 
-_GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _MOVING_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
+_GROUND_GROUP, _ROBOT_GROUP, _OBJECT_GROUP, _MOVING_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
 """Bullet lets a pair collide if the mask of either one has the group of the other; the floor is a ground that is not
 solid."""
+
+
+_KINDS = {"box": pybullet.GEOM_BOX, "cylinder": pybullet.GEOM_CYLINDER, "sphere": pybullet.GEOM_SPHERE}
+_SIZES = {"box": (), "cylinder": ("radius", "height"), "sphere": ("radius",)}
+"""Types of the shapes that an object has, and names of their sizes; a box has half of its edges."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +47,8 @@ class Scenery:
         robot: Body number of the robot.
         joints: Joint numbers of the moving joints, in the order of the scene.
         tool: Link number of the tool.
-        held: Link number of the link that has the mass of a ball that the tool holds; None if it cannot hold any.
-        names: Name of each surface that can press on the ball: the ground, the tool or a link of the robot.
+        held: Link number of the link that has the mass of an object that the tool holds; None if it cannot hold any.
+        names: Name of each surface that can press on the object: the ground, the tool or a link of the robot.
     """
 
     robot: int
@@ -79,9 +84,9 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     tool = next(link for (_, link), name in names.items() if name == scene.tool.link)
     names[robot, tool] = scene.tool.name
     for body, link in names:
-        group, mask = _ROBOT_GROUP, _BALL_GROUP
+        group, mask = _ROBOT_GROUP, _OBJECT_GROUP
         if body == ground:
-            group, mask = (_GROUND_GROUP, _BALL_GROUP) if scene.ground_is_solid else (_FLOOR_GROUP, 0)
+            group, mask = (_GROUND_GROUP, _OBJECT_GROUP) if scene.ground_is_solid else (_FLOOR_GROUP, 0)
         pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
     held = joints.get(HELD_LINK)
     return Scenery(robot, [joints[joint] for joint in scene.moving], tool, held, names)
@@ -168,32 +173,37 @@ def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody
         model = BodyModel(link.name, (link,))
         number = _load_model(client, model, at.position, at.orientation_xyzw, moves=body.moves)
         if not body.moves:
-            pybullet.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _BALL_GROUP, physicsClientId=client)
+            pybullet.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _OBJECT_GROUP, physicsClientId=client)
         numbers[number] = body
     return numbers
 
 
 def renew_moving(client: int, body: int) -> None:
     """Let a body that moves collide with everything; Bullet then forgets all contacts that it had."""
-    everything = _GROUND_GROUP | _ROBOT_GROUP | _BALL_GROUP | _MOVING_GROUP | _FLOOR_GROUP
+    everything = _GROUND_GROUP | _ROBOT_GROUP | _OBJECT_GROUP | _MOVING_GROUP | _FLOOR_GROUP
     pybullet.setCollisionFilterGroupMask(body, BASE, _MOVING_GROUP, everything, physicsClientId=client)
 
 
-def load_ball(client: int, radius: float) -> int:
-    """Put a ball into the world, far above everything else, and return its body number.
+def load_object(client: int, body: SceneBody) -> int:
+    """Put the object into the world, far above everything else, and return its body number.
 
-    Its radius [m] cannot be changed later.
+    Its sizes cannot be changed later.
     """
-    sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
-    ball = int(pybullet.createMultiBody(1, sphere, basePosition=[0, 0, 100], physicsClientId=client))
-    renew_pairs(client, ball)
-    return ball
+    (shape,) = body.link.shapes
+    names = _SIZES[shape.kind]
+    size = (
+        {"halfExtents": [edge / 2 for edge in shape.size]} if not names else dict(zip(names, shape.size, strict=True))
+    )
+    number = pybullet.createCollisionShape(_KINDS[shape.kind], physicsClientId=client, **size)
+    object_id = int(pybullet.createMultiBody(1, number, basePosition=[0, 0, 100], physicsClientId=client))
+    renew_pairs(client, object_id)
+    return object_id
 
 
-def renew_pairs(client: int, ball: int, *, floor: bool = False) -> None:
-    """Let the ball collide with everything, or also with a floor; Bullet then forgets all contacts that it had."""
+def renew_pairs(client: int, object_id: int, *, floor: bool = False) -> None:
+    """Let the object collide with everything, or also with a floor; Bullet then forgets all contacts that it had."""
     mask = _GROUND_GROUP | _ROBOT_GROUP | (_FLOOR_GROUP if floor else 0)
-    pybullet.setCollisionFilterGroupMask(ball, BASE, _BALL_GROUP, mask, physicsClientId=client)
+    pybullet.setCollisionFilterGroupMask(object_id, BASE, _OBJECT_GROUP, mask, physicsClientId=client)
 
 
 def links(client: int, body: int) -> range:
@@ -201,8 +211,8 @@ def links(client: int, body: int) -> range:
     return range(BASE, pybullet.getNumJoints(body, physicsClientId=client))
 
 
-def set_physics(client: int, scenery: Scenery, ball: int, bodies: Mapping[int, SceneBody], physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
+def set_physics(client: int, scenery: Scenery, bodies: Mapping[int, SceneBody], physics: Physics) -> None:
+    """Set time step, solver, gravity and surfaces, also of bodies by their numbers, so that no earlier ones stay."""
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,
@@ -215,19 +225,8 @@ def set_physics(client: int, scenery: Scenery, ball: int, bodies: Mapping[int, S
     pybullet.setGravity(0, 0, -physics.gravity_mps2, physicsClientId=client)
     # Bullet's default damping of 0.04/s has no physical cause and would shorten a throw by 6 cm.
     undamped = {"linearDamping": 0, "angularDamping": 0}
-    pybullet.changeDynamics(
-        ball,
-        BASE,
-        mass=physics.ball_mass_kg,
-        lateralFriction=physics.ball_friction,
-        restitution=physics.ball_restitution,
-        rollingFriction=physics.ball_rolling_friction_m,
-        spinningFriction=physics.ball_rolling_friction_m,
-        physicsClientId=client,
-        **undamped,
-    )
     for body, link in scenery.names:
-        # Bullet multiplies restitutions: with 1 here, only the restitution of the ball counts.
+        # Bullet multiplies restitutions: with 1 here, only the restitution of the object counts.
         pybullet.changeDynamics(
             body,
             link,
@@ -242,6 +241,8 @@ def set_physics(client: int, scenery: Scenery, ball: int, bodies: Mapping[int, S
             BASE,
             lateralFriction=each.friction,
             restitution=each.restitution,
+            rollingFriction=each.rolling_friction_m,
+            spinningFriction=each.rolling_friction_m,
             physicsClientId=client,
             **undamped,
         )

@@ -24,8 +24,8 @@ from throwcollect.engines.engine import (
     Scene,
     State,
     Steps,
-    ball_of,
     body_of,
+    object_in,
     split_bodies,
 )
 from throwcollect.engines.grip import HELD_LINK, carry, find_held
@@ -34,10 +34,10 @@ from throwcollect.engines.mujoco.scenery import (
     Surface,
     describe_links,
     find_bounces,
-    let_ball_hit_floor,
+    let_object_hit_floor,
     make_spec,
     place_bodies,
-    resize_ball,
+    resize_object,
     set_physics,
     weigh_held,
 )
@@ -45,7 +45,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 
 _ORIENTATION, _SPIN = slice(-10, -6), -3
-"""Places of the ball's orientation and angular velocity in a sample."""
+"""Places of the object's orientation and angular velocity in a sample."""
 
 _PRESS = 3
 """Each contact sensor has three numbers, of which the first is the normal force."""
@@ -75,9 +75,9 @@ class MujocoEngine(Engine):
             del self._model, self._data
 
     def load(self, scene: Scene) -> None:
-        """Make the world of a scene; if nothing but numbers of the ball and the bodies differs, only these change."""
+        """Make the world of a scene; if nothing but numbers of the object and the bodies differs, only these change."""
         if self._is_loaded and scene.has_robot_of(self._scene) and _list_kinds(scene) == _list_kinds(self._scene):
-            resize_ball(self._model, scene.ball_radius_m)
+            resize_object(self._model, scene.object)
             place_bodies(self._model, scene.bodies)
             self._scene = scene
             return
@@ -105,33 +105,37 @@ class MujocoEngine(Engine):
         """Set all numbers of the physics."""
         self._physics = physics
         set_physics(self._model, self._scene, physics)
-        self._rows = ROLLING_ROWS if physics.ball_rolling_friction_m else SLIDING_ROWS
-        self._bounces = find_bounces(self._model, self._scene.bodies, physics.ball_restitution)
+        self._rows = ROLLING_ROWS if self._scene.object.rolling_friction_m else SLIDING_ROWS
+        self._bounces = find_bounces(self._model, self._scene)
         moving, first = len(self._scene.moving_bodies), 3 * len(self._places)
         self._pick = _make_sample_picker(self._model, self._places, moving)
         self._ends_of_bodies = [first + BODY_NUMBERS * number for number in range(1, moving + 1)]
 
-    def rest(self, joints: Sequence[float], seat: Vector) -> None:
-        """Put the joints into positions and the ball into the tool, all at rest."""
+    def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
+        """Put joints, object and bodies at their start, all at rest."""
         model, data = self._model, self._data
-        data.qpos[: len(joints)] = np.array(joints)[self._columns]
-        mujoco.mj_kinematics(model, data)
-        tool = data.body(self._scene.tool.link)
-        centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
-        still, turn, touching = (0.0,) * len(joints), (0.0, 0.0, 0.0, 1.0), frozenset[str]()
-        if self._scene.tool.seat is not None:
-            turn, touching = _to_xyzw(tool.xquat), frozenset({self._scene.tool.name})
-        placed = [part for body in self._scene.moving_bodies for part in body.start]
-        self.reset(State((*joints, *still, *still, *placed, *centre, *turn, *(0.0,) * 6), touching))
+        placed, touching = self._scene.object.start, frozenset[str]()
+        if seat is not None:
+            data.qpos[: len(joints)] = np.array(joints)[self._columns]
+            mujoco.mj_kinematics(model, data)
+            tool = data.body(self._scene.tool.link)
+            centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
+            turn: Quaternion = (0.0, 0.0, 0.0, 1.0)
+            if self._scene.tool.seat is not None:
+                turn, touching = _to_xyzw(tool.xquat), frozenset({self._scene.tool.name})
+            placed = (*centre, *turn, *(0.0,) * 6)
+        still = (0.0,) * len(joints)
+        bodies = [part for body in self._scene.moving_bodies for part in body.start]
+        self.reset(State((*joints, *still, *still, *bodies, *placed), touching))
 
     def reset(self, state: State) -> None:
-        """Put robot and ball into a state, and leave no trace of earlier ones in the world."""
+        """Put robot, bodies and object into a state, and leave no trace of earlier ones in the world."""
         count, data = len(self._columns), self._data
-        let_ball_hit_floor(self._model, floor=False)
+        let_object_hit_floor(self._model, floor=False)
         mujoco.mj_resetData(self._model, data)
         positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
         data.qpos[:count], data.qvel[:count] = positions[self._columns], velocities[self._columns]
-        self.place_ball(ball_of(state.sample))
+        self.place(0, object_in(state.sample))
         for number, numbers in enumerate(split_bodies(state.sample, count), start=1):
             self._place(number, body_of(numbers))
         self._touching = state.touching
@@ -140,7 +144,7 @@ class MujocoEngine(Engine):
 
     @property
     def state(self) -> State:
-        """Robot and ball now; right after `reset` without torques, as there are none before a step."""
+        """Robot, bodies and object now; right after `reset` without torques, as there are none before a step."""
         return State(self._sample(), self._touching)
 
     def run(self, steps: Steps, observer: Observer) -> int:
@@ -150,7 +154,7 @@ class MujocoEngine(Engine):
         present state give the torque for that, with the contact forces of the step before and within the efforts. So
         the solver finds contacts for the motion that the tool really has.
         """
-        let_ball_hit_floor(self._model, floor=steps.ground_is_solid)
+        let_object_hit_floor(self._model, floor=steps.ground_is_solid)
         # Local names, arithmetic in place and a single loop, because every operation here costs time in every step.
         model, data, physics = self._model, self._data, self._physics
         count, hz = len(self._columns), float(physics.hz)
@@ -168,7 +172,7 @@ class MujocoEngine(Engine):
         multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
         begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
-        restitution, bounces, rows = physics.ball_restitution, self._bounces, self._rows
+        restitution, bounces, rows = self._scene.object.restitution, self._bounces, self._rows
         # This equals no state of the surfaces, so the first step compares what presses with what pressed before.
         last_presses, number = b"", 0
         for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
@@ -205,30 +209,31 @@ class MujocoEngine(Engine):
         data.qfrc_applied[count : count + 3] = 0.0
         return number
 
-    def place_ball(self, ball: BodyState) -> None:
-        """Set pose and velocity of the ball."""
-        self._hold(None)
-        self._place(0, ball)
+    def place(self, number: int, state: BodyState) -> None:
+        """Set pose and velocity of a body."""
+        if not number:
+            self._hold(None)
+        self._place(number, state)
 
     def _place(self, number: int, body: BodyState) -> None:
-        """Set pose and velocity of the ball, number 0, or of a body of the scene that moves, by its number from 1."""
+        """Set pose and velocity of the object, number 0, or of a body of the scene that moves, by its number from 1."""
         at, by = len(self._columns) + 7 * number, len(self._columns) + 6 * number
         x, y, z, w = body.orientation_xyzw
         self._data.qpos[at : at + 7] = (*body.position, w, x, y, z)
         spin = _turn_back(body.orientation_xyzw, body.angular_velocity)
         self._data.qvel[by : by + 6] = (*body.linear_velocity, *spin)
 
-    def _hold(self, ball: BodyState | None) -> None:
-        """Let the tool hold a ball, whose mass the arm bears, or none."""
-        self._held = ball
+    def _hold(self, held: BodyState | None) -> None:
+        """Let the tool hold the object, whose mass the arm bears, or none."""
+        self._held = held
         if self._seat is not None:
-            weigh_held(self._model, is_held=ball is not None)
+            weigh_held(self._model, is_held=held is not None)
 
-    def _carry(self, ball: BodyState, presses: bytes) -> bytes:
-        """Move the held ball to where the tool is after a step, and return which surfaces press on it."""
+    def _carry(self, held: BodyState, presses: bytes) -> bytes:
+        """Move the held object to where the tool is after a step, and return which surfaces press on it."""
         mujoco.mj_kinematics(self._model, self._data)
         (x, y, z), turn = self._data.xpos[self._seat].tolist(), _to_xyzw(self._data.xquat[self._seat])
-        self._held = carry(ball, (x, y, z), turn, self._physics.hz)
+        self._held = carry(held, (x, y, z), turn, self._physics.hz)
         self._place(0, self._held)
         return bytes(map(or_, presses, self._grip))
 
@@ -238,12 +243,12 @@ class MujocoEngine(Engine):
         mujoco.mj_step1(model, data)
         data.qfrc_applied[:count] = data.qfrc_bias[:count]
         if data.ncon:
-            aim_contacts(data, self._physics.hz, self._physics.ball_restitution, self._bounces, self._rows)
+            aim_contacts(data, self._physics.hz, self._scene.object.restitution, self._bounces, self._rows)
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
 
     def _report_touch(self, step: int, presses: bytes, observer: Observer) -> None:
-        """Tell the observer which bodies press on the ball now, if others did before.
+        """Tell the observer which bodies press on the object now, if others did before.
 
         `presses` has one byte for each surface, 1 if it presses.
         """
@@ -267,15 +272,16 @@ class MujocoEngine(Engine):
 
 
 def _list_kinds(scene: Scene) -> list[tuple[str, bool, list[str]]]:
-    """List the names of the bodies and the kinds of their shapes, which a compiled model cannot change."""
-    return [(body.link.name, body.moves, [shape.kind for shape in body.link.shapes]) for body in scene.bodies]
+    """List the names of object and bodies and the kinds of their shapes, which a compiled model cannot change."""
+    bodies = (scene.object, *scene.bodies)
+    return [(body.link.name, body.moves, [shape.kind for shape in body.link.shapes]) for body in bodies]
 
 
 def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int], bodies: int) -> Callable[[list[float]], Sample]:
     """Make a function that picks a sample from all positions, velocities and forces.
 
     The function leaves angular velocities in the frames of their bodies. `order` is the place of each moving joint
-    among the joints of the model, behind which are those of the ball and of some moving bodies.
+    among the joints of the model, behind which are those of the object and of some moving bodies.
     """
     velocities, forces = model.nq, model.nq + model.nv
     places = [first + place for first in (0, velocities, forces) for place in order]

@@ -1,11 +1,10 @@
-"""Sets up a MuJoCo world: ground, robot with its tool, ball, and bodies of the scene.
+"""Sets up a MuJoCo world: ground, robot with its tool, the object, and bodies of the scene.
 
-As in Bullet, only the ball and bodies that move collide with other things.
+As in Bullet, only the object and bodies that move collide with other things.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import INERTIA, BodyModel, LinkShape, Vector, turn_of
+from throwcollect.engines.body import BodyModel, LinkShape, Vector, turn_of
 from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
 from throwcollect.engines.grip import HELD_LINK, add_held_link
 from throwcollect.engines.mujoco.contact_targets import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
@@ -27,21 +26,19 @@ _KINDS = {
 }
 """Types of the shapes that bodies of a scene have."""
 
-_DIAGONAL = [number for number, (row, column) in enumerate(INERTIA.values()) if row == column]
-
-BALL = "ball"
-"""Name of the ball's body and shape."""
+OBJECT = "object"
+"""Name of the object's body and shape in the model."""
 
 _GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT = 1, 2, 4
 """Bits of ``contype`` and ``conaffinity``: a pair collides if the one's type is among those that the other collides
 with."""
 
-_BALL_HITS = _GROUND_BIT | _ROBOT_BIT
+_OBJECT_HITS = _GROUND_BIT | _ROBOT_BIT
 _REACH_M = 0.02
-"""MuJoCo makes a contact of shapes at this distance, so that a fast ball does not get inside of a shape in one step."""
+"""MuJoCo makes a contact of shapes at this distance, so that nothing fast gets inside of a shape in one step."""
 
-_BALL_PRIORITY = 1
-"""The highest priority: friction and restitution of a contact are those of the ball, whatever it touches."""
+_OBJECT_PRIORITY = 1
+"""The highest priority: friction and restitution of a contact are those of the object, whatever it touches."""
 
 # Without these options MuJoCo cuts the directories off the names of meshes, and merges links that are fixed to their
 # parents.
@@ -54,11 +51,11 @@ _WORLD_LINK, _STAND_IN = "world", "world of the robot"
 
 @dataclass(frozen=True)
 class Surface:
-    """A body that can press on the ball.
+    """A body that can press on the object.
 
     Attributes:
         body: Name of the body in the model; all its shapes count.
-        name: Its name in contacts of the ball.
+        name: Its name in contacts of the object.
     """
 
     body: str
@@ -78,10 +75,10 @@ def _read_robot(model: BodyModel) -> mujoco.MjSpec:
 
 
 def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
-    """Put ground, robot and ball together.
+    """Put ground, robot, object and bodies together.
 
     Returns:
-        The world, and its surfaces that can press on the ball.
+        The world, and its surfaces that can press on the object.
     """
     try:
         robot = add_held_link(scene.robot, scene.tool).rename_links({_WORLD_LINK: _STAND_IN})
@@ -103,7 +100,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         contype=_GROUND_BIT if scene.ground_is_solid else _FLOOR_BIT,
         conaffinity=0,
     )
-    _add_ball(spec, scene.ball_radius_m)
+    _add_object(spec, scene.object)
     if scene.moving_bodies:
         for number, geom in enumerate(spec.geoms):
             geom.name = geom.name or f"robot/{number}"
@@ -123,29 +120,30 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     return spec, surfaces
 
 
-def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
-    """Put a ball into the world; `set_physics` sets its mass and its surface."""
-    ball = spec.worldbody.add_body(name=BALL)
-    ball.add_freejoint(name=BALL)
-    ball.add_geom(
-        name=BALL,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=(radius, 0.0, 0.0),
+def _add_object(spec: mujoco.MjSpec, body: SceneBody) -> None:
+    """Put the object into the world; `set_physics` sets its mass and its surface."""
+    added = spec.worldbody.add_body(name=OBJECT)
+    added.add_freejoint(name=OBJECT)
+    (shape,) = body.link.shapes
+    added.add_geom(
+        name=OBJECT,
+        type=_KINDS[shape.kind],
+        size=_size(shape)[0],
         mass=1.0,
         contype=0,
-        conaffinity=_BALL_HITS,
-        priority=_BALL_PRIORITY,
+        conaffinity=_OBJECT_HITS,
+        priority=_OBJECT_PRIORITY,
     )
 
 
 def _add_body(spec: mujoco.MjSpec, body: SceneBody) -> None:
     """Put a body into the world; `place_bodies` sets its pose, its sizes and its mass.
 
-    Pairs of shapes that collide are named one by one, as they have numbers of their own: the ball with every body, and
-    a body that moves with everything that is in the world already.
+    Pairs of shapes that collide are named one by one, as they have numbers of their own: the object with every body,
+    and a body that moves with everything that is in the world already.
     """
     name = _name_body(body)
-    others = [geom.name for geom in spec.geoms] if body.moves else [BALL]
+    others = [geom.name for geom in spec.geoms] if body.moves else [OBJECT]
     added = spec.worldbody.add_body(name=name)
     if body.moves:
         added.add_freejoint(name=name)
@@ -169,13 +167,17 @@ def place_bodies(model: mujoco.MjModel, bodies: Sequence[SceneBody]) -> None:
         model.body_pos[body], model.body_quat[body] = each.placement.xyz, (w, x, y, z)
         if (inertia := each.link.inertia) is not None:
             model.body_mass[body] = inertia.mass_kg
-            model.body_inertia[body] = [inertia.moments_kgm2[number] for number in _DIAGONAL]
+            model.body_inertia[body] = inertia.diagonal
         for number, shape in enumerate(each.link.shapes):
             geom = model.geom(f"{_name_body(each)}/{number}").id
-            size, half = _size(shape)
-            model.geom_size[geom] = size
-            model.geom_aabb[geom, 3:] = half
-            model.geom_rbound[geom] = math.hypot(*half) if shape.kind != "sphere" else half[0]
+            _resize(model, geom, shape)
+
+
+def _resize(model: mujoco.MjModel, geom: int, shape: LinkShape) -> None:
+    size, half = _size(shape)
+    model.geom_size[geom] = size
+    model.geom_aabb[geom, 3:] = half
+    model.geom_rbound[geom] = shape.radius_m
 
 
 def _size(shape: LinkShape) -> tuple[Vector, Vector]:
@@ -191,41 +193,41 @@ def _size(shape: LinkShape) -> tuple[Vector, Vector]:
 
 
 def _watch(spec: mujoco.MjSpec, surface: Surface) -> None:
-    """Add a sensor of the force with which a surface presses on the ball; its first number is the normal force."""
+    """Add a sensor of the force with which a surface presses on the object; its first number is the normal force."""
     # The sensor reports the force of one contact: of all between the two bodies, the strongest.
     force, strongest, one = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 2, 1
     spec.add_sensor(
         type=mujoco.mjtSensor.mjSENS_CONTACT,
         objtype=mujoco.mjtObj.mjOBJ_GEOM,
-        objname=BALL,
+        objname=OBJECT,
         reftype=mujoco.mjtObj.mjOBJ_BODY,
         refname=surface.body,
         intprm=(force, strongest, one),
     )
 
 
-def resize_ball(model: mujoco.MjModel, radius: float) -> None:
-    """Give the ball another radius, as if the model had been compiled with it."""
-    geom, body = model.geom(BALL).id, model.body(BALL).id
-    model.geom_size[geom, 0] = model.geom_rbound[geom] = radius
-    model.geom_aabb[geom, 3:] = radius
-    model.bvh_aabb[model.body_bvhadr[body], 3:] = radius
-    first = model.body_dofadr[body]
-    model.dof_length[first + 3 : first + 6] = radius
+def resize_object(model: mujoco.MjModel, body: SceneBody) -> None:
+    """Give the object other sizes, as if the model had been compiled with them."""
+    geom, number = model.geom(OBJECT).id, model.body(OBJECT).id
+    (shape,) = body.link.shapes
+    _resize(model, geom, shape)
+    model.bvh_aabb[model.body_bvhadr[number], 3:] = model.geom_aabb[geom, 3:]
+    first = model.body_dofadr[number]
+    model.dof_length[first + 3 : first + 6] = model.geom_rbound[geom]
 
 
 def weigh_held(model: mujoco.MjModel, *, is_held: bool) -> None:
-    """Give the link of the held ball the mass and the inertia of the ball, or none."""
-    link, ball = model.body(HELD_LINK).id, model.body(BALL).id
-    model.body_mass[link] = model.body_mass[ball] * is_held
-    model.body_inertia[link] = model.body_inertia[ball] * is_held
+    """Give the link of the held object the mass and the inertia of the object, or none."""
+    link, held = model.body(HELD_LINK).id, model.body(OBJECT).id
+    model.body_mass[link] = model.body_mass[held] * is_held
+    model.body_inertia[link] = model.body_inertia[held] * is_held
 
 
-def let_ball_hit_floor(model: mujoco.MjModel, *, floor: bool) -> None:
-    """Let the ball collide with a ground that is not solid, too, or not."""
-    hits = _BALL_HITS | (_FLOOR_BIT if floor else 0)
+def let_object_hit_floor(model: mujoco.MjModel, *, floor: bool) -> None:
+    """Let the object collide with a ground that is not solid, too, or not."""
+    hits = _OBJECT_HITS | (_FLOOR_BIT if floor else 0)
     # MuJoCo looks at the bits of bodies before those of their shapes.
-    model.geom_conaffinity[model.geom(BALL).id] = model.body_conaffinity[model.body(BALL).id] = hits
+    model.geom_conaffinity[model.geom(OBJECT).id] = model.body_conaffinity[model.body(OBJECT).id] = hits
 
 
 def set_physics(model: mujoco.MjModel, scene: Scene, physics: Physics) -> None:
@@ -233,34 +235,31 @@ def set_physics(model: mujoco.MjModel, scene: Scene, physics: Physics) -> None:
     model.opt.timestep = 1 / physics.hz
     model.opt.iterations = physics.solver_iterations
     model.opt.gravity[:] = (0.0, 0.0, -physics.gravity_mps2)
-    ball, sphere = model.body(BALL).id, model.geom(BALL).id
-    model.body_mass[ball] = physics.ball_mass_kg
-    # This is the inertia of a solid sphere.
-    model.body_inertia[ball] = 0.4 * physics.ball_mass_kg * model.geom_size[sphere, 0] ** 2
-    # Frictions are multiplied, as in Bullet. Only the ball resists rolling and spinning.
+    body, geom, thing = model.body(OBJECT).id, model.geom(OBJECT).id, scene.object
+    model.body_mass[body], model.body_inertia[body] = thing.inertia.mass_kg, thing.inertia.diagonal
+    # Frictions are multiplied, as in Bullet. Only the object and bodies that move resist rolling and spinning.
     model.geom_friction[:] = (physics.surface_friction**2, 0.0, 0.0)
-    rolling = physics.ball_rolling_friction_m
-    model.geom_friction[sphere] = (
-        physics.ball_friction * physics.surface_friction,
+    rolling = thing.rolling_friction_m
+    model.geom_friction[geom] = (
+        thing.friction * physics.surface_friction,
         *[rolling * physics.surface_friction] * 2,
     )
-    # Contacts of the ball that resist rolling have rows for it.
-    model.geom_condim[sphere] = ROLLING_ROWS if rolling else SLIDING_ROWS
-    model.geom_margin[sphere] = _REACH_M
+    # Contacts that resist rolling have rows for it.
+    model.geom_condim[geom] = ROLLING_ROWS if rolling else SLIDING_ROWS
+    model.geom_margin[geom] = _REACH_M
     # Friction stops sliding within one step if it can. `aim_contacts` replaces the targets along the normals.
     model.geom_solref[:] = (2 / physics.hz, 1.0)
     model.geom_solimp[:, :2] = HARDNESS
     # A pair of shapes that is named in the model has numbers of its own.
     model.pair_solref[:], model.pair_solimp[:, :2] = (2 / physics.hz, 1.0), HARDNESS
-    frictions = dict.fromkeys(range(model.ngeom), physics.surface_friction)
-    frictions |= {geom: each.friction for each in scene.bodies for geom in _list_geoms(model, each)}
+    surfaces = dict.fromkeys(range(model.ngeom), (physics.surface_friction, 0.0)) | {geom: (thing.friction, rolling)}
+    for each in scene.bodies:
+        surfaces |= dict.fromkeys(_list_geoms(model, each), (each.friction, each.rolling_friction_m))
     for pair, (one, other) in enumerate(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)):
-        if sphere in (one, other):
-            friction = frictions[one if other == sphere else other]
-            model.pair_friction[pair] = (*[physics.ball_friction * friction] * 2, *[rolling * friction] * 3)
-            model.pair_dim[pair] = model.geom_condim[sphere]
-        else:
-            model.pair_friction[pair, :2] = frictions[one] * frictions[other]
+        (friction, rolls), (other_friction, other_rolls) = surfaces[one], surfaces[other]
+        resists = rolls * other_friction + other_rolls * friction
+        model.pair_friction[pair] = (*[friction * other_friction] * 2, *[resists] * 3)
+        model.pair_dim[pair] = ROLLING_ROWS if rolls or other_rolls else SLIDING_ROWS
     if scene.tool.seat is not None:
         weigh_held(model, is_held=True)
     # Recompute the numbers that the solver derives from masses, such as those by which it scales contacts.
@@ -317,7 +316,7 @@ def _list_geoms(model: mujoco.MjModel, body: SceneBody) -> list[int]:
     return [model.geom(f"{_name_body(body)}/{number}").id for number in range(len(body.link.shapes))]
 
 
-def find_bounces(model: mujoco.MjModel, bodies: Sequence[SceneBody], ball_restitution: float) -> dict[int, float]:
+def find_bounces(model: mujoco.MjModel, scene: Scene) -> dict[int, float]:
     """Map shapes to their restitution, by number; it is 1 for all others. The map is empty without bodies."""
-    found = {geom: each.restitution for each in bodies for geom in _list_geoms(model, each)}
-    return {**found, model.geom(BALL).id: ball_restitution} if found else {}
+    found = {geom: each.restitution for each in scene.bodies for geom in _list_geoms(model, each)}
+    return {**found, model.geom(OBJECT).id: scene.object.restitution} if found else {}

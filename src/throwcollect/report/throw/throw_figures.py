@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from throwcollect.dataset.motion import Joint
-from throwcollect.dataset.throw import BallEvent, Throw
+from throwcollect.dataset.throw import BodyEvent, Throw
 from throwcollect.report.figures import (
     BLUE,
     LEGEND_ABOVE,
@@ -218,7 +218,7 @@ def _draw_paths(throws: Sequence[Throw], outcomes: Outcomes, axis: int) -> go.Fi
 
 
 def draw_joint(
-    joint: Joint, commanded: NDArray[np.float64], release: BallEvent | None, scale: tuple[float, str]
+    joint: Joint, commanded: NDArray[np.float64], release: BodyEvent | None, scale: tuple[float, str]
 ) -> go.Figure:
     """Draw commanded and measured position of one joint; the scale is a factor on these and the unit it leads to."""
     factor, unit = scale

@@ -47,7 +47,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     coverage = count_throws(planned, throws, target=dataset.config.sweep.target)
     examples = list(dataset.select(choose_examples(dataset, planned, outcomes)))
     configs = [dataset.config_of(throw) for throw in examples] or [dataset.config]
-    bodies = tuple(dict.fromkeys(body for config in configs for body in looks_of(config)))
+    bodies = tuple(dict.fromkeys(body for config in configs for body in looks_of(config)[:-1]))
     return TaskReport(
         subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by {robot.introduction}",
         tiles=tuple(_show_key_numbers(planned, outcomes)),

@@ -100,7 +100,9 @@ export class LandingMap {
   }
 
   get #outlines() {
-    return (this.#newest?.bodies ?? this.#bodies).map(({ above_m, color }) => ({ corners: above_m, color }));
+    // The ball begins in the tool, wherever that is.
+    const bodies = (this.#newest?.bodies ?? this.#bodies).filter(({ name }) => name !== "ball");
+    return bodies.map(({ above_m, color }) => ({ corners: above_m, color }));
   }
 
   /** @param {number[] | null} place of the target [m], frame world; null if there is none */

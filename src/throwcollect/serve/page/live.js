@@ -16,14 +16,25 @@ const KEPT = 600;
  * @property {number[] | null} ball [m]
  */
 
+/**
+ * @param {string} simulation
+ * @param {string} body
+ * @returns {string} topic of its odometry
+ */
+function topicOf(simulation, body) {
+  return body === "ball" ? `/${simulation}/ball/odometry` : `/${simulation}/bodies/${body}/odometry`;
+}
+
 /** Follows the simulations that are shown. */
 export class Live {
   /** @type {Set<string>} names of the simulations that are shown as they move */
   simulations = new Set();
   /** @type {Map<string, Moment[]>} */
   #moments = new Map();
-  /** @type {Map<string, number[]>} */
-  #balls = new Map();
+  /** @type {Map<string, number[]>} centres of the objects */
+  #objects = new Map();
+  /** @type {Map<string, string[]>} bodies that are followed, by simulation, with the object last */
+  #bodies = new Map();
   #bridge = null;
   #run = null;
   #described = new Set();
@@ -44,6 +55,7 @@ export class Live {
    */
   constructor({ connection, view, watching, tell }) {
     Object.assign(this, { connection, view, watching, tell });
+    watching.known = () => this.#follow();
     get("live").addEventListener("click", () => {
       if (!this.#alone) {
         this.tell("choose one simulation first: it is slowed down to real time while it is watched");
@@ -89,7 +101,8 @@ export class Live {
 
   #follow() {
     const instance = this.#instance;
-    const isSeen = Boolean(instance) && lives(instance) && instance.robots.length > 0 && !document.hidden;
+    const isKnown = Boolean(instance) && instance.robots.length > 0 && this.watching.moving.length > 0;
+    const isSeen = isKnown && lives(instance) && !document.hidden;
     const run = isSeen ? instance.id : null;
     if (run !== this.#run) this.#connect(run);
     this.#showButton(instance, isSeen);
@@ -134,20 +147,26 @@ export class Live {
     this.simulations.add(name);
     this.#moments.set(name, []);
     this.#bridge.subscribe(`/${name}/joint_states`, "sensor_msgs/msg/JointState", (message) => this.#move(name, message));
-    this.#bridge.subscribe(`/${name}/ball/odometry`, "nav_msgs/msg/Odometry", ({ pose }) => {
-      const { x, y, z } = pose.pose.position;
-      this.#balls.set(name, [x, y, z]);
-      this.view.stations.get(name)?.placeBall([x, y, z]);
-      this.view.touch();
-    });
+    const moving = this.watching.moving;
+    this.#bodies.set(name, moving);
+    for (const body of moving) {
+      this.#bridge.subscribe(topicOf(name, body), "nav_msgs/msg/Odometry", ({ pose }) => {
+        const { position: { x, y, z }, orientation: turn } = pose.pose;
+        if (body === moving.at(-1)) this.#objects.set(name, [x, y, z]);
+        this.view.stations.get(name)?.bodies.place(body, [x, y, z, turn.x, turn.y, turn.z, turn.w]);
+        this.view.touch();
+      });
+    }
     if (slowly) this.#slowDown(name);
   }
 
   #leave(name) {
     this.simulations.delete(name);
     this.#moments.delete(name);
-    this.#balls.delete(name);
-    for (const topic of ["joint_states", "ball/odometry"]) this.#bridge?.unsubscribe(`/${name}/${topic}`);
+    this.#objects.delete(name);
+    const topics = [`/${name}/joint_states`, ...(this.#bodies.get(name) ?? []).map((body) => topicOf(name, body))];
+    for (const topic of topics) this.#bridge?.unsubscribe(topic);
+    this.#bodies.delete(name);
     this.#holds.get(name)?.close();
     this.#holds.delete(name);
   }
@@ -161,7 +180,7 @@ export class Live {
     if (!moments) return;
     const [positions, velocities, efforts] = [position, velocity, effort].map((values) => Object.fromEntries(pairs(values)));
     moments.push({
-      time: performance.now() / 1000, position: positions, velocity: velocities, effort: efforts, ball: this.#balls.get(name) ?? null,
+      time: performance.now() / 1000, position: positions, velocity: velocities, effort: efforts, ball: this.#objects.get(name) ?? null,
     });
     if (moments.length > KEPT) moments.shift();
   }

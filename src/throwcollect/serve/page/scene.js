@@ -1,16 +1,13 @@
 /** The three-dimensional view: one tile a simulation, all seen from the same side; or all of them in a room. */
 
 import {
-  Color, DirectionalLight, GridHelper, Group, HemisphereLight, Mesh, MeshLambertMaterial, PerspectiveCamera, Scene,
-  SphereGeometry, Vector3, WebGLRenderer,
+  Color, DirectionalLight, GridHelper, Group, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
 } from "./vendor/three/build/three.module.js";
 import { OrbitControls } from "./vendor/three/examples/jsm/controls/OrbitControls.js";
 import { Bodies } from "./bodies.js";
 import { makeMarker } from "./marker.js";
 import { Trails } from "./trails.js";
 
-const BALL_COLOR = "#ff7300";
-const BALL_RADIUS_M = 0.04;
 const TARGET = new Vector3(0.6, 0, 1);
 const EYE = new Vector3(3.3, -4, 1.9);
 const TURN_RAD = 0.12;
@@ -37,11 +34,9 @@ export class Station {
   robot = null;
 
   constructor() {
-    this.ball = new Mesh(new SphereGeometry(BALL_RADIUS_M, 20, 14), new MeshLambertMaterial({ color: BALL_COLOR }));
-    this.ball.visible = false;
     this.target = makeMarker();
     this.target.visible = false;
-    this.group.add(this.ball, this.trails.object, this.bodies.object, this.target);
+    this.group.add(this.trails.object, this.bodies.object, this.target);
   }
 
   /** @param {import("./robot.js").Robot} robot takes the place of the one before, in its posture */
@@ -52,12 +47,6 @@ export class Station {
     }
     this.robot = robot;
     this.group.add(robot.object);
-  }
-
-  /** @param {number[]} place [m], frame world */
-  placeBall(place) {
-    this.ball.visible = true;
-    this.ball.position.fromArray(place);
   }
 
   /** @param {number[] | null} place that is aimed at [m], frame world; null if none is */
@@ -71,8 +60,6 @@ export class Station {
     this.bodies.clear();
     this.robot?.dispose();
     this.group.removeFromParent();
-    this.ball.geometry.dispose();
-    this.ball.material.dispose();
   }
 }
 

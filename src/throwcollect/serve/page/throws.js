@@ -1,4 +1,4 @@
-/** Finished throws as the server sends them: decoding, and the places of joints and ball at a time. */
+/** Finished throws as the server sends them: decoding, and the places of joints and bodies at a time. */
 
 /**
  * @typedef {object} Throw
@@ -12,13 +12,13 @@
  * @property {Record<string, unknown>} values swept keys and their values
  * @property {import("./bodies.js").Body[] | null} bodies that stood around the robot; null if they are not known
  * @property {Float32Array} positions [rad], joints of a sample side by side
- * @property {Float32Array} ball [m], frame world, x y z of a sample side by side
- * @property {Float32Array} moved centres [m] and quaternions of the bodies that move, 7 numbers each, frame world
+ * @property {Float32Array} path centre of the object [m], frame world, x y z of a sample side by side
+ * @property {Float32Array} moved centres [m] and quaternions of the bodies that move, the object last, 7 numbers each, frame world
  * @property {number} duration [s]
  */
 
 /**
- * Decode a message: length of the header, header, padding to 4 bytes, positions of joints, positions of the ball, poses of bodies.
+ * Decode a message: length of the header, header, padding to 4 bytes, positions of joints, positions of the object, poses of bodies.
  * @param {ArrayBuffer} buffer
  * @returns {Throw}
  * @throws {RangeError} if it is shorter than its header says
@@ -30,9 +30,9 @@ export function decodeThrow(buffer) {
   const { samples, joints } = header;
   // Typed arrays need the byte order of the machine; all machines with a browser are little-endian, as the message is.
   const positions = new Float32Array(buffer, start, samples * joints.length);
-  const ball = new Float32Array(buffer, start + positions.byteLength, samples * 3);
-  const moved = new Float32Array(buffer, ball.byteOffset + ball.byteLength);
-  return { ...header, positions, ball, moved, duration: Math.max(0, samples - 1) / header.rate_hz };
+  const path = new Float32Array(buffer, start + positions.byteLength, samples * 3);
+  const moved = new Float32Array(buffer, path.byteOffset + path.byteLength);
+  return { ...header, positions, path, moved, duration: Math.max(0, samples - 1) / header.rate_hz };
 }
 
 /**
@@ -62,15 +62,6 @@ export function jointsAt(shown, time) {
 /**
  * @param {Throw} shown
  * @param {number} time [s]
- * @returns {number[]} position of the ball [m]
- */
-export function ballAt(shown, time) {
-  return valuesAt(shown.ball, 3, shown, time);
-}
-
-/**
- * @param {Throw} shown
- * @param {number} time [s]
  * @returns {number[][]} centre and quaternion of each body that moves, at the sample before
  */
 export function posesAt(shown, time) {
@@ -80,7 +71,7 @@ export function posesAt(shown, time) {
 }
 
 /**
- * One number of each sample: of the ball, of a joint, or the velocity of a joint as the slope of its positions.
+ * One number of each sample: of the object, of a joint, or the velocity of a joint as the slope of its positions.
  * @param {Throw} shown
  * @param {"position" | "velocity" | "effort" | "ball"} field
  * @param {string} name of a joint, or x, y, z
@@ -90,7 +81,7 @@ export function seriesOf(shown, field, name) {
   const width = field === "ball" ? 3 : shown.joints.length;
   const column = field === "ball" ? "xyz".indexOf(name) : shown.joints.indexOf(name);
   if (column < 0 || field === "effort") return null;
-  const values = field === "ball" ? shown.ball : shown.positions;
+  const values = field === "ball" ? shown.path : shown.positions;
   const series = Float64Array.from({ length: shown.samples }, (_, i) => values[i * width + column]);
   if (field !== "velocity") return series;
   const last = shown.samples - 1;

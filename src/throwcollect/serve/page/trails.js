@@ -1,4 +1,4 @@
-/** Paths of the ball in the throw that is replayed and, fainter, in earlier throws, coloured by outcome. */
+/** Paths of the object in the throw that is replayed and, fainter, in earlier throws, coloured by outcome. */
 
 import {
   CatmullRomCurve3, CircleGeometry, Group, Mesh, MeshBasicMaterial, TubeGeometry, Vector3,
@@ -28,7 +28,7 @@ export class Trails {
   add(shown) {
     const points = [];
     const step = Math.max(1, Math.floor(shown.samples / SEGMENTS));
-    for (let i = 0; i < shown.samples; i += step) points.push(new Vector3().fromArray(shown.ball, 3 * i));
+    for (let i = 0; i < shown.samples; i += step) points.push(new Vector3().fromArray(shown.path, 3 * i));
     if (points.length < 2) return;
     const material = new MeshBasicMaterial({ color: colorOf(shown.outcome), transparent: true });
     // The curve is sampled by time: with arc lengths, a share of the tube would not be the same share of the time.
@@ -54,7 +54,7 @@ export class Trails {
   }
 
   /**
-   * Draw the newest trail as far as the ball has come.
+   * Draw the newest trail as far as the object has come.
    * @param {number} share of the throw's time
    */
   reveal(share) {

@@ -3,7 +3,7 @@
 import { Landings } from "./landings.js";
 import { Robot } from "./robot.js";
 import { lives } from "./state.js";
-import { ballAt, decodeThrow, jointsAt, posesAt } from "./throws.js";
+import { decodeThrow, jointsAt, posesAt } from "./throws.js";
 
 /** Watches one run at a time, and only while the page is visible. */
 export class Watching {
@@ -16,6 +16,8 @@ export class Watching {
   #isMissed = false;
   /** @type {(simulation: string, urdf: string) => void} called with each description that is drawn */
   described = () => {};
+  /** @type {() => void} called when the scene of the run is known */
+  known = () => {};
 
   /**
    * @param {object} parts
@@ -70,7 +72,7 @@ export class Watching {
   }
 
   /**
-   * Put robots and balls where they are at the times of the replay.
+   * Put robots and bodies where they are at the times of the replay.
    * @param {Set<string>} live simulations that others move
    */
   pose(live) {
@@ -83,11 +85,15 @@ export class Watching {
       station.posed = shown;
       station.posedAt = time;
       station.robot?.move(jointsAt(shown, time).map((position, i) => [shown.joints[i], position]));
-      station.placeBall(ballAt(shown, time));
       station.bodies.move(posesAt(shown, time));
       station.trails.reveal(shown.duration ? time / shown.duration : 1);
       this.view.touch();
     }
+  }
+
+  /** @returns {string[]} names of the bodies that move in the run, with the object last; none before they are known */
+  get moving() {
+    return (this.#scene?.bodies ?? []).filter(({ moves }) => moves).map(({ name }) => name);
   }
 
   /** @param {import("./throws.js").Throw} shown begins to be replayed */
@@ -150,6 +156,7 @@ export class Watching {
         this.map.surround(scene.bodies);
         this.view.setBodies(scene.bodies);
         this.show(this.view.shown);
+        this.known();
       }
     }
   }

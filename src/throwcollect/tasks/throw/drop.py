@@ -11,7 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.reproducible_math import add_up
 from throwcollect.robots.tool_motion import ToolMotion
-from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.measures import ObjectState
 from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
 
@@ -37,7 +37,7 @@ def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) 
     held = [contact.start_ns for contact in header.contacts if contact.body == config.tool.name]
     if held and min(held) > header.start_ns:
         seat = ToolMotion(config).place(samples.position[0])
-        if math.dist(samples.ball_position[0], seat) > tool_of(config).rim_radius_m:
+        if math.dist(samples.object_position[0], seat) > tool_of(config).rim_radius_m:
             held = []
     if held:
         return None
@@ -47,7 +47,7 @@ def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) 
     )
 
 
-def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config: Config) -> str | None:
+def explain_drop(samples: Samples, header: EpisodeHeader, release: ObjectState, *, config: Config) -> str | None:
     """Explain why a ball that left the tool was not thrown by it; None if it was thrown.
 
     The tool threw the ball if the tool moved in the direction that the ball then took, at a quarter or more of the
@@ -71,8 +71,8 @@ def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *,
         if samples.stamps_ns[row] <= since_ns:
             break
     moved = math.dist(tool.place(samples.position[last]), tool.place(samples.position[0]))
-    height = release.position[2] - samples.ball_position[0, 2]
-    work = config.scene.gravity_mps2 * height + (speed**2 - math.hypot(*samples.ball_linear_velocity[0]) ** 2) / 2
+    height = release.position[2] - samples.object_position[0, 2]
+    work = config.scene.gravity_mps2 * height + (speed**2 - math.hypot(*samples.object_linear_velocity[0]) ** 2) / 2
     name = config.tool.name
     return (
         f"the {name} did not throw the ball: it left at {release.time_s:.3f} s with {speed:.2f} m/s, and the {name} "

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.free_flight import ballistic_positions
-from throwcollect.tasks.measures import BallState, Vector
+from throwcollect.tasks.measures import ObjectState, Vector
 from throwcollect.tasks.throw.throw_config import throw_section
 from throwcollect.units import NS_PER_S
 
@@ -36,7 +36,7 @@ class Flight:
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
 
-    def state_at(self, time_s: float, *, knot: int) -> BallState:
+    def state_at(self, time_s: float, *, knot: int) -> ObjectState:
         """Interpolate the ball at a time between a knot, which must not be the last one, and the next knot."""
         before, after = self.times[knot : knot + 2].tolist()
         span = after - before
@@ -49,14 +49,14 @@ class Flight:
         )
         x, y, z = (p0 + (p1 - p0) * smooth + bump * (v0 * (1 - u) - v1 * u) for p0, p1, v0, v1 in axes)
         vx, vy, vz = (v0 + (v1 - v0) * u for _, _, v0, v1 in axes)
-        return BallState(time_s, (x, y, z), (vx, vy, vz))
+        return ObjectState(time_s, (x, y, z), (vx, vy, vz))
 
-    def knot_state(self, knot: int) -> BallState:
+    def knot_state(self, knot: int) -> ObjectState:
         """Return the state of the ball at a knot."""
         (x, y, z), (vx, vy, vz) = self.positions[knot].tolist(), self.velocities[knot].tolist()
-        return BallState(float(self.times[knot]), (x, y, z), (vx, vy, vz))
+        return ObjectState(float(self.times[knot]), (x, y, z), (vx, vy, vz))
 
-    def landing(self, height: float) -> tuple[int, BallState] | None:
+    def landing(self, height: float) -> tuple[int, ObjectState] | None:
         """Find the first downward crossing of a height [m] by the ball's centre.
 
         Returns:
@@ -74,7 +74,7 @@ class Flight:
         u = _find_root((2 * z0 - 2 * z1 + m0 + m1, -3 * z0 + 3 * z1 - 2 * m0 - m1, m0, z0))
         return knot, self.state_at(float(self.times[knot]) + u * span, knot=knot)
 
-    def apex(self, knots: int) -> BallState:
+    def apex(self, knots: int) -> ObjectState:
         """Find the highest point of the first `knots` knots, at least one, and between them."""
         top = int(np.argmax(self.positions[:knots, 2]))
         speeds = self.velocities[:, 2]
@@ -92,7 +92,7 @@ def flight_after(samples: Samples, *, start_ns: int, release_ns: int) -> Flight:
     after = int(np.searchsorted(samples.stamps_ns, release_ns, side="right"))
     before = max(after - 1, 0)
     times = (samples.stamps_ns[before:] - start_ns) / NS_PER_S
-    flight = Flight(times, samples.ball_position[before:].copy(), samples.ball_linear_velocity[before:].copy())
+    flight = Flight(times, samples.object_position[before:].copy(), samples.object_linear_velocity[before:].copy())
     release = (release_ns - start_ns) / NS_PER_S
     if release > times[0]:
         first = flight.state_at(release, knot=0)
@@ -140,7 +140,7 @@ def release_of(contacts: tuple[Contact, ...], *, tool: str, gap_s: float) -> int
 def spin_after(samples: Samples, release_ns: int) -> Vector:
     """Read the angular velocity of the ball in world [rad/s] after its release [ns]; nothing changes it in flight."""
     first = int(np.searchsorted(samples.stamps_ns, release_ns))
-    x, y, z = samples.ball_angular_velocity[first].tolist()
+    x, y, z = samples.object_angular_velocity[first].tolist()
     return x, y, z
 
 
@@ -173,12 +173,12 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
         return None
     stride = config.sim.physics_hz // config.record.rate_hz
     predicted = ballistic_positions(
-        samples.ball_position[first],
-        samples.ball_linear_velocity[first],
+        samples.object_position[first],
+        samples.object_linear_velocity[first],
         steps=stride * (stop - first - 1),
         config=config,
     )
-    x, y, z = (samples.ball_position[first:stop] - predicted[::stride]).T
+    x, y, z = (samples.object_position[first:stop] - predicted[::stride]).T
     # `numpy.linalg.norm` adds in an order that depends on the processor.
     return float(np.sqrt(x * x + y * y + z * z).max())
 

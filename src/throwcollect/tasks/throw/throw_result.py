@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from throwcollect.tasks.measures import BallState, Vector
+from throwcollect.tasks.measures import ObjectState, Vector
 from throwcollect.tasks.result import Outcome, Result
-from throwcollect.tasks.result_columns import BallColumns, Count, Number, SpinColumns, measured
+from throwcollect.tasks.result_columns import BodyColumns, Count, Number, SpinColumns, measured
 
 
 class ThrowOutcome(Outcome):
@@ -42,9 +42,9 @@ class ThrowResult(Result):
     when its lowest point crosses the landing plane. See `flight.flight_residual` for `ballistic_residual_m`.
     """
 
-    release: BallState | None = measured(BallColumns("when it left the {tool}"))
-    apex: BallState | None = measured(BallColumns("at the highest point of its flight"))
-    landing: BallState | None = measured(BallColumns("when it crossed the landing plane"))
+    release: ObjectState | None = measured(BodyColumns("when it left the {tool}"))
+    apex: ObjectState | None = measured(BodyColumns("at the highest point of its flight"))
+    landing: ObjectState | None = measured(BodyColumns("when it crossed the landing plane"))
     release_speed_mps: float | None = measured(Number("Speed at release [m/s]."))
     release_elevation_rad: float | None = measured(Number("Direction of flight at release above the horizontal [rad]."))
     flight_time_s: float | None = measured(Number("From release to landing [s]."))

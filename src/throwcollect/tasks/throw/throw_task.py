@@ -9,7 +9,8 @@ from typing import ClassVar
 
 from throwcollect.engines.engine import GROUND
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.tasks.measures import BallState
+from throwcollect.robots.surroundings import object_of
+from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import Outcome
 from throwcollect.tasks.task import Failure, Task
 from throwcollect.tasks.throw.drop import explain_drop, find_early_loss
@@ -106,7 +107,7 @@ class ThrowTask(Task[ThrowResult]):
 
     def _stands(self, body: str) -> bool:
         """Whether a name in contacts is that of the ground, or of a body of the scene."""
-        return body == GROUND or body in self.config.scene.bodies or body in self.config.task.bodies
+        return body == GROUND or body in self.config.bodies
 
     def _find_failure(
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader, touched: list[Contact]
@@ -142,7 +143,7 @@ class ThrowTask(Task[ThrowResult]):
     def measure_flight(self, result: ThrowResult, flight: Flight) -> ThrowResult:
         """Add the measures of a flight to a result."""
         release = flight.knot_state(0)
-        crossing = flight.landing(self.landing_height_m + self.config.ball.radius_m)
+        crossing = flight.landing(self.landing_height_m + object_of(self.config).radius_m)
         last, landing = crossing or (len(flight.times) - 1, None)
         speed, elevation = _compute_direction(release)
         return replace(
@@ -157,7 +158,7 @@ class ThrowTask(Task[ThrowResult]):
         )
 
 
-def _compute_direction(ball: BallState) -> tuple[float, float]:
+def _compute_direction(ball: ObjectState) -> tuple[float, float]:
     """Compute the speed [m/s] and the elevation of the direction of flight above the horizontal [rad]."""
     vx, vy, vz = ball.velocity
     level = math.hypot(vx, vy)

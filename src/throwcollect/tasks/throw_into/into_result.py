@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from throwcollect.tasks.measures import BallState
+from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import Outcome
-from throwcollect.tasks.result_columns import BallColumns, Count, Number, measured
+from throwcollect.tasks.result_columns import BodyColumns, Count, Number, measured
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
 
@@ -49,7 +49,7 @@ class IntoOutcome(Outcome):
 class IntoResult(ThrowResult):
     """Outcome and measures of a throw into a bin; the landing is where the ball comes down to the height of the rim."""
 
-    rest: BallState | None = measured(BallColumns("at the end of the trial, if it rests"))
+    rest: ObjectState | None = measured(BodyColumns("at the end of the trial, if it rests"))
     bin_miss_m: float | None = measured(
         Number("Horizontal distance of the landing, at the height of the rim, from the middle of the bin [m].")
     )

@@ -11,7 +11,8 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.tasks.measures import BallState
+from throwcollect.robots.surroundings import object_of
+from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.task import Failure
 from throwcollect.tasks.throw.flight import Flight
 from throwcollect.tasks.throw.throw_result import ThrowResult
@@ -65,7 +66,7 @@ class ThrowIntoTask(ThrowTask):
                 one, other = flight.positions[passed[0] : passed[0] + 2].tolist()
                 share = (self._wall.x_m - one[0]) / (other[0] - one[0])
                 height = one[2] + share * (other[2] - one[2])
-                clearance_m = height - self.config.ball.radius_m - self._wall.height_m
+                clearance_m = height - object_of(self.config).radius_m - self._wall.height_m
         return replace(result, bin_miss_m=miss_m, wall_clearance_m=clearance_m)  # type: ignore[call-arg]
 
     def judge_flight(
@@ -75,17 +76,17 @@ class ThrowIntoTask(ThrowTask):
         time_s = header.seconds_at(int(samples.stamps_ns[-1]))
         rest = None
         if header.end_reason == "rest":
-            (x, y, z), (vx, vy, vz) = samples.ball_position[-1].tolist(), samples.ball_linear_velocity[-1].tolist()
-            rest = BallState(time_s, (x, y, z), (vx, vy, vz))
+            (x, y, z), (vx, vy, vz) = samples.object_position[-1].tolist(), samples.object_linear_velocity[-1].tolist()
+            rest = ObjectState(time_s, (x, y, z), (vx, vy, vz))
         result = replace(result, rest=rest, bounces=len(impacts))  # type: ignore[call-arg]
         return result, self._find_miss(result, rest, impacts, header)
 
     def _find_miss(
-        self, result: ThrowResult, rest: BallState | None, impacts: Sequence[Contact], header: EpisodeHeader
+        self, result: ThrowResult, rest: ObjectState | None, impacts: Sequence[Contact], header: EpisodeHeader
     ) -> Failure | None:
         landing = result.landing
         ended = rest if self._bin.depth_m else landing
-        if ended is not None and self._bin.holds(ended.position, self.config.ball.radius_m):
+        if ended is not None and self._bin.holds(ended.position, object_of(self.config).radius_m):
             return None
         if landing is None and impacts:
             first = impacts[0]

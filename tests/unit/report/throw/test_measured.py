@@ -38,7 +38,7 @@ def test_flights_of_a_sound_dataset_are_ballistic(collected: Path) -> None:
 def test_a_kick_in_a_flight_shows_in_its_residual(collection: Any, tmp_path: Path) -> None:
     def kick(samples: Any, header: Any) -> Any:
         if header.trial == 3:
-            samples.ball_position[-5:, 0] += 1e-6
+            samples.object_position[-5:, 0] += 1e-6
         return samples, header
 
     found = measure_residuals(Dataset.open(collection.collect(tmp_path / "dataset", change=kick)))
@@ -58,7 +58,7 @@ def rest_in_bin(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episo
     """The balls of even trials rest in the bin."""
     if header.trial % 2:
         return samples, header
-    samples.ball_position[-1], samples.ball_linear_velocity[-1] = (1.6, -0.25, 0.05), 0.0
+    samples.object_position[-1], samples.object_linear_velocity[-1] = (1.6, -0.25, 0.05), 0.0
     return samples, replace(header, end_reason="rest")
 
 

@@ -49,16 +49,16 @@ def episode(
     velocity = np.zeros((count, 32))
     columns = [TALOS.joints.index(joint) for joint in trajectory.joints]
     position[:, columns], velocity[:, columns], _ = sample_quintic(trajectory, times)
-    ball_position, ball_velocity = parabola(times, **ball)
+    object_position, ball_velocity = parabola(times, **ball)
     samples = Samples(
         stamps_ns=stamps,
         position=position,
         velocity=velocity,
         effort=np.zeros((count, 32)),
-        ball_position=ball_position,
-        ball_orientation_xyzw=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
-        ball_linear_velocity=ball_velocity,
-        ball_angular_velocity=np.zeros((count, 3)),
+        object_position=object_position,
+        object_orientation_xyzw=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+        object_linear_velocity=ball_velocity,
+        object_angular_velocity=np.zeros((count, 3)),
     )
 
     def stamp(time: float) -> int:

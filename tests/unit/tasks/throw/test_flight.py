@@ -23,12 +23,12 @@ def discrete_throw(config):
     dt = 1 / config.sim.physics_hz
     scene, ball = config.scene, config.ball
     factor = scene.air_density_kgpm3 * ball.drag_coefficient * math.pi * ball.radius_m**2 / 2 / ball.mass_kg
-    x, v = samples.ball_position[RELEASED].copy(), samples.ball_linear_velocity[RELEASED].copy()
+    x, v = samples.object_position[RELEASED].copy(), samples.object_linear_velocity[RELEASED].copy()
     for row in range(RELEASED + 1, len(samples.stamps_ns)):
         for _ in range(config.sim.physics_hz // config.record.rate_hz):
             v = v + (np.array([0, 0, -scene.gravity_mps2]) - factor * np.linalg.norm(v) * v) * dt
             x = x + v * dt
-        samples.ball_position[row], samples.ball_linear_velocity[row] = x, v
+        samples.object_position[row], samples.object_linear_velocity[row] = x, v
     return samples, header
 
 
@@ -48,13 +48,13 @@ def test_wrong_gravity_or_forgotten_drag_gives_a_residual():
 
 def test_a_displaced_sample_gives_its_distance_as_residual():
     samples, header = discrete_throw(Config())
-    samples.ball_position[250] += [0, 3e-6, 4e-6]
+    samples.object_position[250] += [0, 3e-6, 4e-6]
     assert flight_residual(samples, header, config=Config()) == pytest.approx(5e-6, rel=1e-6)
 
 
 def test_flight_ends_with_the_first_contact():
     samples, header = discrete_throw(Config())
-    samples.ball_position[251:] += 0.1
+    samples.object_position[251:] += 0.1
     contact = Contact("ground", int(samples.stamps_ns[251]), None)
     assert flight_residual(samples, header, config=Config()) > 0.1
     touched = replace(header, contacts=(*header.contacts, contact))
@@ -64,9 +64,9 @@ def test_flight_ends_with_the_first_contact():
 def test_the_residual_counts_only_samples_after_the_recatch_gap():
     samples, header = discrete_throw(Config())
     free = math.ceil((RELEASE_S + Config().task.recatch_gap_s) * 250)
-    samples.ball_position[:free] += 0.1
+    samples.object_position[:free] += 0.1
     assert flight_residual(samples, header, config=Config()) < 1e-12
-    samples.ball_position[free] += 0.1
+    samples.object_position[free] += 0.1
     assert flight_residual(samples, header, config=Config()) > 0.05
 
 

@@ -63,7 +63,7 @@ def test_a_resting_joint_with_limits_of_0_does_not_spoil_the_result(monkeypatch)
 def test_spin_is_that_of_the_first_sample_after_the_release():
     samples, header = episode()
     spins = np.arange(3.0 * len(samples)).reshape(-1, 3)
-    result = judge(replace(samples, ball_angular_velocity=spins), header)
+    result = judge(replace(samples, object_angular_velocity=spins), header)
     first = int(np.argmax((samples.stamps_ns - header.start_ns) / 1e9 >= RELEASE_S))
     assert result.release_spin == tuple(spins[first])
 
@@ -81,8 +81,8 @@ def test_ball_at_release_lies_between_its_neighbouring_samples():
     g = np.array([0, 0, -GRAVITY])
     samples = replace(
         samples,
-        ball_position=ORIGIN + VELOCITY * times[:, None] + g * times[:, None] ** 2 / 2,
-        ball_linear_velocity=VELOCITY + g * times[:, None],
+        object_position=ORIGIN + VELOCITY * times[:, None] + g * times[:, None] ** 2 / 2,
+        object_linear_velocity=VELOCITY + g * times[:, None],
     )
     result = judge(samples, header)
     assert result.release.position == pytest.approx(ORIGIN, abs=1e-12)
@@ -105,8 +105,8 @@ def test_landing_between_samples_is_exact_for_a_parabola(height, rate, vx, vz):
     g = np.array([0, 0, -GRAVITY])
     samples = replace(
         samples,
-        ball_position=ORIGIN + velocity * times + g * times**2 / 2,
-        ball_linear_velocity=velocity + g * times,
+        object_position=ORIGIN + velocity * times + g * times**2 / 2,
+        object_linear_velocity=velocity + g * times,
     )
     end = landing_time(height + RADIUS, velocity=velocity)
     result = judge(samples, header, config)
@@ -136,8 +136,8 @@ def test_ball_that_left_the_spoon_before_the_start_is_dropped():
 
 def test_ball_on_a_bounce_at_the_start_is_in_the_spoon():
     samples, header = episode(contacts=(("spoon", 0.01, RELEASE_S),))
-    samples.ball_position[0] = ToolMotion(Config()).place(samples.position[0])
-    samples.ball_position[0, 2] += 0.01
+    samples.object_position[0] = ToolMotion(Config()).place(samples.position[0])
+    samples.object_position[0, 2] += 0.01
     assert judge(samples, header).outcome is ThrowOutcome.LANDED
 
 
@@ -146,7 +146,7 @@ def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence():
     task = {"start": {**Config().task.start, "arm_left_4_joint": -1.9}, "end": {"arm_left_4_joint": -0.5}}
     config = Config(task=task)
     samples, header = episode(config)
-    samples.ball_linear_velocity[samples.stamps_ns < header.start_ns + RELEASE_S * 1e9] = 0.0
+    samples.object_linear_velocity[samples.stamps_ns < header.start_ns + RELEASE_S * 1e9] = 0.0
     result = judge(samples, header, config)
     assert result.outcome is ThrowOutcome.DROPPED
     assert result.reason.startswith("the spoon did not throw the ball: it left at 0.637 s with ")
@@ -188,7 +188,7 @@ def test_ball_that_is_thrown_downwards_is_thrown():
     down = ToolMotion(config).velocity(samples.position[row], samples.velocity[row])
     assert down[2] < -0.3
     samples, header = episode(config, velocity=down, origin=ORIGIN - [0.0, 0.0, 0.4])
-    samples.ball_position[0] = ORIGIN
+    samples.object_position[0] = ORIGIN
     assert judge(samples, header, config).outcome is ThrowOutcome.LANDED
 
 
@@ -243,12 +243,14 @@ def test_impact_on_the_ground_does_not_bend_the_landing_just_above_it(drag):
     """The ball crosses a plane 5 mm above the ground and is stopped by the ground before the next sample."""
     config = Config(scene={"landing_height_m": 0.005}, ball={"drag_coefficient": drag})
     free, header = episode(config)
-    end = int(np.argmax(free.ball_position[:, 2] < 0.005 + RADIUS))
+    end = int(np.argmax(free.object_position[:, 2] < 0.005 + RADIUS))
     step = 1 / config.sim.physics_hz
-    path = ballistic_positions(free.ball_position[end - 1], free.ball_linear_velocity[end - 1], steps=2, config=config)
-    free.ball_position[end], free.ball_linear_velocity[end] = path[2], (path[2] - path[1]) / step
+    path = ballistic_positions(
+        free.object_position[end - 1], free.object_linear_velocity[end - 1], steps=2, config=config
+    )
+    free.object_position[end], free.object_linear_velocity[end] = path[2], (path[2] - path[1]) / step
     undisturbed = judge(free, header, config)
-    free.ball_position[end, 2], free.ball_linear_velocity[end] = RADIUS, 0.0
+    free.object_position[end, 2], free.object_linear_velocity[end] = RADIUS, 0.0
     start_ns = int(free.stamps_ns[end]) - round(step * 1e9)
     impact = Contact("ground", start_ns, None)
     stopped = judge(free, replace(header, contacts=(*header.contacts, impact)), config)
@@ -349,7 +351,7 @@ def test_outcomes_come_in_their_documented_order():
     assert result.reason == "torso_controller aborted its goal with error code -5"
 
 
-@pytest.mark.parametrize("field", ["position", "velocity", "effort", "ball_position", "ball_linear_velocity"])
+@pytest.mark.parametrize("field", ["position", "velocity", "effort", "object_position", "object_linear_velocity"])
 def test_diverged_simulation_is_a_tracking_failure_without_numbers(field):
     samples, header = episode()
     getattr(samples, field)[300, 0] = np.nan

@@ -38,7 +38,7 @@ def config(*, x: float = HIT_X, y: float = HIT_Y, wall: object = None, **bin_key
 def judge(made: Config, *contacts: tuple[str, float, float | None], rests_at=None, end_reason: str = "landed"):
     samples, header = episode(made, contacts=(HELD, *contacts), end_reason="rest" if rests_at else end_reason)
     if rests_at:
-        samples.ball_position[-1], samples.ball_linear_velocity[-1] = rests_at, 0.0
+        samples.object_position[-1], samples.object_linear_velocity[-1] = rests_at, 0.0
     task = task_of(made)
     return task.judge(samples, header, task.trajectory())
 

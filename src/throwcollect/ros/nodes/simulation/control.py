@@ -28,11 +28,10 @@ from throwcollect.version import __version__
 Fill = Callable[[Any, Any], None]
 """Function of a request and a response that fills the response."""
 
-_BALL = "ball"
 _WORLD_FRAME = "world"
 _LARGEST_COORDINATE_M = 1e3
 _LARGEST_SPEED = 1e3
-"""Largest speed that a client may give the ball [m/s, rad/s]: at a higher one, its place would soon be no number."""
+"""Largest speed that a client may give a body [m/s, rad/s]: at a higher one, its place would soon be no number."""
 
 _NORM_TOLERANCE = 1e-3
 
@@ -126,11 +125,11 @@ class EntityServices:
     def _set_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:
         self._simulation.trial.require_free()
         self._require(request.entity)
-        if request.entity != _BALL:
+        if request.entity not in self._simulation.world.free:
             raise RequestError("RESULT_OPERATION_FAILED", f"{request.entity} is fixed to the world")
         if (frame := request.state.header.frame_id) not in ("", _WORLD_FRAME):
             raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=_WORLD_FRAME)
-        self._simulation.world.ball = _to_body_state(request.state)
+        self._simulation.world.place(request.entity, _to_body_state(request.state))
 
     def _select(self, filters: EntityFilters) -> list[str]:
         if filters != EntityFilters():
@@ -140,12 +139,12 @@ class EntityServices:
 
     @property
     def _names(self) -> list[str]:
-        return [_BALL, self._robot, *self._simulation.world.bodies]
+        return [*self._simulation.world.bodies, self._robot]
 
     def _read_state(self, name: str) -> EntityState:
         self._require(name)
         world = self._simulation.world
-        states = {_BALL: world.ball, self._robot: world.robot_base, **world.bodies}
+        states = {self._robot: world.robot_base, **world.bodies}
         return _to_message(states[name], self._simulation.now_ns)
 
     def _require(self, name: str) -> None:
