@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,15 +23,17 @@ from throwcollect.dataset.trajectories import (
     BODY_COMPONENTS,
     JOINT_COLUMNS,
     TIMES,
-    Column,
     name_components,
 )
 from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.message_table import list_body_fields, read_column
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.topics import Rows, rotate
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
+from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
@@ -103,11 +105,6 @@ class Events:
             )
             for contact in header.contacts
         )
-
-
-def _copy(array: Column) -> Column:
-    """Copy an array of samples into one that belongs to the caller."""
-    return np.array(array, order="C")
 
 
 def _make_event(row: Row, name: str) -> BodyEvent | None:
@@ -260,16 +257,37 @@ class Throw:
             located.hint = located.hint or command("dataset", "verify", self._source)
             raise located from error
 
-    @property
+    @cached_property
+    def _rows(self) -> tuple[int, Rows]:
+        """Start of the episode [ns], and its samples in place (`MessageTable.rows`)."""
+        with self.locating_damage():
+            episode = self.read_episode()
+            return episode.header.start_ns, episode.rows(robot_of(self._config).joints)
+
+    def _read(self, fields: Iterable[str]) -> list[NDArray[Any]]:
+        """Copy times, stamps, and some fields of the samples."""
+        start_ns, rows = self._rows
+        stamps = read_column(rows, "stamps_ns")
+        return [(stamps - start_ns) / NS_PER_S, stamps, *(read_column(rows, field) for field in fields)]
+
+    def _read_body(self, name: str, number: int) -> Body:
+        times, stamps, position, turn, linear, angular = self._read(list_body_fields(number).values())
+        velocity, spin = np.ascontiguousarray(rotate(turn, linear, angular, inverse=False))
+        return Body(name, times, stamps, position, turn, velocity, spin)
+
+    @cached_property
     def object(self) -> Body:
         """The body that the robot acts on, over time, such as the ball; it is one of `bodies`.
 
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        return self.bodies[self._config.acted_on]
+        return self._read_body(self._config.acted_on, 0)
 
-    ball = object
+    @property
+    def ball(self) -> Body:
+        """Another name of `object`."""
+        return self.object
 
     @cached_property
     def joints(self) -> Joints:
@@ -278,9 +296,7 @@ class Throw:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        header, samples = self.read_samples()
-        arrays = (getattr(samples, name) for name in ("stamps_ns", *JOINT_COLUMNS.values()))
-        return Joints(robot_of(self._config).joints, samples.seconds_since(header.start_ns), *map(_copy, arrays))
+        return Joints(robot_of(self._config).joints, *self._read(JOINT_COLUMNS.values()))
 
     @cached_property
     def bodies(self) -> dict[str, Body]:
@@ -289,12 +305,8 @@ class Throw:
         Raises:
             DatasetError: If the throw has no episode, or it is damaged.
         """
-        header, samples = self.read_samples()
-        times = samples.seconds_since(header.start_ns)
-        return {
-            name: Body(name, times, *map(_copy, (samples.stamps_ns, *samples.parts_of(number))))
-            for number, name in enumerate(moving_bodies_of(self._config))
-        }
+        acted_on, *others = moving_bodies_of(self._config)
+        return {acted_on: self.object} | {name: self._read_body(name, k) for k, name in enumerate(others, start=1)}
 
     def to_pandas(self) -> DataFrame:
         """Make a DataFrame of the motion of joints and bodies: one row a sample, by time since the start of the trial.

@@ -28,6 +28,7 @@ from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.topics import Rows
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import Signer
 
@@ -70,10 +71,21 @@ class Episode:
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
         """Read the samples; `joints` must have been recorded, in this order."""
-        if joints is not None and tuple(joints) != self.table.joints:
+        self._check_joints(self.table.joints if joints is None else joints)
+        return self.table.samples
+
+    def rows(self, joints: Sequence[str]) -> Rows:
+        """View the samples in place, see `MessageTable.rows`; `joints` must have been recorded, in this order."""
+        try:
+            return self.table.rows(tuple(joints))
+        except DatasetError:
+            self._check_joints(joints)
+            raise
+
+    def _check_joints(self, joints: Sequence[str]) -> None:
+        if tuple(joints) != self.table.joints:
             found = ", ".join(self.table.joints)[:_LONGEST_NAME]
             raise DatasetError(f"chunk: joint states of {found}", expected=", ".join(joints))
-        return self.table.samples
 
     @cached_property
     def message_indexes(self) -> Mapping[int, bytes]:
