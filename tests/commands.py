@@ -16,6 +16,7 @@ import ctypes
 import gc
 import importlib
 import json
+import multiprocessing.util
 import os
 import pkgutil
 import runpy
@@ -28,6 +29,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import IO, NoReturn, Self
 
@@ -35,6 +37,7 @@ import setproctitle
 
 import throwcollect
 from tests.restrictions import FREE, Restrictions
+from throwcollect import side_by_side
 from throwcollect.build import build_digest
 from throwcollect.config import shape
 from throwcollect.config.schema import Config
@@ -45,6 +48,7 @@ from throwcollect.robots.description import full_description
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.tool_motion import ToolMotion
 
+_spawn = multiprocessing.util.spawnv_passfds
 _MESSAGE_BYTES = 1 << 17
 _ANSWER_S = 60.0
 """Most time for an answer of the server: importing takes two seconds, and longer on a busy machine."""
@@ -368,6 +372,33 @@ def _become_command(request: dict[str, object], streams: Sequence[int]) -> list[
     return arguments
 
 
+def _fork_server_of_nodes(path: str, arguments: Sequence[str], passed: Sequence[int]) -> int:
+    """Fork the process that nodes are forked from, too, in the place of `multiprocessing.util.spawnv_passfds`.
+
+    It has then imported and computed what takes it a second of a processor. Libraries that have started threads would
+    miss them in a fork.
+    """
+    if "multiprocessing.forkserver" not in arguments[-1] or len(os.listdir("/proc/self/task")) > 1:
+        return _spawn(path, arguments, passed)
+    if pid := os.fork():
+        return pid
+    setproctitle.setproctitle("forkserver")
+    for stream in map(int, os.listdir("/proc/self/fd")):
+        if stream > 2 and stream not in passed:
+            with contextlib.suppress(OSError):
+                os.close(stream)
+    signal.set_wakeup_fd(-1)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    # The launcher holds the locks of these two at the moment.
+    forkserver._forkserver.__init__()  # type: ignore[misc]
+    side_by_side._launch = threading.Lock()
+    with contextlib.suppress(SystemExit):
+        exec(arguments[-1], {})  # noqa: S102 - what `python -c` would do
+    os._exit(0)
+
+
 def _leave(code: int) -> NoReturn:
     """End without taking the interpreter apart, which takes a third of a second with all that is imported here.
 
@@ -395,6 +426,7 @@ def main() -> None:
     gc.freeze()
     arguments = _serve(connection)
     sys.argv[1:] = arguments
+    multiprocessing.util.spawnv_passfds = _fork_server_of_nodes
     code = 1
     try:
         runpy.run_module("throwcollect", run_name="__main__", alter_sys=True)

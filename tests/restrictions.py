@@ -7,6 +7,7 @@ import resource
 from dataclasses import dataclass
 
 _PR_CAPBSET_DROP = 24
+_CLONE_NEWNET = 0x40000000
 _VERSION_3 = 0x20080522
 _OVERRIDES = (1, 2)
 """CAP_DAC_OVERRIDE and CAP_DAC_READ_SEARCH: the rights to ignore permissions."""
@@ -19,10 +20,12 @@ class Restrictions:
     Attributes:
         file_bytes: Most bytes of each file that is written, as if the disk were full then; None for any number.
         obeys_permissions: Whether permissions hold as for everybody who is not root.
+        network: Name of a network namespace, outside of which nothing is reached; None for the machine's network.
     """
 
     file_bytes: int | None = None
     obeys_permissions: bool = False
+    network: str | None = None
 
     def impose(self) -> None:
         """Restrict this process.
@@ -34,6 +37,10 @@ class Restrictions:
             resource.setrlimit(resource.RLIMIT_FSIZE, (self.file_bytes, self.file_bytes))
         if self.obeys_permissions:
             _drop_overrides()
+        if self.network is not None:
+            with open(f"/run/netns/{self.network}") as namespace:
+                if ctypes.CDLL(None, use_errno=True).setns(namespace.fileno(), _CLONE_NEWNET):
+                    raise OSError(ctypes.get_errno(), "setns")
 
 
 FREE = Restrictions()

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from rclzenoh.session_config import OVERRIDE_VARIABLE, Key, client_override
-from tests.commands import command
+from tests.commands import Command, command, start_command
 from tests.e2e.collection import (
     CONFIG,
     FAST,
@@ -30,6 +30,7 @@ from tests.e2e.collection import (
     fingerprints,
     launch,
 )
+from tests.restrictions import Restrictions
 from throwcollect.run_key import RunKey
 
 pytestmark = pytest.mark.e2e
@@ -154,12 +155,12 @@ def move_endpoint(token: str, address: str, port: int) -> str:
     return replace(JoinToken.decode(token), endpoint=f"tls/{address}:{port}").encode()
 
 
-def join(machine: Machine, token: str) -> subprocess.Popen[str]:
-    words = machine.run(*command("join-run", token, "-n", "1"))
-    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True)
+def join(machine: Machine, token: str) -> Command:
+    network = Restrictions(network=machine.name)
+    return start_command("join-run", token, "-n", "1", stdout=subprocess.DEVNULL, restrictions=network)
 
 
-def wait_for(written: int, running: Running, joined: list[subprocess.Popen[str]]) -> None:
+def wait_for(written: int, running: Running, joined: list[Command]) -> None:
     """Wait until a run has written so many bytes; say what the joined simulations said if it does not come to that."""
     try:
         running.wait_until(lambda: running.count_bytes() >= written or any(each.poll() for each in joined), seconds=120)
@@ -167,7 +168,7 @@ def wait_for(written: int, running: Running, joined: list[subprocess.Popen[str]]
     except AssertionError as error:
         for each in joined:
             each.kill()
-            error.add_note(f"{each.args}: exit code {each.wait()}: {each.communicate()[1]}")
+            error.add_note(f"join-run: exit code {each.wait()}: {each.communicate()[1]}")
         raise
 
 
@@ -178,18 +179,17 @@ def machines() -> Iterator[list[Machine]]:
 
 
 @pytest.fixture
-def processes() -> Iterator[list[subprocess.Popen[str]]]:
-    started: list[subprocess.Popen[str]] = []
+def processes() -> Iterator[list[Command]]:
+    started: list[Command] = []
     yield started
     for process in started:
-        with suppress(ProcessLookupError):
-            process.send_signal(signal.SIGKILL)
+        process.kill()
         process.wait()
 
 
 @needs_machines
 def test_machines_can_join_and_leave_without_changing_the_files(
-    tmp_path: Path, machines: list[Machine], processes: list[subprocess.Popen[str]]
+    tmp_path: Path, machines: list[Machine], processes: list[Command]
 ) -> None:
     running, token, port = listen(tmp_path, "--set", SLOW)
     steady, late, gone = machines
