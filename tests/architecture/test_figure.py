@@ -37,17 +37,6 @@ def test_the_document_shows_the_figure_and_names_every_room(figure: ModuleType) 
     assert [room for room in imported if f"`{room}`" not in DOCUMENT] == []
 
 
-def test_arrows_that_follow_from_others_are_left_out(figure: ModuleType) -> None:
-    imported = {room: set() for room in figure.PLACES} | {"cli": {"runs", "dataset"}, "runs": {"dataset"}}
-    assert figure.reduce_arrows(imported) == [("cli", "runs"), ("runs", "dataset")]
-
-
-def test_an_import_by_a_room_at_the_bottom_is_an_error(figure: ModuleType) -> None:
-    imported = {room: set() for room in figure.PLACES} | {"wording": {"config"}}
-    with pytest.raises(ValueError, match="wording imports config"):
-        figure.reduce_arrows(imported)
-
-
 def test_the_committed_flow_figures_match_and_are_shown(flows: ModuleType) -> None:
     drawn = {path.stem: path.read_text(encoding="utf-8") for path in flows.FIGURES.iterdir()}
     assert drawn == {name: flows.draw(flow) for name, flow in flows.FLOWS.items()}, "python packaging/flow_figures.py"

@@ -82,8 +82,6 @@ FILES = {
         ": {}/arm.urdf: is xacro, not URDF; convert it with `xacro FILE > robot.urdf`",
     ),
     "MJCF": (put("<mujoco/>"), ": {}/arm.urdf: is MJCF, not URDF; mjcf-urdf-simple-converter converts it"),
-    "SDF": (put("<sdf/>"), ": {}/arm.urdf: is SDF, not URDF; sdf2urdf of sdformat_tools converts it"),
-    "USD as text": (put("#usda 1.0\n"), "is USD, not URDF; usd_to_urdf of nvidia-srl-usd-to-urdf converts it"),
     "USD": (put(b"PXR-USDC\0\1"), "is USD, not URDF; usd_to_urdf of nvidia-srl-usd-to-urdf converts it"),
     "ring": (change(('"base_link"/><child', '"fore_link"/><child')), ": {}/arm.urdf: the joints form a ring"),
     "two roots": (
@@ -132,14 +130,9 @@ FILES = {
         large("a.stl", bytes(80) + (10**7).to_bytes(4, "little")),
         ": {}/arm.urdf: link upper_link: {}/a.stl: should have at most 50 MB, which is a million triangles of STL, has",
     ),
-    "OBJ of 500 MB": (large("a.obj", b""), ": {}/arm.urdf: link upper_link: {}/a.obj: should have at most 50 MB"),
     "name of a robot": (
         change(("Foreign Arm", "Talos")),
         ".name: talos is the name of an installed robot; give another one",
-    ),
-    "name of an arm": (
-        change(("Foreign Arm", "panda")),
-        ".name: panda is the name of an installed robot; give another one",
     ),
     "cannot hold the tool": (
         change(('"turn" type="revolute"', '"turn" type="fixed"'), (MOUNT, ASIDE)),
@@ -151,8 +144,6 @@ FILES = {
 KEYS = {
     "flange": ({"flange": "lange_link"}, ".flange: {}/arm.urdf has no link 'lange_link'; did you mean 'flange_link'?"),
     "flange that nothing moves": ({"flange": "base_link"}, ".flange: no joint moves base_link"),
-    "no flange": ({"flange": "null"}, ".flange: should be a valid string, got nothing"),
-    "name": ({"name": "My Arm"}, ".name: String should match pattern"),
     "unknown joint": (
         {"controllers": "{arm: [turn, lfit]}"},
         ".controllers.arm: {}/arm.urdf has no joint 'lfit'; did you mean 'lift'?",
@@ -161,7 +152,6 @@ KEYS = {
         {"controllers": "{arm: [turn, lift], wrist: [lift, bend]}"},
         ".controllers: the joint lift is there twice",
     ),
-    "joint twice": ({"controllers": "{arm: [turn, turn]}"}, ".controllers: the joint turn is there twice"),
     "fixed joint": (
         {"controllers": "{arm: [mount]}"},
         ".controllers.arm: the joint mount is fixed, so that no controller can command it",
@@ -170,16 +160,8 @@ KEYS = {
         {"controllers": "{arm: {chain: [fore_link, turret_link]}}"},
         ".controllers: no joints lead from the link fore_link to turret_link",
     ),
-    "no such link": (
-        {"controllers": "{arm: {chain: [base_link, forelink]}}"},
-        ".controllers.arm: {}/arm.urdf has no link 'forelink'; did you mean 'fore_link'?",
-    ),
     "no controllers": (
         {"controllers": "{}"},
-        ".controllers: each should have joints, and some should move flange_link",
-    ),
-    "no joints": (
-        {"controllers": "{arm: [turn], hand: []}"},
         ".controllers: each should have joints, and some should move flange_link",
     ),
     "joints of another limb": (
@@ -190,30 +172,18 @@ KEYS = {
         {"controllers": "{arm: [turn, lift]}", "fixed": "{lift: 1}"},
         ".fixed.lift: a controller commands this joint",
     ),
-    "unknown fixed joint": (
-        {"fixed": "{lfit: 1}"},
-        ".fixed.lfit: {}/arm.urdf has no joint 'lfit'; did you mean 'lift'?",
-    ),
-    "unknown limit": ({"limits": "{lfit: {max_effort: 1}}"}, ".limits.lfit: {}/arm.urdf has no joint 'lfit'"),
     "limits in the wrong order": (
         {"limits": "{lift: {min_position: 3}}"},
         ".limits.lift: min_position should be below max_position, got 3 and 2.6",
     ),
     "posture beyond a limit": ({"home": "{lift: 4}"}, ".home: 4 is beyond the limits of lift, -2.5 to 2.6"),
-    "posture of an unknown joint": ({"home": "{lfit: 1}"}, ".home.lfit: foreign_arm has no joint 'lfit'; did you mean"),
     "unknown posture": ({"home": "rest"}, ".home: no group_state 'rest'; robot.srdf has none"),
     "no SRDF": ({"srdf": "none.srdf"}, ": {}/none.srdf: cannot be read as robot description: No such file"),
     "no such URDF": (
         {"urdf": "amr.urdf"},
         ".urdf: {}/amr.urdf: no such file; did you mean '{}/arm.urdf'?\n  try: docs/robots",
     ),
-    "no such example": ({"urdf": "example-robot-data:none.urdf"}, ".urdf: "),
-    "no such package": (
-        {"urdf": "package://none/arm.urdf"},
-        ".urdf: package://none/arm.urdf: no such file\n  try: docs/robots",
-    ),
     "a directory": ({"urdf": "."}, ".urdf: {}: is a directory"),
-    "a number": ({"urdf": "3"}, ".urdf: should be a valid string, got 3"),
     "unknown key": ({"udrf": "arm.urdf"}, ".udrf: unknown key; did you mean 'urdf'?"),
 }
 """What is wrong with the section of a robot, and how the message goes on after the key `robot`."""

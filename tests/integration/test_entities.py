@@ -58,12 +58,9 @@ def test_a_placed_ball_flies_on_from_its_new_position(robot: Robot) -> None:
     ("state", "code", "words"),
     [
         (entity_state(w=0.0), SetEntityState.Response.INVALID_POSE, "quaternion of norm 0"),
-        (entity_state(w=0.9), SetEntityState.Response.INVALID_POSE, "quaternion of norm 0.9"),
         (entity_state(w=float("nan")), SetEntityState.Response.INVALID_POSE, "quaternion of norm nan"),
-        (entity_state(z=float("nan")), SetEntityState.Response.INVALID_POSE, "nan"),
         (entity_state(z=1e9), SetEntityState.Response.INVALID_POSE, "within 1000 m of the world's origin"),
         (entity_state(vx=float("inf")), Result.RESULT_OPERATION_FAILED, "inf"),
-        (entity_state(vx=1e300), Result.RESULT_OPERATION_FAILED, "up to 1000 m/s"),
         (entity_state(frame="base_link"), SetEntityState.Response.INVALID_POSE, "no frame 'base_link'"),
     ],
 )

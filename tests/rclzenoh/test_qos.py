@@ -29,7 +29,6 @@ _SYSTEM_DEFAULT = QoSProfile(
         (qos.qos_profile_action_status_default, ":1:,1:,:,:,,"),
         (qos.qos_profile_rosout, ":1:,1000:,:10,0:,,"),
         (qos.qos_profile_parameters, "::,1000:,:,:,,"),
-        (qos.qos_profile_parameter_events, "::,1000:,:,:,,"),
         (QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT), "2::,1:,:,:,,"),
         (QoSProfile(depth=0, history=HistoryPolicy.KEEP_ALL), "::2,:,:,:,,"),
         (QoSProfile(depth=42), "::,:,:,:,,"),

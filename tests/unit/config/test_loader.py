@@ -41,7 +41,6 @@ def test_the_family_of_a_trajectory_may_be_left_out(write):
     ("content", "message"),
     [
         (b"", "run.yaml: the file is empty"),
-        (b"# only a comment\n", "run.yaml: the file is empty"),
         (b"- 1\n", "run.yaml: the file should hold keys and values"),
         (b"a: 1\nb: \xff\n", "run.yaml:2: should be UTF-8 text, got the byte 0xff"),
         (
@@ -85,7 +84,6 @@ def test_overrides_replace_values_of_the_file_and_earlier_overrides(write):
     ("override", "message"),
     [
         ("trials", "an override should be KEY=VALUE, got 'trials'"),
-        ("=3", "an override should be KEY=VALUE, got '=3'"),
         ("ball..mass_kg=3", "an override should be KEY=VALUE, got 'ball..mass_kg=3'"),
         (
             "ball.mass_kg=[",
@@ -93,11 +91,9 @@ def test_overrides_replace_values_of_the_file_and_earlier_overrides(write):
             "while parsing a flow node; got '['",
         ),
         ("ball.mass_kg=heavy", "ball.mass_kg: should be a valid number, got 'heavy'"),
-        ("ball.mas_kg=1", "ball.mas_kg: unknown key; did you mean 'mass_kg'?"),
         ("bal.mass_kg=1", "bal: unknown key; did you mean 'ball'?"),
         ("ball.mass_kg.x=1", "ball.mass_kg.x: nothing of this name can be set; got '1'"),
         ("record.topics.7=tf", "record.topics.7: nothing of this name can be set; got 'tf'"),
-        ("record.topics.last=tf", "record.topics.last: nothing of this name can be set; got 'tf'"),
     ],
 )
 def test_a_wrong_override_is_reported_without_a_line_of_the_file(problems_of, override, message):

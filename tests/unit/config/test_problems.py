@@ -14,28 +14,18 @@ from throwcollect.errors import ConfigError, PlanError, Problem
         ("trails: 3", ["trails: unknown key; did you mean 'trials'?"]),
         ("robot: {urdf: my.urdf}", ["robot.flange: missing"]),
         (
-            "containers: {sim: {options: {shm_siez: 1m}}}",
-            ["containers.sim.options.shm_siez: unknown key; did you mean"],
-        ),
-        (
             "task: {trajectory: {family: dmp, gamma: 1}}",
             ["task.trajectory.gamma: unknown key; known: family, basis_functions, weights, alpha_z, alpha_x and"],
         ),
         ("task: {end: {<<: 1}}", ["task.end.<<: Talos has no joint '<<'; known: arm_left_1_joint,"]),
         ("ball: {mass_kg: heavy}", ["ball.mass_kg: should be a valid number, got 'heavy'"]),
-        ("ball: {mass_kg: '1'}", ["ball.mass_kg: should be a valid number, got '1'"]),
         ("ball: {mass_kg: .nan}", ["ball.mass_kg: should be a finite number, got nan"]),
         ("ball: {mass_kg: 0}", ["ball.mass_kg: should be greater than 0, got 0"]),
-        ("ball: {radius_m: [1]}", ["ball.radius_m: should be a valid number, got a list"]),
         ("ball:", ["ball: should be keys and values, got nothing"]),
-        ("task: {end: [1]}", ["task.end: should be keys and values, got a list"]),
-        ("task: {trajectory: fast}", ["task.trajectory: should be keys and values, got 'fast'"]),
-        (f"seed: {'9' * 400}", ["seed: should be less than 4294967296, got 999"]),
         (
             "task: {trajectory: {family: dpm}}",
             ["task.trajectory.family: should be 'minimum_jerk', 'dmp' or 'file', got 'dpm'; did you mean 'dmp'?"],
         ),
-        ("tool: {name: gripper}", ["tool.name: should be 'spoon' or 'claw', got 'gripper'"]),
         (
             "robot: {locked: torso_1_joint}",
             ["robot.locked: should be 'auto' or 'none', got 'torso_1_joint'; or should be a valid list, got"],
@@ -45,21 +35,12 @@ from throwcollect.errors import ConfigError, PlanError, Problem
             ["record.topics.2: should be 'joint_states', 'ball/odometry', 'controller_state', 'tf' or 'clock', got"],
         ),
         (
-            "robot: {locked: [torso_2_joint, torso_3_joint]}",
-            ["robot.locked.1: Talos has no joint 'torso_3_joint'; did you mean 'torso_2_joint' or 'torso_1_joint'?"],
-        ),
-        (
             "task: {end: {arm_rihgt_4_joint: 1}}",
             ["task.end.arm_rihgt_4_joint: Talos has no joint 'arm_rihgt_4_joint'; did you mean 'arm_right_4_joint'?"],
         ),
-        ("sweep: {parameters: {ball.mass_kg: {max: 2}}}", ["sweep.parameters.ball.mass_kg.min: missing"]),
         (
             "trials: 1\nsweep: {parameters: {task.durations_s: {values: [1]}}}",
             ["sweep.parameters.task.durations_s: unknown key; did you mean 'task.duration_s'?"],
-        ),
-        (
-            "trials: 1\nsweep: {parameters: {ball.mass_kg: {min: -1, max: 1}}}",
-            ["sweep.parameters.ball.mass_kg.min: should be greater than 0, got -1.0"],
         ),
         (
             "sweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}",

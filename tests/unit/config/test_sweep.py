@@ -9,17 +9,12 @@ from throwcollect.config.loader import dump_yaml, load
     ("sweep", "messages"),
     [
         ("sim.physics_hz: {values: [500]}", ["sim.physics_hz: cannot vary from trial to trial"]),
-        ("task.duration_s: 1", ["task.duration_s: should be keys and values, got 1"]),
         ("task.duration_s: {min: 2, max: 1}", ["task.duration_s.min: should be at most max, 1.0, got 2.0"]),
         (
             "ball.drag_coefficient: {min: 0, max: 1, scale: log}",
             ["ball.drag_coefficient.min: should be above 0 on a logarithmic scale, got 0.0"],
         ),
         ("ball.friction: {values: [1, 3]}", ["ball.friction.values.1: should be less than or equal to 2, got 3.0"]),
-        (
-            "task.duration_s: {min: 1, max: 2, count: 2}",
-            ["task.duration_s.count: should be left out, as the sampler sobol has no grid"],
-        ),
     ],
 )
 def test_a_wrong_sweep_is_reported_with_its_line_key_and_expectation(problems_of, sweep, messages):
@@ -39,10 +34,6 @@ def test_a_wrong_sweep_is_reported_with_its_line_key_and_expectation(problems_of
         (
             "{sampler: grid, parameters: {ball.mass_kg: {min: 1, max: 2}}}",
             "sweep.parameters.ball.mass_kg.count: missing; the sampler grid should know how many points to take",
-        ),
-        (
-            "{sampler: grid, parameters: {ball.mass_kg: {min: 1, max: 2, count: 1}}}",
-            "sweep.parameters.ball.mass_kg.count: should be 2 or more, as both min and max are grid points",
         ),
     ],
 )
@@ -64,15 +55,10 @@ PARAMETERS = "parameters: {task.duration_s: {min: 1, max: 1.2}}"
     ("target", "message"),
     [
         ("{}", "distance_m: missing; at least one of distance_m, height_m and hit_angle_rad should be there"),
-        ("{distance_m: {min: -1, max: 2, bins: 4}}", "distance_m.min: should be 0 or more, got -1.0"),
         ("{distance_m: {min: 2, max: 1, bins: 4}}", "distance_m.min: should be below max, 1.0, got 2.0"),
         (
             "{hit_angle_rad: {min: 1, max: 70, bins: 4}}",
             "hit_angle_rad.max: should be from -1.5708 to 1.5708 rad, got 70.0",
-        ),
-        (
-            "{hit_angle_rad: {min: -2, max: 1, bins: 4}}",
-            "hit_angle_rad.min: should be from -1.5708 to 1.5708 rad, got -2.0",
         ),
         (
             "{height_m: {min: 0, max: 1, bins: 4}}",

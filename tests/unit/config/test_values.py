@@ -51,7 +51,6 @@ def test_with_values_accepts_numbers_of_numpy():
     ("values", "message"),
     [
         ({"ball.mas_kg": 1}, r"^ball\.mas_kg: unknown key; did you mean 'mass_kg'\?$"),
-        ({"task.end.head_1_joint": 1}, r"^task\.end\.head_1_joint: unknown key; "),
         (
             {"task.trajectory.weights.arm_right_4_joint.3": 1},
             r"^task\.[a-z_.0-9]+\.3: unknown key; known: 0, 1 and 2$",
@@ -59,7 +58,6 @@ def test_with_values_accepts_numbers_of_numpy():
         ({f"task.trajectory.weights.arm_right_4_joint.{'9' * 5000}": 1}, r"unknown key; known: 0, 1 and 2$"),
         ({"task.duration_s.x": 1}, r"^task\.duration_s\.x: unknown key; no keys are expected here$"),
         ({"ball.mass_kg": "1"}, r"^ball\.mass_kg: should be a valid number, got '1'$"),
-        ({"ball.mass_kg": -1}, r"^ball\.mass_kg: should be greater than 0, got -1$"),
         (
             {"task.trajectory.weights.arm_right_4_joint.1": float("nan")},
             r"^task\.trajectory\.weights\.arm_right_4_joint\.1: should be a finite number, got nan$",
@@ -102,11 +100,7 @@ def test_keys_that_may_vary_between_trials_can_be_swept(key):
         ),
         ("task.trajectory.family", "cannot be swept, as it is not a number"),
         ("task.points_hz", "cannot vary from trial to trial"),
-        ("task.recatch_gap_s", "cannot vary from trial to trial"),
         ("tool.mass_kg", "cannot vary from trial to trial"),
-        ("robot.base_height_m", "cannot vary from trial to trial"),
-        ("sim.physics_hz", "cannot vary from trial to trial"),
-        ("run.simulations", "cannot vary from trial to trial"),
         ("seed", "cannot vary from trial to trial"),
     ],
 )

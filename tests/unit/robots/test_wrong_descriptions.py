@@ -41,19 +41,11 @@ def test_the_unchanged_description_is_accepted(tmp_path: Path) -> None:
     ("kind", "old", "new", "said"),
     [
         ("urdf", '<mass value="2"/>', '<mass value="x"/>', "value of <mass> should be a finite number, is 'x'"),
-        ("urdf", 'ixx="0.000833"', 'ixx="nan"', "ixx of <inertia> should be a finite number, is 'nan'"),
         ("urdf", 'xyz="-0.5 0 0"', 'xyz="-0.5 0"', "xyz of <origin> should be 3 finite numbers, is '-0.5 0'"),
-        (
-            "urdf",
-            'lower="-2.5" upper="2.5"',
-            'lower="2.5" upper="-2.5"',
-            "joint shoulder_joint: lower should be at most",
-        ),
         ("srdf", 'value="0.0"', 'value="nan"', "group_state rest: the angle of shoulder_joint is not finite"),
         ("urdf", 'name="forearm_link"', 'name="upper_arm_link"', "link upper_arm_link is there twice"),
         ("urdf", '<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "joint shoulder_joint: its axis 0 0 0 has no direction"),
         ("urdf", '<parent link="base_link"/>', "", "joint shoulder_joint: <joint> without <parent>"),
-        ("urdf", '<mass value="2"/>', '<mass value="0"/>', "upper_arm_link, which shoulder_joint moves, has no mass"),
         ("urdf", "</robot>", "<xacro:if/></robot>", "not well-formed XML: unbound prefix"),
     ],
 )

@@ -242,7 +242,6 @@ TILED, BENT = np.tile(TIMES, 3), PATHS[..., 0].ravel()
     ("columns", "message"),
     [
         ({"arm_rihgt_2_joint_rad": BENT}, "arm_rihgt_2_joint_rad: Talos has no joint 'arm_rihgt_2_joint'; did you"),
-        ({"panda_joint1_rad": BENT}, "panda_joint1_rad: Talos has no joint 'panda_joint1'"),
         ({f"{ELBOW}_deg": BENT}, f"{ELBOW}_deg: should be {ELBOW}_rad, {ELBOW}_radps or {ELBOW}_radps2"),
         (
             {f"{ELBOW}_rad": None, **{f"{joint}_radps": BENT * 0 for joint in JOINTS}},
@@ -253,7 +252,6 @@ TILED, BENT = np.tile(TIMES, 3), PATHS[..., 0].ravel()
         ({"time_s": replaced(TILED, 30, 0.12)}, "motion 'b', point 5: time_s should rise, is 0.12 after 0.12"),
         ({"time_s": TILED + 1}, "motion 'a': should begin at time_s 0, begins at 1"),
         ({f"{ELBOW}_rad": replaced(BENT, 27, np.nan)}, f"motion 'b', point 2: {ELBOW}_rad should be a number, got nan"),
-        ({f"{ELBOW}_rad": ["far"] * len(BENT)}, f"{ELBOW}_rad: should be one column of numbers: "),
         ({"motion": ["a", "b"] * 39}, "the points of motion 'a' should follow each other"),
         ({"motion": np.arange(78)}, "motion '0': should have 2 points or more, has 1"),
         (
@@ -275,8 +273,6 @@ def test_numbers_that_are_no_motions_are_refused(columns: dict[str, Any], messag
         ("file: motion.csv", "", ":2: task.trajectory.file: there is no file .*; did you mean"),
         ("file: config.yaml", "", ":2: task.trajectory.file: should be a .csv, .parquet, "),
         ("file: motions.csv, motion: d", "", ":2: task.trajectory.motion: there is no motion d; the file has 3 mot"),
-        ("file: motions.csv, motion: 3", "", "task.trajectory.motion: there is no motion 3; the file has 3 motions: a"),
-        ("file: motions.csv, motion: 0.5", "", "task.trajectory.motion: .*multiple of 1"),
         ("file: motions.csv", "  duration_s: 2", "task.duration_s: should be left out, as the file of motions has t"),
         (
             "file: motions.csv",
@@ -287,12 +283,6 @@ def test_numbers_that_are_no_motions_are_refused(columns: dict[str, Any], messag
             "file: motions.csv",
             f"  start: {{{ELBOW}: -1.85, {WRIST}: 0}}",
             f"3 × task.start.{WRIST}: should be -0.1, the start of its",
-        ),
-        ("file: motions.csv", "  start: 3", "task.start: should be "),
-        (
-            "file: motions.csv",
-            "  end: {torso_1_joint: 0}",
-            f"task.end: should name only {ELBOW} and {WRIST}, as the file",
         ),
         ("file: motions.csv", "trials: 4", "trials: should be at most 3"),
         (

@@ -8,7 +8,6 @@ from throwcollect.runtimes.docker.watch import ContainerState
     ("state", "memory", "words"),
     [
         (ContainerState("exited", 3), None, "exit code 3"),
-        (ContainerState("exited", 0), None, "exit code 0"),
         (ContainerState("exited", 137), "512m", "ended by SIGKILL"),
         (ContainerState("exited", 139), None, "ended by SIGSEGV"),
         (ContainerState("exited", 137, out_of_memory=True), "512m", "ran out of memory (limit 512m)"),
@@ -16,7 +15,6 @@ from throwcollect.runtimes.docker.watch import ContainerState
         # Another process of the container ran out of memory.
         (ContainerState("exited", 5, out_of_memory=True), "512m", "exit code 5"),
         # The exit code of our commands after an interruption.
-        (ContainerState("exited", 130), None, "exit code 130"),
         (ContainerState("exited", 255), None, "exit code 255"),
         (ContainerState("removed"), None, "its container was removed"),
     ],
