@@ -14,7 +14,7 @@ from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
 
-TRIALS = 8
+TRIALS = 6
 KINOVA = """\
 name: kinova
 seed: 1

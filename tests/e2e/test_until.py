@@ -10,7 +10,7 @@ from tests.e2e.collection import INPROCESS, call, call_here, fingerprints, inter
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
-LANDED = 100
+LANDED = 40
 YAML = f"""\
 name: until
 until: {{landed: {LANDED}}}

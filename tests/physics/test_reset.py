@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 
-TRIALS = 12
+TRIALS = 8
 DEFAULT = Config()
 
 

@@ -12,7 +12,7 @@ GetParameters = get_service("rcl_interfaces/srv/GetParameters")
 String = get_message("std_msgs/msg/String")
 
 SESSIONS, PROCESSES, NODES = 40, 2, 3
-CUTS = 8
+CUTS = 5
 BUSY_S = 0.4
 """Time [s] after a cut in which messages and requests are sent: in most of it, sessions are reconnecting."""
 

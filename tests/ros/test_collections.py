@@ -104,7 +104,7 @@ def entries(running: Running, event: str) -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     directory = tmp_path_factory.mktemp("reference")
-    config = write_config(directory, trials=TRIALS)
+    config = write_config(directory, trials=TRIALS, sim=FAST)
     collect(config, directory / "data", 1, *INPROCESS, THROWCOLLECT_ROS="embedded")
     return fingerprints(directory / "data")
 
@@ -117,7 +117,7 @@ def beside(going_on: Running, tmp_path_factory: pytest.TempPathFactory) -> dict[
     """
     directory = tmp_path_factory.mktemp("beside")
     environment = {STATE_VARIABLE: str(directory / "state"), "THROWCOLLECT_ROS": "rclpy"}
-    config = write_config(directory, trials=TRIALS)
+    config = write_config(directory, trials=TRIALS, sim=FAST)
     collect(config, directory / "data", 1, "--set", f"run.domain_id={DOMAIN}", **environment)
     return fingerprints(directory / "data")
 
@@ -126,7 +126,7 @@ def test_a_killed_simulation_gives_up_its_trial_even_if_the_router_dies_too(
     reference: dict[str, str], records: Records, tmp_path: Path
 ) -> None:
     """A discovery server that comes back too soon is never told of the nodes that are there."""
-    config = write_config(tmp_path, trials=TRIALS)
+    config = write_config(tmp_path, trials=TRIALS, sim=FAST)
     running = start(config, tmp_path / "data", 2, "--set", "sim.real_time_factor=1")
 
     def under_way() -> set[int]:
