@@ -97,8 +97,10 @@ def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
             yield f"## `{key}`\n\n{child.node['description']}\n"
             yield from _write_sections(child, f"{key}.")
         else:
-            for item in (each for part in (0, "") for each in child.child(part).alternatives if each.keys):
-                yield f"### Items of `{key}`\n\n{item.node['description']}\n"
+            items = [each for part in (0, "") for each in child.child(part).alternatives if each.keys]
+            for item in items:
+                kind = f" with `{_find_discriminator(item)}`" if len(items) > 1 else ""
+                yield f"### Items of `{key}`{kind}\n\n{item.node['description']}\n"
                 yield _write_table(item, "")
 
 

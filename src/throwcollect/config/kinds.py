@@ -42,6 +42,11 @@ def complete_motions(*given: Any) -> Any:
     return import_own("throwcollect.tasks.motions:complete")(*given)
 
 
+def complete_body(section: Any) -> Any:
+    """Complete the section of a body whose shapes are in a file (see `throwcollect.robots.body_files.complete`)."""
+    return import_own("throwcollect.robots.body_files:complete")(section)
+
+
 def unknown_joint(name: str, robot: Any) -> str:
     """Make the sentence for a name that is no joint of a robot."""
     return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"

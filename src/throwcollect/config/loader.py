@@ -14,10 +14,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from throwcollect.config.document import Document, Plain
-from throwcollect.config.kinds import complete_motions, complete_robot
+from throwcollect.config.kinds import complete_body, complete_motions, complete_robot
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.problems import PARAMETERS, Location
 from throwcollect.config.robot_config import AnyRobot, DescribedRobotConfig, RobotConfig
+from throwcollect.config.scene import AnyBody, FileBodyConfig
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.section import Section
 from throwcollect.config.values import reason_not_sweepable, with_values
@@ -60,6 +61,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
         document.override(override, find_default=partial(_find_default, document.values))
     robot = _find_robot(document, path.parent)
     _find_motions(document, path.parent, robot)
+    _find_bodies(document, path.parent)
     config = document.validate(Config, context=robot)
     if wrong := [document.problem(*each) for each in _find_sweep_problems(config)]:
         raise ConfigError(wrong)
@@ -159,6 +161,21 @@ def _find_motions(document: Document, directory: Path, robot: Any) -> None:
         document.values["task"] = task | keys
 
 
+def _find_bodies(document: Document, directory: Path) -> None:
+    """Complete the sections of bodies whose shapes are in files, which may be relative to the directory."""
+    scene = document.values.get("scene")
+    bodies = scene.get("bodies") if isinstance(scene, dict) else {}
+    if not isinstance(bodies, dict):
+        return
+    for name, given in bodies.items():
+        with suppress(ValidationError):
+            section = _BodyOnly.model_validate({"body": given}, strict=True).body
+            if isinstance(section, FileBodyConfig):
+                section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
+                with _placing(document, f"scene.bodies.{name}.file"):
+                    bodies[name] = complete_body(section)
+
+
 def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> RobotConfig:
     """Read and complete the section `robot` of a file, or the one that overrides alone make.
 
@@ -176,6 +193,10 @@ def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> Robo
 
 class _RobotOnly(Section):
     robot: AnyRobot
+
+
+class _BodyOnly(Section):
+    body: AnyBody
 
 
 def _read_name(values: dict[str, Any], section: str) -> Any:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
+from typing_extensions import Self
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, match
@@ -15,6 +17,7 @@ BALL = "ball"
 """Name of the ball, as that of a body."""
 
 _Length = Annotated[float, Field(ge=0.001, le=20)]
+_Factor = Annotated[float, Field(ge=1e-6, le=1e6)]
 _Triple = Annotated[list[Annotated[float, Field(ge=-20, le=20)]], Field(min_length=3, max_length=3)]
 _Color = Annotated[str, match(r"#[0-9a-fA-F]{6}", "# and six hexadecimal digits, such as #8a6f4d")]
 BodyName = Annotated[str, match(r"[a-z][a-z0-9_]{0,31}", "up to 32 lower-case letters, digits and _, first a letter")]
@@ -43,8 +46,8 @@ class BodyConfig(Section):
     """A body of the scene."""
 
     position_m: Annotated[_Triple, Key(swept=True)] = [0.0, 0.0, 0.0]
-    """Position of its centre in world at the start: x, y, z. With `lies_on`, it counts from the place that follows from
-    that."""
+    """Position of its centre in world at the start, for shapes of a file that of their origin: x, y, z. With `lies_on`,
+    it counts from the place that follows from that."""
     lies_on: BodyName | None = None
     """Name of the body on the middle of which it lies at the start; the object may lie in the tool. Null for none."""
     velocity_mps: Annotated[_Triple, Key(swept=True)] = [0.0, 0.0, 0.0]
@@ -94,11 +97,51 @@ class SphereConfig(BodyConfig):
     """Radius."""
 
 
+class FileBodyConfig(BodyConfig):
+    """A body whose shapes are in a file, which a dataset carries."""
+
+    suffix: ClassVar[str]
+
+    file: Annotated[str, Key(Effect.RUN, swept=False, operator=True)]
+    """The file; a relative path starts at the directory of the configuration file."""
+    sha256: str | None = None
+    """Digest of what the file describes; it is written with a dataset."""
+
+    def in_directory(self, directory: Path) -> Self:
+        """Make a section whose file is the one that a dataset has in a directory, once its digest is known."""
+        place = {} if self.sha256 is None else {"file": str(directory / f"{self.sha256[:16]}{self.suffix}")}
+        return self.model_copy(update=place)
+
+
+class MeshConfig(FileBodyConfig):
+    """The convex hull of a mesh in an STL, OBJ or COLLADA file, as which it collides; pictures show the mesh itself."""
+
+    suffix = ".stl"
+
+    shape: Literal["mesh"]
+    """Shape of the body."""
+    scale: Annotated[list[_Factor], Field(min_length=3, max_length=3), Key(swept=True)] = [1.0, 1.0, 1.0]
+    """Factors on the coordinates x, y, z of the file, which are then in m; of a file in mm, 0.001."""
+
+
+class UrdfConfig(FileBodyConfig):
+    """The one rigid body of a URDF, whose joints have to be fixed.
+
+    Its collision shapes count, also in pictures. Its mass is `mass_kg`; those of the URDF say how it is spread, and
+    without any it is spread evenly. By default, its color is that of the URDF.
+    """
+
+    suffix = ".urdf"
+
+    shape: Literal["urdf"]
+    """Shape of the body."""
+
+
 if TYPE_CHECKING:
-    AnyBody = BoxConfig | CylinderConfig | SphereConfig
+    AnyBody = BoxConfig | CylinderConfig | SphereConfig | MeshConfig | UrdfConfig
 else:
     AnyBody = any_of(
-        {"box": BoxConfig, "cylinder": CylinderConfig, "sphere": SphereConfig},
+        {"box": BoxConfig, "cylinder": CylinderConfig, "sphere": SphereConfig, "mesh": MeshConfig, "urdf": UrdfConfig},
         lambda value: value.get("shape", "box") if isinstance(value, dict) else None,
     )
 

@@ -21,7 +21,7 @@ from throwcollect.config.kinds import ContradictionError, Name, unknown_joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile
 from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
-from throwcollect.config.scene import BALL, AnyBody, BallConfig, BodyName, SceneConfig
+from throwcollect.config.scene import BALL, AnyBody, BallConfig, BodyName, FileBodyConfig, SceneConfig
 from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
 from throwcollect.config.task_config import TaskConfig, UntilConfig
@@ -86,8 +86,8 @@ else:
     AnyTask = _make_section_type("tasks")
     AnyUntil = _make_until_type()
 
-MOTIONS = "motions.parquet"
-"""Name of the file of motions in a dataset."""
+MOTIONS, BODIES = "motions.parquet", "bodies"
+"""Names in a dataset of the file of motions, and of the directory with the shapes of bodies."""
 SLOWEST, FASTEST = 0.001, 1000
 """Bounds of real-time factors: with slower ones, one step of the physics sleeps for minutes or overflows the clock."""
 _BETWEEN_TRIALS_S = 10
@@ -222,9 +222,10 @@ class Config(Section):
     def _find_wrong_bodies(self) -> Iterator[tuple[str, str]]:
         bodies, acted_on = self.bodies, self.acted_on
         if acted_on != BALL:
-            if acted_on not in bodies or bodies[acted_on].mass_kg is None:
-                movable = [name for name, body in bodies.items() if body.mass_kg is not None]
-                yield "object", f"should be a body with a mass_kg, {join_names(movable) or 'none'}, got {acted_on}"
+            movable = [name for name, body in bodies.items() if body.mass_kg and not isinstance(body, FileBodyConfig)]
+            if acted_on not in movable:
+                kind = "box, cylinder or sphere with a mass_kg"
+                yield "object", f"should be a {kind}, {join_names(movable) or 'none'}, got {acted_on}"
             if self.ball != BallConfig():
                 yield "ball", f"should be left out, as the robot acts on {acted_on}"
         for name, body in bodies.items():
@@ -259,7 +260,7 @@ class Config(Section):
 
     def without_run(self) -> Config:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""
-        return self.with_motions_in(Path(MOTIONS)).model_copy(
+        return self.with_files_in(Path()).model_copy(
             update={
                 "run": RunConfig(),
                 "containers": ContainersConfig(),
@@ -268,13 +269,18 @@ class Config(Section):
             }
         )
 
-    def with_motions_in(self, file: Path) -> Config:
-        """Make a copy of this configuration whose motions, if it has them from a file, are in a dataset's file."""
-        if not isinstance(self.task.trajectory, MotionFile):
-            return self
-        place: dict[str, Any] = {"file": str(file), "joints": [], "rate_hz": None}
-        motions = self.task.trajectory.model_copy(update=place)
-        return self.model_copy(update={"task": self.task.model_copy(update={"trajectory": motions})})
+    def with_files_in(self, directory: Path) -> Config:
+        """Make a copy of this configuration whose motions and bodies, if they are in files, are those of a dataset."""
+        changes: dict[str, Any] = {}
+        if isinstance(self.task.trajectory, MotionFile):
+            place: dict[str, Any] = {"file": str(directory / MOTIONS), "joints": [], "rate_hz": None}
+            motions = self.task.trajectory.model_copy(update=place)
+            changes["task"] = self.task.model_copy(update={"trajectory": motions})
+        bodies = {name: body for name, body in self.scene.bodies.items() if isinstance(body, FileBodyConfig)}
+        if bodies:
+            placed = {name: body.in_directory(directory / BODIES) for name, body in bodies.items()}
+            changes["scene"] = self.scene.model_copy(update={"bodies": {**self.scene.bodies, **placed}})
+        return self.model_copy(update=changes) if changes else self
 
     def run_as(self, other: Config) -> Config:
         """Make a copy of this configuration that takes all keys that do not change the dataset from another one."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import ValidationError
 
@@ -94,7 +94,10 @@ def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
 
 @cache
 def list_operator_keys() -> tuple[str, ...]:
-    """List the dotted keys that only the operator of a server sets, without those that lie below another of them."""
+    """List the dotted keys that only the operator of a server sets, without those that lie below another of them.
+
+    A `*` in the place of a name stands for any.
+    """
     return tuple(_find_operator_keys(Config))
 
 
@@ -136,12 +139,16 @@ def _find_operator_keys(section: type[Section]) -> Iterator[str]:
         if key_of_field(section, name).operator:
             yield name
             continue
-        # Sections of members may have the same key.
-        sections = [
-            each for each in list_kinds(field.annotation) if isinstance(each, type) and issubclass(each, Section)
-        ]
-        inner = dict.fromkeys(key for each in sections for key in _find_operator_keys(each))
-        yield from (f"{name}.{key}" for key in inner)
+        # Sections of members may have the same key. In a mapping, any name may have such a section.
+        kinds = dict.fromkeys(list_kinds(field.annotation), "")
+        for kind in [each for each in kinds if get_origin(each) is dict]:
+            kinds |= dict.fromkeys(list_kinds(get_args(kind)[1]), "*.")
+        sections = {
+            each: above for each, above in kinds.items() if isinstance(each, type) and issubclass(each, Section)
+        }
+        yield from dict.fromkeys(
+            f"{name}.{above}{key}" for each, above in sections.items() for key in _find_operator_keys(each)
+        )
 
 
 def _list_leaves(value: Any, location: Location, key: Key) -> Iterator[Leaf]:

@@ -1,4 +1,4 @@
-"""Copies the files of a described robot, and motions, into the directory of a dataset, which needs no other files."""
+"""Copies the files of a described robot, motions, and shapes of bodies into a dataset, which needs no other files."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from pathlib import Path
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.robot_config import DescribedRobotConfig
-from throwcollect.config.schema import MOTIONS, Config
+from throwcollect.config.scene import FileBodyConfig
+from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.directory import CONFIG, ROBOT
 from throwcollect.files import write_file
+from throwcollect.robots.body_files import files_of
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.imported import SRDF, URDF, list_files
 from throwcollect.sweep.parquet_file import encode_table
@@ -22,14 +24,14 @@ from throwcollect.tasks.motions import motions_of
 
 
 def write_config(directory: Path, config: Config) -> None:
-    """Write the configuration of a dataset, and next to it the files of its robot and its motions."""
+    """Write the configuration of a dataset, and next to it the files that it names."""
     carry_robot(config, directory)
     write_file(directory / CONFIG, config_text(config).encode())
 
 
 def config_text(config: Config) -> str:
-    """Write the text of a configuration as a dataset has it, which carries the files of its robot and its motions."""
-    return dump_yaml(_place_robot(config, Path(ROBOT)).with_motions_in(Path(MOTIONS)))
+    """Write the text of a configuration as a dataset has it, which carries the files that it names."""
+    return dump_yaml(_place_robot(config, Path(ROBOT)).with_files_in(Path()))
 
 
 def _place_robot(config: Config, directory: Path) -> Config:
@@ -42,13 +44,20 @@ def _place_robot(config: Config, directory: Path) -> Config:
 
 
 def carry_robot(config: Config, directory: Path) -> Config:
-    """Copy robot and motions into the directory of a dataset; return the configuration that names their files there."""
+    """Copy robot, motions and bodies into the directory of a dataset; return the configuration of the copies."""
     if (source := find_files(config)) is not None:
         copy_robot(source, directory)
     family, target = config.task.trajectory, directory / MOTIONS
     if isinstance(family, MotionFile) and family.file not in (MOTIONS, str(target.absolute())):
         write_file(target, _encode_motions(family, config))
-    return _place_robot(config, directory / ROBOT).with_motions_in(target)
+    placed = _place_robot(config, directory / ROBOT).with_files_in(directory)
+    for name, body in config.scene.bodies.items():
+        # A relative file is that of a dataset already.
+        if isinstance(body, FileBodyConfig) and Path(body.file).is_absolute() and body != placed.scene.bodies[name]:
+            (directory / BODIES).mkdir(exist_ok=True)
+            for file, content in files_of(body).items():
+                write_file(directory / BODIES / file, content)
+    return placed
 
 
 def _encode_motions(family: MotionFile, config: Config) -> bytes:
@@ -77,11 +86,14 @@ def find_files(config: Config) -> Path | None:
 
 
 def pack_robot(config: Config) -> str:
-    """Write the files of a robot and of motions as a text, a zip archive in base64; it is empty if there are none."""
+    """Write all files that a dataset carries as a text, a zip archive in base64; it is empty if there are none."""
     source = find_files(config)
     files = {f"{ROBOT}/{path.name}": path.read_bytes() for path in (list_files(source) if source else ())}
     if isinstance(family := config.task.trajectory, MotionFile):
         files[MOTIONS] = _encode_motions(family, config)
+    for body in config.scene.bodies.values():
+        if isinstance(body, FileBodyConfig):
+            files |= {f"{BODIES}/{name}": content for name, content in files_of(body).items()}
     packed = io.BytesIO()
     if files:
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
@@ -97,7 +109,18 @@ def unpack_robot(text: str, directory: Path) -> None:
             archive.extractall(directory)
 
 
+def copy_carried(source: Path, directory: Path) -> None:
+    """Copy the files of robot and bodies from the directory of a dataset into another one."""
+    for name in list_carried(source):
+        (directory / name).parent.mkdir(exist_ok=True)
+        shutil.copyfile(source / name, directory / name)
+
+
 def list_carried(directory: Path) -> list[str]:
-    """List the files of the robot in a dataset, by their names there."""
-    robot = directory / ROBOT
-    return [f"{ROBOT}/{path.name}" for path in list_files(robot)] if robot.is_dir() else []
+    """List the files of robot and bodies in a dataset, by their names there."""
+    return [
+        f"{place}/{path.name}"
+        for place in (ROBOT, BODIES)
+        if (directory / place).is_dir()
+        for path in list_files(directory / place)
+    ]

@@ -6,7 +6,7 @@ import shutil
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from throwcollect.config.schema import MOTIONS, Config
+from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.bag import MOST_FILES
 from throwcollect.dataset.carried_robot import write_config
 from throwcollect.dataset.directory import CONFIG, PLAN, ROBOT, TRIALS
@@ -74,7 +74,8 @@ def remove_plan(directory: Path, *, made: bool) -> None:
     with suppress(OSError):
         for name in (CONFIG, PLAN, TRIALS, MOTIONS):
             (directory / name).unlink(missing_ok=True)
-        shutil.rmtree(directory / ROBOT, ignore_errors=True)
+        for name in (ROBOT, BODIES):
+            shutil.rmtree(directory / name, ignore_errors=True)
         if made:
             directory.rmdir()
 

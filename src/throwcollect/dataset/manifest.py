@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from throwcollect.config.schema import MOTIONS
+from throwcollect.config.schema import BODIES, MOTIONS
 from throwcollect.dataset.carried_robot import list_carried
 from throwcollect.dataset.directory import (
     CONFIG,
@@ -41,8 +41,8 @@ _PROFILE = "data-package"
 _HASH = "sha256:"
 DESCRIBING = (CONFIG, PLAN, TRIALS, MOTIONS, SOURCES, THROWS)
 """Files beside the recordings and ``metadata.yaml`` that the manifest has, as far as a dataset has them."""
-_NAME = re.compile(rf"(?:{ROBOT}/)?[A-Za-z0-9][A-Za-z0-9_.-]*")
-"""A file name without directories but that of the robot, so that no manifest can name a file outside of the dataset."""
+_NAME = re.compile(rf"(?:(?:{ROBOT}|{BODIES})/)?[A-Za-z0-9][A-Za-z0-9_.-]*")
+"""A file name without directories but those two, so that no manifest can name a file outside of the dataset."""
 _MOST_BYTES = 100_000_000
 _BLOCK = 1 << 20
 

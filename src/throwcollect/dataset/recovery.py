@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.schema import MOTIONS, Config
+from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -88,6 +88,8 @@ def remove_unfinished(directory: Path) -> None:
     """Remove half-written files that a killed process left beside the recordings; the files themselves stay."""
     for name in (CONFIG, PLAN, TRIALS, MOTIONS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
         remove(directory / f"{name}.new")
+    for path in (directory / BODIES).glob("*.new"):
+        remove(path)
 
 
 def find_left(

@@ -16,7 +16,8 @@ import pyarrow as pa
 
 from throwcollect.config.loader import load
 from throwcollect.config.motion import MotionFile
-from throwcollect.config.schema import MOTIONS, Config
+from throwcollect.config.scene import FileBodyConfig
+from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.bag import read_bag_metadata, refuse_other_directory
 from throwcollect.dataset.directory import (
     CARD,
@@ -40,6 +41,7 @@ from throwcollect.dataset.verify_recording import RecordingReport, check_recordi
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import read_text
 from throwcollect.progress_log import log_progress
+from throwcollect.robots.body_files import files_of
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.robots.description import robot_of
 from throwcollect.side_by_side import working_side_by_side
@@ -137,6 +139,10 @@ def _read_tables(directory: Path) -> _Tables:
         if isinstance(family := config.task.trajectory, MotionFile):
             file = MOTIONS
             motions_of(family, robot_of(config))
+        for body in config.scene.bodies.values():
+            if isinstance(body, FileBodyConfig):
+                file = f"{BODIES}/{Path(body.file).name}"
+                files_of(body)
         if config.sweep.file == TRIALS:
             file = TRIALS
             read_list(directory, plan)

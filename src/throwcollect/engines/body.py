@@ -116,6 +116,14 @@ class LinkInertia:
         """The moments about the axes x, y, z [kg m²]."""
         return [self.moments_kgm2[number] for number, (row, column) in enumerate(INERTIA.values()) if row == column]
 
+    @property
+    def is_centred(self) -> bool:
+        """Whether the frame of the link is that of its centre of mass and of its principal axes."""
+        off_diagonal = (
+            self.moments_kgm2[number] for number, (row, column) in enumerate(INERTIA.values()) if row != column
+        )
+        return self.placement == HERE and not any(off_diagonal)
+
 
 @dataclass(frozen=True)
 class BodyLink:
@@ -124,6 +132,12 @@ class BodyLink:
     name: str
     inertia: LinkInertia | None = None
     shapes: tuple[LinkShape, ...] = ()
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is one box, cylinder, sphere or capsule around its origin."""
+        plain = [shape.mesh is None and shape.placement == HERE for shape in self.shapes] == [True]
+        return plain and (self.inertia is None or self.inertia.is_centred)
 
 
 @dataclass(frozen=True)

@@ -40,9 +40,9 @@ class BodyState:
     """A body at one instant.
 
     Attributes:
-        position: Its origin in world [m]; that of a body of the scene is its centre.
+        position: Its origin in world [m]; that of a box, cylinder or sphere is its centre.
         orientation_xyzw: Unit quaternion, body to world.
-        linear_velocity: In world [m/s].
+        linear_velocity: Of the origin, in world [m/s].
         angular_velocity: In world [rad/s].
     """
 
@@ -330,6 +330,11 @@ def body_of(numbers: Sample) -> BodyState:
     """Read a body from its numbers in a sample."""
     x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz = numbers
     return BodyState((x, y, z), (qx, qy, qz, qw), (vx, vy, vz), (wx, wy, wz))
+
+
+def to_numbers(body: BodyState) -> Sample:
+    """Write a body as its numbers in a sample."""
+    return (*body.position, *body.orientation_xyzw, *body.linear_velocity, *body.angular_velocity)
 
 
 def split_bodies(sample: Sample, joints: int) -> list[Sample]:

@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.config.schema import MOTIONS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
@@ -76,7 +75,7 @@ def write(source: ExportSource, directory: Path) -> None:
         data = file.create_group("data")
         data.attrs["total"] = sum(map(source.count_samples, source.throws))
         data.attrs["env_args"] = json.dumps({"env_name": config.name, "type": _GYM, "env_kwargs": {}})
-        placed = config.with_motions_in(Path(MOTIONS)).model_copy(update={"robot": config.robot.without_place()})
+        placed = config.with_files_in(Path()).model_copy(update={"robot": config.robot.without_place()})
         file.attrs["config"] = placed.model_dump_json()
         succeeded = []
         for throw in source.read(source.throws):

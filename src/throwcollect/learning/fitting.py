@@ -13,7 +13,7 @@ from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.values import column_of, leaves
-from throwcollect.dataset.carried_robot import config_text, find_files
+from throwcollect.dataset.carried_robot import config_text
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
 from throwcollect.errors import ConfigError, DatasetError
@@ -95,7 +95,7 @@ def fit(
         adaptation=None,
         points=_tabulate(throws, learned),
         config=config_text(config),
-        robot=find_files(config),
+        source=dataset.directory,
     )
 
 

@@ -12,8 +12,8 @@ from pydantic import Field, ValidationError
 
 from throwcollect.arguments import check_bounds, read_word, refuse_argument
 from throwcollect.config.task_config import LARGEST_TARGET
-from throwcollect.dataset.carried_robot import copy_robot
-from throwcollect.dataset.directory import ROBOT, has_files
+from throwcollect.dataset.carried_robot import copy_carried
+from throwcollect.dataset.directory import has_files
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
@@ -50,12 +50,12 @@ class Model(ModelFile):
     Attributes:
         points: Arrow table of the throws that it was learned from: ``trial``, inputs, ends, effort; a file of its own.
         config: YAML of the dataset's configuration; a file of its own.
-        robot: Directory with the files of the dataset's robot, which are copied; None if it is an installed one.
+        source: Directory with the files that the configuration names, of the dataset or of a model; they are copied.
     """
 
     points: Any = Field(default=None, exclude=True)
     config: str = Field(default="", exclude=True)
-    robot: Path | None = Field(default=None, exclude=True)
+    source: Path | None = Field(default=None, exclude=True)
 
     def __repr__(self) -> str:
         trained = self.trained_on
@@ -260,8 +260,8 @@ class Model(ModelFile):
             write_file(beside / POINTS, encode_table(self.points))
             write_file(beside / CONFIG, self.config.encode())
             write_file(beside / CARD, describe_model(self, None).encode())
-            if self.robot is not None:
-                copy_robot(self.robot, beside)
+            if self.source is not None:
+                copy_carried(self.source, beside)
             if onnx is not None:
                 write_file(beside / ONNX, onnx)
 
@@ -316,9 +316,7 @@ def load_model(directory: StrPath) -> Model:
         expected = ", ".join(sorted(names))
         raise DatasetError("does not have the columns of this model", path=directory / POINTS, expected=expected)
     config = read_text(directory / CONFIG, most_bytes=_MOST_BYTES)
-    robot = directory / ROBOT
-    files = {"points": points, "config": config, "robot": robot if robot.is_dir() else None}
-    return model.model_copy(update=files)
+    return model.model_copy(update={"points": points, "config": config, "source": directory})
 
 
 def read_score(directory: Path) -> Score | None:

@@ -6,6 +6,7 @@ import copy
 import hashlib
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -78,24 +79,7 @@ class Cleaning:
         return name
 
     def _find_mesh(self, filename: str) -> Path:
-        if filename.startswith(PACKAGE):
-            package, _, rest = filename.removeprefix(PACKAGE).lstrip("/").partition("/")
-            places = [Path(given) for name, given in self._section.packages.items() if name == package]
-            # A package is a directory of its name, mostly one of those that the URDF lies in.
-            places += [above / package for above in self._path.resolve().parents]
-            places += [above for above in self._path.resolve().parents if above.name == package]
-            places += list_shares(package)
-            # The meshes of an imported robot lie in the directory of its URDF.
-            found = next((place / rest for place in places if (place / rest).is_file()), self._path.parent / rest)
-            missing = f"not found; robot.packages takes the directory of {package}"
-        else:
-            found = locate_mesh(filename, self._path.parent, self._path.parent)
-            missing = f"there is no file {found}"
-        if not found.is_file():
-            raise ConfigError(f"{filename}: {missing}")
-        if (size := found.stat().st_size) > _MOST_MESH_BYTES:
-            most = f"at most {_MOST_MESH_BYTES // 10**6} MB, which is a million triangles of STL"
-            raise ConfigError(f"{found}: should have {most}, has {size // 10**6} MB")
+        found = find_mesh(filename, self._path, self._section.packages)
         self.sources.add(found)
         return found
 
@@ -301,3 +285,30 @@ class Cleaning:
     @property
     def _moving(self) -> set[str]:
         return {name for names in self.controllers.values() for name in names}
+
+
+def find_mesh(filename: str, urdf: Path, packages: Mapping[str, str] | None = None) -> Path:
+    """Find the mesh that a URDF names; packages lie in given directories, above it, or in ROS.
+
+    Raises:
+        ConfigError: If there is no such file, or it is too large.
+    """
+    if filename.startswith(PACKAGE):
+        package, _, rest = filename.removeprefix(PACKAGE).lstrip("/").partition("/")
+        places = [Path(given) for name, given in (packages or {}).items() if name == package]
+        # A package is a directory of its name, mostly one of those that the URDF lies in.
+        places += [above / package for above in urdf.resolve().parents]
+        places += [above for above in urdf.resolve().parents if above.name == package]
+        places += list_shares(package)
+        # The meshes of an imported robot lie in the directory of its URDF.
+        found = next((place / rest for place in places if (place / rest).is_file()), urdf.parent / rest)
+        missing = "not found" if packages is None else f"not found; robot.packages takes the directory of {package}"
+    else:
+        found = locate_mesh(filename, urdf.parent, urdf.parent)
+        missing = f"there is no file {found}"
+    if not found.is_file():
+        raise ConfigError(f"{filename}: {missing}")
+    if (size := found.stat().st_size) > _MOST_MESH_BYTES:
+        most = f"at most {_MOST_MESH_BYTES // 10**6} MB, which is a million triangles of STL"
+        raise ConfigError(f"{found}: should have {most}, has {size // 10**6} MB")
+    return found

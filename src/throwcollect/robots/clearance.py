@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from throwcollect.tools.tool import Tool
 MARGIN_M = 0.002
 """Least distance between links. On a path between two checked postures, which are 0.02 rad apart, the spoon, 1 m from
 the torso's axis, could cut by this much into a body as curved as the head."""
+_TOUCHING_M = 1e-3
+"""Bodies that touch may reach into each other by this much."""
 _SHORT_CHAIN = 2
 """Links with at most this many joints between them are always close to each other."""
 
@@ -165,6 +168,26 @@ class Clearance:
             self._links.append(body.link.name)
             for other in robot:
                 self.geometry.addCollisionPair(pinocchio.CollisionPair(other, added))
+
+
+@lru_cache(maxsize=8)
+def find_overlap(bodies: tuple[SceneBody, ...]) -> str | None:
+    """Explain which two bodies, of which one moves, overlap; None if none do."""
+    solids = [(body, solid) for body in bodies for solid in _make_objects(body)]
+    request, result = pinocchio.coal.DistanceRequest(), pinocchio.coal.DistanceResult()
+    for (one, solid), (other, beside) in combinations(solids, 2):
+        if one is not other and (one.moves or other.moves):
+            result.clear()
+            if (depth_m := -pinocchio.coal.distance(solid, beside, request, result)) > _TOUCHING_M:
+                return f"{one.link.name} and {other.link.name} overlap by {depth_m * 1000:.3g} mm at the start"
+    return None
+
+
+def _make_objects(body: SceneBody) -> Iterator[pinocchio.coal.CollisionObject]:
+    for shape in body.link.shapes:
+        pose = pose_of(body.placement) * pose_of(shape.placement)
+        solid = _make_solid(f"scene.bodies.{body.link.name}", shape)
+        yield pinocchio.coal.CollisionObject(solid, pinocchio.coal.Transform3s(pose.rotation, pose.translation))
 
 
 @lru_cache(maxsize=4)

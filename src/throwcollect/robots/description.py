@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import (
-    INERTIA,
     BodyJoint,
     BodyLink,
     BodyModel,
-    LinkInertia,
     LinkShape,
     to_text,
 )
@@ -24,7 +22,7 @@ from throwcollect.errors import ConfigError, MemberError, Problem
 from throwcollect.extras import MissingExtraError, is_installed
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.described import find_robot
-from throwcollect.robots.joint_model import joint_model, lock_joints, mount_of, placement_of, pose_of
+from throwcollect.robots.joint_model import describe_inertia, joint_model, lock_joints, mount_of, placement_of, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool, tool_of
 
@@ -133,7 +131,7 @@ def physics_description(config: Config) -> Description:
     joints = [source.joints[name] for name in model.names[1:]]
     names = [source.model.links[0].name, *(joint.child for joint in joints)]
     links = [
-        BodyLink(name, _inertia_of(model.inertias[number]), _collect_shapes(robot, model, number))
+        BodyLink(name, describe_inertia(model.inertias[number]), _collect_shapes(robot, model, number))
         for number, name in enumerate(names)
     ]
     merged = [
@@ -178,9 +176,4 @@ def _hold(tool: Tool, hand: str, mount: pinocchio.SE3) -> tuple[BodyLink, BodyJo
     """Describe a tool, and the joint that fixes it to a link."""
     boxes = tuple(LinkShape("box", box.size, placement_of(box.placement)) for box in tool.boxes)
     joint = BodyJoint(f"{tool.name}_joint", "fixed", hand, tool.link, placement_of(mount))
-    return BodyLink(tool.link, _inertia_of(tool.inertia), boxes), joint
-
-
-def _inertia_of(body: pinocchio.Inertia) -> LinkInertia:
-    moments = tuple(float(body.inertia[place]) for place in INERTIA.values())
-    return LinkInertia(float(body.mass), placement_of(pinocchio.SE3(np.eye(3), body.lever)), moments)
+    return BodyLink(tool.link, describe_inertia(tool.inertia), boxes), joint

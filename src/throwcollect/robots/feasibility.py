@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.engines.body import Placement
+from throwcollect.engines.engine import SceneBody
 from throwcollect.pinocchio_library import pinocchio
-from throwcollect.robots.clearance import MARGIN_M, Clearance
+from throwcollect.robots.clearance import MARGIN_M, Clearance, find_overlap
 from throwcollect.robots.description import (
     check_names,
     find_locked_joints,
@@ -68,8 +71,7 @@ class Feasibility:
         self._tool_config, self._tool = config.tool.without_release(), tool_of(config)
         check_names(config, self._robot, self._tool)
         self._clearance = Clearance(self._robot, self._model, self._tool)
-        self._key_of_around: object = None
-        self._around: Clearance | None = None
+        self._around: dict[tuple[tuple[SceneBody, ...], float], Clearance] = {}
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
         """Explain why the robot cannot do a trial with a trajectory.
@@ -98,7 +100,10 @@ class Feasibility:
         positions = motion[0]
         rows = _choose_rows(positions)
         way = self._model_order(positions[rows])
-        around = self._find_around(config, tool)
+        bodies = bodies_of(config)
+        if overlap := self._find_overlap(config, tool, bodies, way[:1]):
+            return overlap
+        around = self._find_around(config, tool, bodies)
         if approach := self._clearance.first_approach(way) or (around and around.first_approach(way)):
             return (
                 f"{' and '.join(approach.links)} {_describe_gap(approach.distance_m)} "
@@ -183,18 +188,35 @@ class Feasibility:
         if config.tool.without_release() != self._tool_config:
             self._tool_config, self._tool = config.tool.without_release(), tool_of(config)
             self._clearance = Clearance(self._robot, self._model, self._tool)
-            self._key_of_around = None
+            self._around.clear()
         return self._tool
 
-    def _find_around(self, config: Config, tool: Tool) -> Clearance | None:
-        """Return what checks the robot against the bodies of a trial's scene; None if there are none."""
-        bodies, height = bodies_of(config), config.robot.base_height_m
-        if not bodies:
-            return None
-        if (bodies, height) != self._key_of_around:
-            self._around = Clearance(self._robot, self._model, tool, bodies=bodies, base_height_m=height)
-            self._key_of_around = bodies, height
-        return self._around
+    def _find_overlap(
+        self, config: Config, tool: Tool, bodies: tuple[SceneBody, ...], start: NDArray[np.float64]
+    ) -> str | None:
+        """Explain what the object or a body that moves overlaps at the start; None if nothing."""
+        thing = object_of(config)
+        if starts_in_tool(config):
+            pinocchio.forwardKinematics(self._model, self._data, start[0])
+            hand = self._data.oMi[self._hand] * self._hand_placement * mount_of(self._robot, tool)
+            x, y, z = hand.act(np.array(tool.ball_seat(thing.radius_m))).tolist()
+            thing = replace(thing, placement=Placement((x, y, z + config.robot.base_height_m)))
+        elif beside := self._find_around(config, tool, (thing,)):
+            # Later, the robot may touch the object.
+            approach = beside.first_approach(start)
+            if approach is not None and approach.distance_m < 0:
+                return f"{' and '.join(approach.links)} overlap at the start"
+        return find_overlap((thing, *bodies))
+
+    def _find_around(self, config: Config, tool: Tool, bodies: tuple[SceneBody, ...]) -> Clearance | None:
+        """Return what checks the robot against bodies of a trial's scene; None if there are none."""
+        height = config.robot.base_height_m
+        if bodies and (bodies, height) not in self._around:
+            if len(self._around) > 1:
+                self._around.clear()
+            made = Clearance(self._robot, self._model, tool, bodies=bodies, base_height_m=height)
+            self._around[bodies, height] = made
+        return self._around.get((bodies, height))
 
     def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Put values of joints, along the last axis, into the order of the model."""

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from throwcollect.engines.body import HERE, BodyJoint, Placement
+from throwcollect.engines.body import HERE, INERTIA, BodyJoint, LinkInertia, Placement
 from throwcollect.errors import ConfigError
 from throwcollect.native_reading import reading_natively
 from throwcollect.pinocchio_library import pinocchio
@@ -44,10 +44,11 @@ def _check_inertias(robot: Robot, model: pinocchio.Model) -> None:
         where = f"{robot.urdf_path}: link {robot.description.joints[joint].child}, which {joint} moves,"
         if body.mass <= 0:
             raise ConfigError(f"{where} has no mass", hint="give it an <inertial> with <mass> and <inertia> in a copy")
-        _check_moments(where, body)
+        check_moments(where, body)
 
 
-def _check_moments(where: str, body: pinocchio.Inertia) -> None:
+def check_moments(where: str, body: pinocchio.Inertia) -> None:
+    """Make sure that a body can have these moments of inertia."""
     least, middle, most = np.linalg.eigvalsh(body.inertia)
     if least <= 0 or least + middle < most * (1 - _ROUNDING):
         raise ConfigError(
@@ -91,3 +92,9 @@ def pose_of(placement: Placement) -> pinocchio.SE3:
 def placement_of(pose: pinocchio.SE3) -> Placement:
     """Convert a pose into a placement of a URDF."""
     return Placement(tuple(pose.translation.tolist()), tuple(pinocchio.rpy.matrixToRpy(pose.rotation).tolist()))
+
+
+def describe_inertia(body: pinocchio.Inertia) -> LinkInertia:
+    """Convert an inertia, whose axes stay those of its frame."""
+    moments = tuple(float(body.inertia[place]) for place in INERTIA.values())
+    return LinkInertia(float(body.mass), placement_of(pinocchio.SE3(np.eye(3), body.lever)), moments)

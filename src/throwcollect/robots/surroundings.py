@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.scene import BALL, AnyBody, BoxConfig, CylinderConfig, SphereConfig
+from throwcollect.config.scene import BALL, AnyBody, BoxConfig, CylinderConfig, FileBodyConfig, SphereConfig
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import (
     HERE,
@@ -24,7 +24,9 @@ from throwcollect.engines.body import (
     turn_of,
 )
 from throwcollect.engines.engine import SceneBody
+from throwcollect.engines.mesh import Mesh
 from throwcollect.reproducible_math import cos, matmul, sin
+from throwcollect.robots.body_files import inertia_of, shapes_of
 
 Outline = tuple[tuple[float, float], ...]
 """Corners of a polygon [m], counter-clockwise, to tenths of millimetres."""
@@ -76,18 +78,21 @@ def _list_sections(config: Config) -> Mapping[str, AnyBody]:
 
 @dataclass(frozen=True)
 class BodyLook:
-    """How a body looks.
+    """How a shape of a body looks.
 
     Attributes:
-        name: Its name.
-        shape: ``box``, ``cylinder`` along its own z, or ``sphere``.
-        size_m: Edges of the box, or of the box around a cylinder or sphere, along its own axes [m].
-        position_m: Its centre in world [m].
+        name: Name of the body.
+        shape: ``box``, ``cylinder`` along its own z, ``sphere`` or ``mesh``.
+        size_m: Edges of the box, or of the box around a cylinder or sphere, along its own axes [m]; factors on the
+            coordinates of a mesh.
+        position_m: Origin of the body in world [m]; for a body of one shape that is no mesh, its centre.
         rpy_rad: Rotations about the axes x, y, z of the world, in this order [rad].
         color: ``#rrggbb``.
         moves: Whether it moves when it is pushed; then its place and outlines are those at the start.
-        above_m: Its outline as seen from above: x and y in world [m].
+        above_m: Outline of the shape as seen from above: x and y in world [m].
         side_m: Its outline as seen from the right of the robot: x and z in world [m].
+        within: Pose of the shape in the body: position [m], and rotations as `rpy_rad`.
+        mesh: File of the mesh; empty if it is none.
     """
 
     name: str
@@ -99,27 +104,37 @@ class BodyLook:
     moves: bool
     above_m: Outline
     side_m: Outline
+    within: Placement = HERE
+    mesh: str = ""
 
 
 def looks_of(config: Config) -> tuple[BodyLook, ...]:
-    """Describe how the bodies in the world of a trial look, with the object last."""
+    """Describe how the shapes of bodies in the world of a trial look, one body after the other, the object last."""
     looks, sections = [], _list_sections(config)
     for name in sorted(sections, key=lambda name: name == config.acted_on):
-        section, body = sections[name], _make_body(name, sections)
-        (shape,), (place, turn) = body.link.shapes, body.placement
-        size = shape.size
-        if shape.kind != "box":
-            radius, *length = size
-            size = (2 * radius, 2 * radius, *(length or [2 * radius]))
-        points = _turn(_find_corners(shape.kind, np.array(size)), turn) + place
-        x, y, z = size
-        above, side = (_find_outline(points[:, axes]) for axes in ([0, 1], [0, 2]))
-        looks.append(BodyLook(name, shape.kind, (x, y, z), place, turn, section.color, body.moves, above, side))
+        section = sections[name]
+        shapes, (place, turn) = _make_shapes(section), _find_placement(section, sections)
+        for shape in shapes:
+            size = shape.size
+            if shape.kind in ("cylinder", "sphere"):
+                radius, *length = size
+                size = (2 * radius, 2 * radius, *(length or [2 * radius]))
+            within = shape.placement
+            points = _turn(_find_corners(shape, np.array(size)), within.rpy) + within.xyz
+            points = _turn(points, turn) + place
+            x, y, z = size
+            above, side = (_find_outline(points[:, axes]) for axes in ([0, 1], [0, 2]))
+            pose, mesh = (place, turn, section.color, section.mass_kg is not None), shape.mesh
+            file = "" if mesh is None else str(mesh.path)
+            looks.append(BodyLook(name, shape.kind, (x, y, z), *pose, above, side, within, file))
     return tuple(looks)
 
 
-def _find_corners(kind: str, size: NDArray[np.float64]) -> NDArray[np.float64]:
+def _find_corners(shape: LinkShape, size: NDArray[np.float64]) -> NDArray[np.float64]:
     """Find points of a shape whose hull is the shape or nearly so, in its own frame [m], shape ``(n, 3)``."""
+    kind = shape.kind
+    if shape.mesh is not None:
+        return _find_outermost(shape.mesh) * size
     if kind == "box":
         return np.array(list(product([-1.0, 1.0], repeat=3))) * size / 2
     angles = np.arange(_ROUND) * 2 * np.pi / _ROUND
@@ -127,6 +142,17 @@ def _find_corners(kind: str, size: NDArray[np.float64]) -> NDArray[np.float64]:
     # A sphere is drawn by parallels, one as high as each corner of the circle.
     rings = circle if kind == "sphere" else np.array([(1.0, -1.0), (1.0, 1.0)])
     return np.concatenate([np.column_stack([abs(r) * circle, np.full(_ROUND, z)]) for r, z in rings]) * size / 2
+
+
+@lru_cache(maxsize=64)
+def _find_outermost(mesh: Mesh) -> NDArray[np.float64]:
+    """Choose the corners of a mesh that are outermost in some of many directions, shape ``(n, 3)``."""
+    # Both ends of lines to the points of a grid on half of a cube.
+    grid = np.array(list(product(np.linspace(-1.0, 1.0, 8), repeat=2)))
+    lines = np.concatenate([np.insert(grid, axis, 1.0, axis=1) for axis in range(3)])
+    along = (matmul(mesh.corners, line.reshape(3, 1)) for line in lines)
+    ends = np.unique([(each.argmin(), each.argmax()) for each in along])
+    return np.take(mesh.corners, ends, axis=0)
 
 
 def _turn(points: NDArray[np.float64], rpy_rad: Vector) -> NDArray[np.float64]:
@@ -154,34 +180,62 @@ def _find_outline(points: NDArray[np.float64]) -> Outline:
 
 
 def _make_body(name: str, sections: Mapping[str, AnyBody]) -> SceneBody:
-    section = sections[name]
-    size: tuple[float, ...] = (section.radius_m,) if not isinstance(section, BoxConfig) else tuple(section.size_m)
-    if isinstance(section, CylinderConfig):
-        size = (section.radius_m, section.length_m)
-    inertia = None
+    section, inertia = sections[name], None
+    shapes = _make_shapes(section)
     if section.mass_kg is not None:
-        x, y, z = moments_of(section.shape, size, section.mass_kg)
-        inertia = LinkInertia(section.mass_kg, HERE, (x, 0.0, 0.0, y, 0.0, z))
-    link = BodyLink(name, inertia, (LinkShape(section.shape, size, HERE),))
-    (x, y, z), (roll, pitch, yaw), (vx, vy, vz) = section.position_m, section.rpy_rad, section.velocity_mps
-    place = Placement((x, y, z), (roll, pitch, yaw))
-    if section.lies_on is not None and section.lies_on in sections:
-        below = _make_body(section.lies_on, sections)
-        middle, top = below.placement.xyz, _reach_up(below.link.shapes[0], below.placement)
-        rise = middle[2] + top + _reach_up(link.shapes[0], place)
-        place = Placement((middle[0] + x, middle[1] + y, rise + z), place.rpy)
+        if isinstance(section, FileBodyConfig):
+            inertia = inertia_of(section, section.mass_kg)
+        else:
+            x, y, z = moments_of(section.shape, shapes[0].size, section.mass_kg)
+            inertia = LinkInertia(section.mass_kg, HERE, (x, 0.0, 0.0, y, 0.0, z))
     restitution = (1.0 if inertia is None else 0.0) if section.restitution is None else section.restitution
+    place, (vx, vy, vz) = _find_placement(section, sections), section.velocity_mps
+    link = BodyLink(name, inertia, shapes)
     return SceneBody(link, place, section.friction, restitution, section.rolling_friction_m, (vx, vy, vz))
 
 
-def _reach_up(shape: LinkShape, placement: Placement) -> float:
-    """Compute how far a shape reaches above its centre [m]."""
+def _make_shapes(section: AnyBody) -> tuple[LinkShape, ...]:
+    if isinstance(section, FileBodyConfig):
+        return shapes_of(section)
+    size: tuple[float, ...] = (section.radius_m,) if not isinstance(section, BoxConfig) else tuple(section.size_m)
+    if isinstance(section, CylinderConfig):
+        size = (section.radius_m, section.length_m)
+    return (LinkShape(section.shape, size, HERE),)
+
+
+def _find_placement(section: AnyBody, sections: Mapping[str, AnyBody]) -> Placement:
+    (x, y, z), (roll, pitch, yaw) = section.position_m, section.rpy_rad
+    place = Placement((x, y, z), (roll, pitch, yaw))
+    if section.lies_on is None or section.lies_on not in sections:
+        return place
+    below = sections[section.lies_on]
+    middle = _find_placement(below, sections)
+    top = max(_reach(shape, _turn_back((0.0, 0.0, 1.0), middle)) for shape in _make_shapes(below))
+    bottom = max(_reach(shape, _turn_back((0.0, 0.0, -1.0), place)) for shape in _make_shapes(section))
+    rise = middle.xyz[2] + top + bottom
+    return Placement((middle.xyz[0] + x, middle.xyz[1] + y, rise + z), place.rpy)
+
+
+def _turn_back(direction: Vector, placement: Placement) -> Vector:
+    """Write a direction of a parent along the axes of a frame in it."""
     x, y, z, w = turn_of(placement)
-    # The vertical of the world along the axes of the body.
-    up = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    a, b, c = direction
+    return (
+        a * (1 - 2 * (y * y + z * z)) + b * 2 * (x * y + w * z) + c * (2 * (x * z - w * y)),
+        a * 2 * (x * y - w * z) + b * (1 - 2 * (x * x + z * z)) + c * (2 * (y * z + w * x)),
+        a * 2 * (x * z + w * y) + b * 2 * (y * z - w * x) + c * (1 - 2 * (x * x + y * y)),
+    )
+
+
+def _reach(shape: LinkShape, direction: Vector) -> float:
+    """Compute how far a shape of a body reaches in a direction, from the origin of the body [m]."""
+    from_origin = sum(one * other for one, other in zip(direction, shape.placement.xyz, strict=True))
+    along = _turn_back(direction, shape.placement)
+    if shape.mesh is not None:
+        return from_origin + float(matmul(shape.mesh.corners * shape.size, np.array(along).reshape(3, 1)).max())
     match shape.kind, shape.size:
         case "box", edges:
-            return sum(abs(axis) * edge for axis, edge in zip(up, edges, strict=True)) / 2
+            return from_origin + sum(abs(axis) * edge for axis, edge in zip(along, edges, strict=True)) / 2
         case "cylinder", (radius, length):
-            return abs(up[2]) * length / 2 + math.hypot(up[0], up[1]) * radius
-    return shape.size[0]
+            return from_origin + abs(along[2]) * length / 2 + math.hypot(along[0], along[1]) * radius
+    return from_origin + shape.size[0]

@@ -240,7 +240,7 @@ def _write_overrides(origin: Origin) -> list[str]:
             Problem("may be set only by the operator, not by a request", key=kept)
             for key, value in origin.changes.items()
             for kept in list_operator_keys()
-            if _sets(key, value, kept)
+            if _sets(key.split("."), value, kept.split("."))
         ),
     ]
     if problems:
@@ -251,10 +251,10 @@ def _write_overrides(origin: Origin) -> list[str]:
     return overrides
 
 
-def _sets(key: str, value: JsonValue, kept: str) -> bool:
+def _sets(key: list[str], value: JsonValue, kept: list[str]) -> bool:
     """Whether setting a key to a value also sets another key: the same, one above it, or one inside the value."""
-    if key == kept or key.startswith(f"{kept}."):
+    if not kept:
         return True
-    if not kept.startswith(f"{key}.") or not isinstance(value, dict):
-        return False
-    return any(_sets(each, inner, kept.removeprefix(f"{key}.")) for each, inner in value.items())
+    if key:
+        return kept[0] in ("*", key[0]) and _sets(key[1:], value, kept[1:])
+    return isinstance(value, dict) and any(_sets(each.split("."), inner, kept) for each, inner in value.items())

@@ -11,12 +11,12 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from throwcollect.config.loader import load
-from throwcollect.dataset.directory import ROBOT, config_path
+from throwcollect.dataset.carried_robot import list_carried
+from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, MemberError, NotFoundError
 from throwcollect.members import is_own, load_member, usable_names
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.robots.description import full_description
-from throwcollect.robots.imported import list_files
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.runs.component_container import DESCRIPTION
@@ -115,10 +115,10 @@ def _find_carried(*names: str) -> Path | None:
 def _look_for_carried() -> None:
     for run in Records().all():
         with suppress(OSError):
-            directory = (run.place.directory / ROBOT).resolve(strict=True)
-            for file in list_files(directory):
+            directory = run.place.directory.resolve(strict=True)
+            for name in list_carried(directory):
                 # A link may lead out of the directory.
-                if file.resolve().parent == directory:
+                if (file := directory / name).resolve() == file:
                     _carried[file.name] = file
 
 

@@ -32,14 +32,13 @@ def config_digest(config: Config) -> str:
     return hashlib.sha256(json.dumps(sections).encode()).hexdigest()
 
 
-def _name_uncounted(section: Section) -> dict[str, Any]:
+def _name_uncounted(holder: Section | dict[str, Any]) -> dict[str, Any]:
     """Name the fields of a section and of its inner sections that do not count, in the form of pydantic's `exclude`."""
     uncounted: dict[str, Any] = {}
-    for name, value in section.__dict__.items():
-        key = key_of_field(type(section), name)
-        if key.effect is Effect.RUN:
+    for name, value in (holder if isinstance(holder, dict) else holder.__dict__).items():
+        if isinstance(holder, Section) and key_of_field(type(holder), name).effect is Effect.RUN:
             uncounted[name] = True
-        elif isinstance(value, Section) and (inside := _name_uncounted(value)):
+        elif isinstance(value, Section | dict) and (inside := _name_uncounted(value)):
             uncounted[name] = inside
     return uncounted
 

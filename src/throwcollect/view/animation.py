@@ -100,8 +100,8 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
     released_s = throw.row.get("release_time_s")
     released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
-    colours = (shape.rgba for shape in draw_bodies_of(config))
-    bodies = list(zip((*bodies_of(config), object_of(config)), colours, strict=True))
+    colours = {look.name: shape.rgba for look, shape in zip(looks_of(config), draw_bodies_of(config), strict=True)}
+    bodies = [(body, colours[body.link.name]) for body in (*bodies_of(config), object_of(config))]
     with Renderer(robot.urdf_with_files, config.robot.base_height_m, bodies) as renderer:
         # The mount, or the feet, stand at the origin.
         points = [samples.object_position, np.zeros((1, 3))]

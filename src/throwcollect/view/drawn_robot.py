@@ -9,9 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from throwcollect.config.schema import Config
-from throwcollect.engines.body import BodyModel
+from throwcollect.engines.body import BodyModel, Placement, Vector
+from throwcollect.engines.engine import Quaternion
 from throwcollect.episode.frames import WORLD, quaternion_of
+from throwcollect.episode.topics import rotate
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.surroundings import looks_of, moving_bodies_of, object_of
@@ -127,11 +131,25 @@ def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
     """Make the shapes of the bodies in the world of a trial: in the frame of the world, or of a body that moves."""
     moving, shapes = moving_bodies_of(config), []
     for look in looks_of(config):
-        pose = WORLD, look.position_m, quaternion_of(*look.rpy_rad)
-        if look.name in moving:
-            pose = look.name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
-        shapes.append(DrawnShape(*pose, look.size_m, look.shape, "", _read_hex(look.color)))
+        frame, (place, turn) = look.name, (look.within.xyz, quaternion_of(*look.within.rpy))
+        if look.name not in moving:
+            frame, (place, turn) = WORLD, _move(Placement(look.position_m, look.rpy_rad), look.within)
+        shapes.append(DrawnShape(frame, place, turn, look.size_m, look.shape, look.mesh, _read_hex(look.color)))
     return tuple(shapes)
+
+
+def _move(body: Placement, within: Placement) -> tuple[Vector, Quaternion]:
+    """Find the pose of something in a body in the frame of that body's pose: position [m], and rotation."""
+    (x1, y1, z1, w1), (x2, y2, z2, w2) = quaternion_of(*body.rpy), quaternion_of(*within.rpy)
+    turn = (
+        w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+        w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+        w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+        w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+    )
+    ((offset,),) = rotate(np.array([[x1, y1, z1, w1]]), np.array([within.xyz]), inverse=False)
+    x, y, z = (np.array(body.xyz) + offset).tolist()
+    return (x, y, z), turn
 
 
 def draw_object_of(config: Config) -> str:

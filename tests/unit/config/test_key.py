@@ -62,7 +62,7 @@ def test_sweepable_keys_are_those_with_an_effect_on_physics_or_task():
 
 def test_keys_that_name_files_or_resources_of_a_machine_are_operator_keys():
     assert list_operator_keys() == (
-        *("robot.urdf", "robot.packages", "robot.srdf"),
+        *("robot.urdf", "robot.packages", "robot.srdf", "scene.bodies.*.file"),
         *("task.trajectory.file", "sweep.file", "run", "containers", "cluster"),
     )
 

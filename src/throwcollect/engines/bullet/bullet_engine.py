@@ -14,9 +14,11 @@ from throwcollect.engines.bullet.scenery import (
     Surface,
     connect,
     describe_links,
+    find_origin,
     load_bodies,
     load_object,
     load_scenery,
+    place_body,
     renew_moving,
     renew_pairs,
     set_physics,
@@ -55,6 +57,7 @@ class BulletEngine(Engine):
     _object: SceneBody
     _object_id: int
     _moving: list[int]
+    _displaced: set[int]
     _names: dict[Surface, str]
     _has_floor: bool
     _forces: list[float]
@@ -93,6 +96,7 @@ class BulletEngine(Engine):
         self._names = self._scenery.names | {(each, BASE): body.link.name for each, body in self._bodies.items()}
         self._object_id = load_object(self._client, scene.object)
         self._moving = [number for number, body in self._bodies.items() if body.moves]
+        self._displaced = {each for each in self._moving if not self._bodies[each].inertia.is_centred}
         self._placed = tuple(part for body in scene.moving_bodies for part in body.start)
         self._tool, self._object, self._scene = scene.tool, scene.object, scene
 
@@ -143,10 +147,10 @@ class BulletEngine(Engine):
             pybullet.resetJointState(self._scenery.robot, joint, position, velocity, physicsClientId=client)
         renew_pairs(client, self._object_id)
         self._has_floor = False
-        self._place(self._object_id, object_in(state.sample))
+        place_body(client, self._object_id, self._object, object_in(state.sample))
         for number, numbers in zip(self._moving, split_bodies(state.sample, len(joints)), strict=True):
             renew_moving(client, number)
-            self._place(number, body_of(numbers))
+            place_body(client, number, self._bodies[number], body_of(numbers))
         self._touching, self._pressing = state.touching, None
         self._hold(find_held(self._tool, state))
 
@@ -204,12 +208,8 @@ class BulletEngine(Engine):
         """Set pose and velocity of a body."""
         if not number:
             self._hold(None)
-        self._place((self._object_id, *self._moving)[number], state)
-
-    def _place(self, number: int, body: BodyState) -> None:
-        place, turn, client = body.position, body.orientation_xyzw, self._client
-        pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
-        pybullet.resetBaseVelocity(number, body.linear_velocity, body.angular_velocity, physicsClientId=client)
+        body = ((self._object_id, self._object), *((each, self._bodies[each]) for each in self._moving))[number]
+        place_body(self._client, *body, state)
 
     def _hold(self, held: BodyState | None) -> None:
         """Let the tool hold the object, whose mass the arm bears, or none."""
@@ -227,7 +227,7 @@ class BulletEngine(Engine):
         robot, link = self._scenery.robot, self._scenery.held
         place = pybullet.getLinkState(robot, link, computeForwardKinematics=True, physicsClientId=self._client)
         self._held = carry(held, place[4], place[5], self._physics.hz)
-        self._place(self._object_id, self._held)
+        place_body(self._client, self._object_id, self._object, self._held)
 
     def _report_touch(self, step: int, observer: Observer) -> None:
         """Tell the observer which bodies press on the object now, unless only other surfaces of the same bodies do."""
@@ -248,7 +248,8 @@ class BulletEngine(Engine):
         for body in (*self._moving, self._object_id):
             place, turn = pybullet.getBasePositionAndOrientation(body, client)
             linear, angular = pybullet.getBaseVelocity(body, client)
-            sample += place + turn + linear + angular
+            numbers = place + turn + linear + angular
+            sample += find_origin(client, body, numbers) if body in self._displaced else numbers
         return sample
 
     def _apply_drag(self, drag_kgpm: float) -> None:

@@ -12,7 +12,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
-from throwcollect.engines.bullet.scenery import BASE, connect, links, load_bodies, load_urdf
+from throwcollect.engines.bullet.scenery import BASE, connect, links, load_bodies, load_urdf, place_body
 from throwcollect.engines.engine import BodyState, SceneBody
 from throwcollect.errors import ConfigError
 
@@ -57,7 +57,7 @@ class Renderer:
         loaded = load_bodies(self._client, [body for body, _ in bodies])
         for number, (_, rgba) in zip(loaded, bodies, strict=True):
             pybullet.changeVisualShape(number, BASE, rgbaColor=rgba, physicsClientId=self._client)
-        self._moving = [number for number, body in loaded.items() if body.moves]
+        self._moving = [(number, body) for number, body in loaded.items() if body.moves]
 
     def __enter__(self) -> Renderer:
         return self
@@ -72,9 +72,8 @@ class Renderer:
         """
         for name, angle in joints.items():
             pybullet.resetJointState(self._robot, self._joints[name], angle, physicsClientId=self._client)
-        for number, body in zip(self._moving, bodies, strict=True):
-            pose = body.position, body.orientation_xyzw
-            pybullet.resetBasePositionAndOrientation(number, *pose, physicsClientId=self._client)
+        for each, state in zip(self._moving, bodies, strict=True):
+            place_body(self._client, *each, state)
 
     def find_frames(self) -> list[Vector]:
         """Find the origins of the frames of the robot's links in world [m]."""

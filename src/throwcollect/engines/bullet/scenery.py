@@ -16,7 +16,17 @@ import pybullet
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import BodyModel, Vector
-from throwcollect.engines.engine import GROUND, LoadedLink, Physics, Quaternion, Scene, SceneBody, body_of
+from throwcollect.engines.engine import (
+    GROUND,
+    BodyState,
+    LoadedLink,
+    Physics,
+    Quaternion,
+    Sample,
+    Scene,
+    SceneBody,
+    body_of,
+)
 from throwcollect.engines.grip import ANY_INERTIA, HELD_LINK, add_held_link
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.native_reading import reading_natively
@@ -174,8 +184,38 @@ def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody
         number = _load_model(client, model, at.position, at.orientation_xyzw, moves=body.moves)
         if not body.moves:
             pybullet.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _OBJECT_GROUP, physicsClientId=client)
+        if any(shape.mesh is not None for shape in link.shapes):
+            # Around a hull, Bullet would leave a margin of 1 mm.
+            pybullet.changeDynamics(number, BASE, collisionMargin=0.0, physicsClientId=client)
         numbers[number] = body
     return numbers
+
+
+def place_body(client: int, number: int, body: SceneBody, state: BodyState) -> None:
+    """Set pose and velocity of a body, whose centre of mass Bullet places."""
+    place, turn, linear = state.position, state.orientation_xyzw, state.linear_velocity
+    if not body.inertia.is_centred:
+        centre, axes = pybullet.getDynamicsInfo(number, BASE, physicsClientId=client)[3:5]
+        place, turn = pybullet.multiplyTransforms(place, turn, centre, axes)
+        linear = _move_velocity(linear, state.angular_velocity, state.position, place)
+    pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
+    pybullet.resetBaseVelocity(number, linear, state.angular_velocity, physicsClientId=client)
+
+
+def find_origin(client: int, number: int, numbers: Sample) -> Sample:
+    """Compute the numbers of a sample for the origin of a body from those for its centre of mass."""
+    centre = body_of(numbers)
+    frame = pybullet.getDynamicsInfo(number, BASE, physicsClientId=client)[3:5]
+    back = pybullet.invertTransform(*frame)
+    place, turn = pybullet.multiplyTransforms(centre.position, centre.orientation_xyzw, *back)
+    linear = _move_velocity(centre.linear_velocity, centre.angular_velocity, centre.position, place)
+    return (*place, *turn, *linear, *centre.angular_velocity)
+
+
+def _move_velocity(linear: Vector, angular: Vector, at: Vector, to: Vector) -> Vector:
+    """Compute the velocity of another point of a body that turns."""
+    (a, b, c), (x, y, z) = angular, (to[axis] - at[axis] for axis in range(3))
+    return linear[0] + b * z - c * y, linear[1] + c * x - a * z, linear[2] + a * y - b * x
 
 
 def renew_moving(client: int, body: int) -> None:

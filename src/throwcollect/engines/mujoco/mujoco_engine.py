@@ -271,10 +271,12 @@ class MujocoEngine(Engine):
         self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
 
 
-def _list_kinds(scene: Scene) -> list[tuple[str, bool, list[str]]]:
-    """List the names of object and bodies and the kinds of their shapes, which a compiled model cannot change."""
-    bodies = (scene.object, *scene.bodies)
-    return [(body.link.name, body.moves, [shape.kind for shape in body.link.shapes]) for body in bodies]
+def _list_kinds(scene: Scene) -> list[object]:
+    """List what a compiled model cannot change of object and bodies: names and kinds of plain ones, all of others."""
+    return [
+        (body.link.name, body.moves, [shape.kind for shape in body.link.shapes]) if body.link.is_plain else body.link
+        for body in (scene.object, *scene.bodies)
+    ]
 
 
 def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int], bodies: int) -> Callable[[list[float]], Sample]:

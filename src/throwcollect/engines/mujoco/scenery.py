@@ -137,19 +137,31 @@ def _add_object(spec: mujoco.MjSpec, body: SceneBody) -> None:
 
 
 def _add_body(spec: mujoco.MjSpec, body: SceneBody) -> None:
-    """Put a body into the world; `place_bodies` sets its pose, its sizes and its mass.
+    """Put a body into the world; `place_bodies` sets its pose and, if it is plain, its sizes and its mass.
 
     Pairs of shapes that collide are named one by one, as they have numbers of their own: the object with every body,
     and a body that moves with everything that is in the world already.
     """
-    name = _name_body(body)
+    name, link = _name_body(body), body.link
     others = [geom.name for geom in spec.geoms] if body.moves else [OBJECT]
     added = spec.worldbody.add_body(name=name)
     if body.moves:
         added.add_freejoint(name=name)
-    for number, shape in enumerate(body.link.shapes):
+    if link.inertia is not None and not link.is_plain:
+        added.explicitinertial, added.mass, added.ipos = True, link.inertia.mass_kg, link.inertia.placement.xyz
+        # The axes of the six moments are those of the placement. MuJoCo has the diagonal first.
+        added.fullinertia = [link.inertia.moments_kgm2[number] for number in (0, 3, 5, 1, 2, 4)]
+    for number, shape in enumerate(link.shapes):
         geom = f"{name}/{number}"
-        added.add_geom(name=geom, type=_KINDS[shape.kind], size=(1.0, 1.0, 1.0), mass=1.0, contype=0, conaffinity=0)
+        x, y, z, w = turn_of(shape.placement)
+        form = {"pos": shape.placement.xyz, "quat": (w, x, y, z), "mass": 1.0, "contype": 0, "conaffinity": 0}
+        if shape.mesh is None:
+            size = (1.0, 1.0, 1.0) if link.is_plain else _size(shape)[0]
+            added.add_geom(name=geom, type=_KINDS[shape.kind], size=size, **form)
+        else:
+            # Without faces, MuJoCo makes the convex hull.
+            spec.add_mesh(name=geom, uservert=(shape.mesh.corners * shape.size).ravel())
+            added.add_geom(name=geom, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=geom, **form)
         for other in others:
             spec.add_pair(geomname1=other, geomname2=geom, condim=SLIDING_ROWS, margin=_REACH_M)
 
@@ -160,11 +172,13 @@ def _name_body(body: SceneBody) -> str:
 
 
 def place_bodies(model: mujoco.MjModel, bodies: Sequence[SceneBody]) -> None:
-    """Give bodies their poses and sizes, as if the model had been compiled with them."""
+    """Give bodies their poses, and plain ones their sizes, as if the model had been compiled with them."""
     for each in bodies:
         body = model.body(_name_body(each)).id
         x, y, z, w = turn_of(each.placement)
         model.body_pos[body], model.body_quat[body] = each.placement.xyz, (w, x, y, z)
+        if not each.link.is_plain:
+            continue
         if (inertia := each.link.inertia) is not None:
             model.body_mass[body] = inertia.mass_kg
             model.body_inertia[body] = inertia.diagonal

@@ -1,5 +1,6 @@
 /** The page: puts its parts together. */
 
+import { Bodies } from "./bodies.js";
 import { Connection, Problem, keepToken, takeToken } from "./connection.js";
 import { Controls } from "./controls.js";
 import { get, makeButton, setChoices, setText } from "./dom.js";
@@ -72,6 +73,8 @@ class Page {
     this.playback = new Playback((shown) => this.watching.begin(shown));
     const fetchMesh = async (path) => (await this.connection.ask("GET", `/meshes/${path}`)).arrayBuffer();
     this.meshes = new Meshes(fetchMesh);
+    Bodies.meshes = this.meshes;
+    Bodies.loaded = () => this.view.touch();
     const { connection, view, playback, map, meshes } = this;
     const tell = (text) => this.tell(text);
     this.watching = new Watching({ connection, view, playback, map, meshes, tell });

@@ -93,7 +93,7 @@ export class Watching {
 
   /** @returns {string[]} names of the bodies that move in the run, with the object last; none before they are known */
   get moving() {
-    return (this.#scene?.bodies ?? []).filter(({ moves }) => moves).map(({ name }) => name);
+    return [...new Set((this.#scene?.bodies ?? []).filter(({ moves }) => moves).map(({ name }) => name))];
   }
 
   /** @param {import("./throws.js").Throw} shown begins to be replayed */
