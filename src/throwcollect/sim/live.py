@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
 from throwcollect.config.schema import Config
 from throwcollect.control import JointTrajectoryController, Trajectory, TrajectoryGoal, TrajectoryRefusal
+from throwcollect.engines.engine import SceneBody
 from throwcollect.episode.record import Samples
 from throwcollect.errors import RequestError
 from throwcollect.sim.pace import (
@@ -66,6 +67,7 @@ class LiveSimulator(Simulator):
         self.real_time_factor = config.sim.real_time_factor
         self._pace = Pace()
         self._steps: StepRequest | None = None
+        self._spawned: dict[str, SceneBody] = {}
         self._driven_until_ns = 0
         """Time at which a client last moved a limb [ns], or gave it something to do."""
         self._has_start = False
@@ -99,6 +101,29 @@ class LiveSimulator(Simulator):
         self._has_start &= not state
         super().reset(time=time, state=state)
         self._has_start |= state
+        if state:
+            self._spawned = {}
+
+    @property
+    def spawned(self) -> Sequence[str]:
+        """Names of the bodies that clients have spawned; the next reset of the state removes them."""
+        return tuple(self._spawned)
+
+    def spawn(self, body: SceneBody) -> None:
+        """Put a body into the world, under a name that nothing else has."""
+        self._change_spawned({**self._spawned, body.link.name: body})
+
+    def remove_spawned(self, names: Collection[str]) -> None:
+        """Take bodies that were spawned out of the world."""
+        self._change_spawned({name: body for name, body in self._spawned.items() if name not in names})
+
+    def _change_spawned(self, spawned: dict[str, SceneBody]) -> None:
+        self.trial.require_free()
+        if not self._has_start:
+            raise RequestError("RESULT_INCORRECT_STATE", "there is no start state until a reset succeeds")
+        self.world.set_spawned(spawned.values())
+        # What follows is not the trial that a client has set up.
+        self._spawned, self._in_trial, self._published = spawned, False, 0
 
     def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
         """Give a goal to a controller, or refuse it; a run begins once all controllers that need a goal have one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,15 +17,19 @@ from throwcollect.engines.engine import (
     BodyState,
     Engine,
     Observer,
+    Physics,
     Sample,
     Scene,
+    SceneBody,
     State,
     Steps,
     body_of,
     object_in,
     split_bodies,
+    to_numbers,
 )
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
+from throwcollect.errors import ConfigError
 from throwcollect.extras import require_engine
 from throwcollect.members import explain_failure, load_member
 from throwcollect.robots.description import (
@@ -77,6 +81,8 @@ class World(Observer):
     end_reason: EndReason | None
     _ends: EndRule
     _scene: Scene
+    _own_bodies: tuple[SceneBody, ...]
+    _physics: Physics
     _contacts: ContactLog
     _start: Sequence[float]
     _offsets: NDArray[np.float64]
@@ -261,6 +267,36 @@ class World(Observer):
         if self.steps == 0:
             self._record_start()
 
+    def set_spawned(self, spawned: Iterable[SceneBody]) -> None:
+        """Let these bodies stand in the world besides those of the trial, until the next `reset`; begin a new record.
+
+        All that stays is where it is now. If the engine takes no such bodies, nothing changes.
+        """
+        bodies = (*self._own_bodies, *spawned)
+        before, scene, states = self.engine.state, self._scene, self.bodies
+        joints, thing = before.sample[: 3 * len(self.moving)], before.sample[-BODY_NUMBERS:]
+        starts = [
+            to_numbers(states[each.link.name]) if each.link.name in states else each.start
+            for each in bodies
+            if each.moves
+        ]
+        # The next trial loads its own scene.
+        self._start_key = None
+        with explain_failure("engines", self._name, "place bodies"):
+            try:
+                self._put(replace(scene, bodies=bodies), replace(before, sample=sum(starts, joints) + thing))
+            except ConfigError:
+                self._put(scene, before)
+                raise
+        self._release_step = max(0, self._release_step - self.steps)
+        self.restart_clock(self.stamp_ns)
+
+    def _put(self, scene: Scene, state: State) -> None:
+        self.engine.load(scene)
+        self._scene = scene
+        self.engine.configure(self._physics)
+        self.engine.reset(state)
+
     @property
     def rests(self) -> bool:
         """Whether the arm has been standing still, and the object lying on something, for half a second."""
@@ -294,7 +330,8 @@ class World(Observer):
         offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
         self._offsets = np.array([offsets[joint] for joint in self.moving])
         self._start = [posture[joint] + offsets[joint] for joint in self.moving]
-        self.engine.configure(physics_of(trial, self.moving))
+        self._physics = physics_of(trial, self.moving)
+        self.engine.configure(self._physics)
         self.engine.rest(self._start, seat_of(trial))
         # At least one step is taken, because contact forces and motor torques are known only after a step.
         steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
@@ -310,7 +347,7 @@ class World(Observer):
 
     def _load(self, scene: Scene, engine: str) -> None:
         self.engine.load(scene)
-        self._scene = scene
+        self._scene, self._own_bodies = scene, scene.bodies
         # The robot as it was loaded stays, while only the object is another one.
         if scene.robot != self._compared:
             check_loaded(self.engine, engine, scene)

@@ -38,7 +38,12 @@ _NORM_TOLERANCE = 1e-3
 _FEATURES = (
     "ENTITY_STATE_GETTING",
     "ENTITY_STATE_SETTING",
+    "SPAWNING",
+    "SPAWNING_RESOURCE_STRING",
+    "SPAWNABLES",
+    "DELETING",
     "SIMULATION_RESET",
+    "SIMULATION_RESET_SPAWNED",
     "SIMULATION_RESET_TIME",
     "SIMULATION_RESET_STATE",
     "SIMULATION_STATE_GETTING",
@@ -49,6 +54,7 @@ _FEATURES = (
     "STEP_SIMULATION_ACTION",
 )
 _TIME, _STATE = ResetSimulation.Request.SCOPE_TIME, ResetSimulation.Request.SCOPE_STATE
+_SPAWNED = ResetSimulation.Request.SCOPE_SPAWNED
 _WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL)
 
 
@@ -68,8 +74,10 @@ class SimulationControl:
         self, _request: GetSimulatorFeatures.Request, response: GetSimulatorFeatures.Response
     ) -> GetSimulatorFeatures.Response:
         response.features.features = [getattr(Features, name) for name in _FEATURES]
+        response.features.spawn_formats = ["urdf"]
         response.features.custom_info = (
-            f"throwcollect {__version__}; one step is one physics step of "
+            f"throwcollect {__version__}; what is spawned is a copy of a body of the scene, or one rigid body without "
+            f"meshes, and is gone with the next trial or reset of the state; one step is one physics step of "
             f"{1.0 / self._simulation.config.sim.physics_hz:g} s; the clock runs while a trial runs"
         )
         return response
@@ -93,12 +101,15 @@ class SimulationControl:
         scope = request.scope
         if scope in _WHOLE_SCOPES:
             self._simulation.reset()
-        elif scope & ~(_TIME | _STATE):
+        elif scope & ~(_TIME | _STATE | _SPAWNED):
             message = f"scope {scope} cannot be reset"
-            expected = f"sums of {_TIME} TIME, {_STATE} STATE; 0 or 255 for all"
+            expected = f"sums of {_TIME} TIME, {_STATE} STATE, {_SPAWNED} SPAWNED; 0 or 255 for all"
             raise RequestError("RESULT_FEATURE_UNSUPPORTED", message, expected=expected)
         else:
-            self._simulation.reset(time=bool(scope & _TIME), state=bool(scope & _STATE))
+            if scope & _SPAWNED:
+                self._simulation.remove_spawned(self._simulation.spawned)
+            if scope & (_TIME | _STATE):
+                self._simulation.reset(time=bool(scope & _TIME), state=bool(scope & _STATE))
 
 
 class EntityServices:
@@ -127,9 +138,7 @@ class EntityServices:
         self._require(request.entity)
         if request.entity not in self._simulation.world.free:
             raise RequestError("RESULT_OPERATION_FAILED", f"{request.entity} is fixed to the world")
-        if (frame := request.state.header.frame_id) not in ("", _WORLD_FRAME):
-            raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=_WORLD_FRAME)
-        self._simulation.world.place(request.entity, _to_body_state(request.state))
+        self._simulation.world.place(request.entity, read_state(request.state))
 
     def _select(self, filters: EntityFilters) -> list[str]:
         if filters != EntityFilters():
@@ -152,8 +161,10 @@ class EntityServices:
             raise RequestError("RESULT_NOT_FOUND", f"no entity {name!r:.80}; known: {', '.join(self._names)}")
 
 
-def _to_body_state(message: EntityState) -> BodyState:
+def read_state(message: EntityState) -> BodyState:
     """Read and check a state in the frame of the world."""
+    if (frame := message.header.frame_id) not in ("", _WORLD_FRAME):
+        raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=_WORLD_FRAME)
     position, turn = message.pose.position, message.pose.orientation
     linear, angular = message.twist.linear, message.twist.angular
     state = BodyState(

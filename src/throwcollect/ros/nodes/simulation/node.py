@@ -34,6 +34,7 @@ from throwcollect.ros.nodes.controller.node import ControllerManager, Controller
 from throwcollect.ros.nodes.own_time import make_own_time
 from throwcollect.ros.nodes.simulation.control import SimulationControl
 from throwcollect.ros.nodes.simulation.leases import LeaseQueue
+from throwcollect.ros.nodes.simulation.spawning import SpawningServices
 from throwcollect.ros.nodes.simulation.stepping import Stepping
 from throwcollect.run_key import Signer
 from throwcollect.sim.live import LiveSimulator, StateCode
@@ -106,6 +107,7 @@ class SimulationNode(Node):
         self._restoring = False
         self._requested: tuple[Lease, ...] = ()
         SimulationControl(self, simulation)
+        SpawningServices(self, simulation)
         self._stepping = Stepping(self, simulation)
         # This publisher comes last: a coordinator that sees it takes the whole simulation for ready.
         self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
