@@ -39,6 +39,7 @@ _OWN = MappingProxyType(
         "tools": {
             "spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig",
             "claw": "throwcollect.tools.claw.claw_config:ClawConfig",
+            "paddle": "throwcollect.tools.paddle.paddle_config:PaddleConfig",
         },
         "engines": {
             "bullet": "throwcollect.engines.bullet.bullet_engine:BulletEngine",
@@ -48,6 +49,7 @@ _OWN = MappingProxyType(
         "tasks": {
             "throw": "throwcollect.tasks.throw.throw_config:ThrowConfig",
             "throw_into": "throwcollect.tasks.throw_into.into_config:ThrowIntoConfig",
+            "slide": "throwcollect.tasks.slide.slide_config:SlideConfig",
         },
         "runtimes": {
             "local": "throwcollect.runtimes.local:LocalRuntime",

@@ -20,8 +20,8 @@ pytest.importorskip("mujoco")
 
 pytestmark = pytest.mark.e2e
 ROOT = Path(__file__).parents[2]
-BODIES, OBJECT, INTO, OWN = re.split(
-    r"^## (?:Another object than a ball|Throw into a bin|A task of your own)$",
+BODIES, OBJECT, INTO, SLIDE, OWN = re.split(
+    r"^## (?:Another object than a ball|Throw into a bin|Slide a puck|A task of your own)$",
     (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8"),
     flags=re.MULTILINE,
 )
@@ -79,6 +79,26 @@ def test_a_throw_that_is_aimed_at_a_bin_stays_in_it(
     exec(coarse, {"__name__": "__main__"})  # noqa: S102
     hits, tried = re.findall(r"(\d+) of (\d+) throws stayed", capsys.readouterr().out)[0]
     assert int(hits) == int(tried) > 0
+
+
+def test_a_puck_that_is_aimed_at_a_place_rests_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "configs", "configs")
+    (yaml,) = blocks("yaml", SLIDE)
+    assert yaml in Path("configs/slide.yaml").read_text(encoding="utf-8")
+    printed = run(SLIDE, call_here, "--trials", "60", *CHEAP)
+    assert "60: 60 at_rest" in printed["up"]
+    assert re.search(r"^rest +x 0\.", printed["up"], flags=re.MULTILINE)
+    assert "Where the pucks rest" in Path("datasets/slide.html").read_text(encoding="utf-8")
+    # The throw is simulated with Bullet, and the model was learned with MuJoCo.
+    (miss,) = re.findall(r"throw 0: at_rest: .* miss_m ([\d.]+)$", printed["throw"], flags=re.MULTILINE)
+    assert float(miss) < 0.15
+    (program,) = blocks("python", SLIDE)
+    exec(program, {"__name__": "__main__"})  # noqa: S102
+    distance, law = map(float, re.findall(r"slid ([\d.]+) m; .* is ([\d.]+) m", capsys.readouterr().out)[0])
+    assert distance == pytest.approx(law, rel=0.05)
 
 
 @pytest.fixture

@@ -187,7 +187,10 @@ def test_a_dataset_of_a_task_that_is_not_installed_is_refused_in_one_sentence(re
     done = call_here("dataset", "info", reached)  # in this process, which does not find the package
     assert done.returncode == 2
     line = (reached / "config.yaml").read_text().splitlines().index("  name: reach") + 1
-    assert f"{reached / 'config.yaml'}:{line}: task.name: should be 'throw' or 'throw_into', got 'reach'" in done.stderr
+    assert (
+        f"{reached / 'config.yaml'}:{line}: task.name: should be 'throw', 'throw_into' or 'slide', got 'reach'"
+        in done.stderr
+    )
 
 
 def test_a_task_whose_part_of_the_report_fails_is_named(
@@ -217,7 +220,8 @@ def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: 
     path.write_text("task: {name: reech, duration_s: 1.1}\nuntil: {lands: 3}\n")
     said = refusal("config", path)
     assert (
-        f"{path}:1: task.name: should be 'throw', 'throw_into' or 'reach', got 'reech'; did you mean 'reach'?" in said
+        f"{path}:1: task.name: should be 'throw', 'throw_into', 'slide' or 'reach', got 'reech'; did you mean 'reach'?"
+        in said
     )
     assert f"{path}:2: until.lands: unknown key; did you mean 'landed'?" in said
 

@@ -201,7 +201,7 @@ class Config(Section):
             yield f"scene.bodies.{name}", f"should have another name, as the task {self.task.name} has such a body"
         if self.until is not None and self.until.outcome() != self.task.success:
             yield f"until.{self.until.outcome()}", f"should be {self.task.success}, as the task is {self.task.name}"
-        if self.sweep.target is not None and not self.task.throws:
+        if self.sweep.target is not None and "landing" not in self.task.events:
             yield "sweep.target", f"should be left out, as the task {self.task.name} throws no ball"
         if self.until is not None and self.sweep.sampler == "list":
             yield "until", "should be left out, as the file of the sampler list is not part of the dataset"

@@ -11,7 +11,7 @@ from pydantic import Field
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile, Trajectory
-from throwcollect.config.scene import AnyBody
+from throwcollect.config.scene import BALL, AnyBody
 from throwcollect.config.section import Section
 from throwcollect.wording import join_names, suggest
 
@@ -72,8 +72,12 @@ class TaskConfig(Section):
         implementation: The task itself, ``module:class``: a `Task` that is made of a whole configuration. It is
             imported where it is needed, so that reading a configuration stays cheap.
         until: The section `until` of a configuration of this task; its key is the outcome of a trial that succeeded.
-        throws: Whether the ball is thrown: then the tool has to move, and `sweep.target` can name landings, as
-            results are `ThrowResult`.
+        tool_acts: Whether the tool moves the object, so that a motion in which the tool rests is refused.
+        tool: Name of the tool with which `throwcollect init` begins.
+        noun: Noun for one of its trials.
+        keyword: Keyword by which a hub finds its datasets; empty for its name.
+        instruction: What the robot does, as one would ask it to; empty for its name.
+        events: Names of the instants among its results, in the order of time; `sweep.target` needs a ``landing``.
         targets: Columns of its results that say where a trial ended, and that can be aimed at; none if there is
             nothing to aim at.
         given: Keys whose values belong to a target, in the order in which they follow it: aiming does not choose them.
@@ -84,7 +88,12 @@ class TaskConfig(Section):
 
     implementation: ClassVar[str]
     until: ClassVar[type[UntilConfig]]
-    throws: ClassVar[bool] = False
+    tool_acts: ClassVar[bool] = False
+    tool: ClassVar[str] = "spoon"
+    noun: ClassVar[str] = "trial"
+    keyword: ClassVar[str] = ""
+    instruction: ClassVar[str] = ""
+    events: ClassVar[tuple[str, ...]] = ()
     targets: ClassVar[tuple[str, ...]] = ()
     given: ClassVar[tuple[str, ...]] = ()
     informative: ClassVar[tuple[str, ...]] = ()
@@ -125,19 +134,9 @@ class TaskConfig(Section):
         return None
 
     @property
-    def noun(self) -> str:
-        """Noun for one of its trials."""
-        return "throw" if self.throws else "trial"
-
-    @property
-    def keyword(self) -> str:
-        """Keyword by which a hub finds its datasets."""
-        return "throwing" if self.throws else self.name
-
-    @property
     def subject(self) -> str:
         """Description of its trials, for a sentence in which it follows their number."""
-        return "throws of a ball" if self.throws else f"trials of the task {self.name}"
+        return f"{self.noun}s of " + (f"the task {self.name}" if self.noun == "trial" else f"a {self.object or BALL}")
 
     def find_wrong_targets(self, columns: Collection[str]) -> dict[str, str]:
         """Say what is wrong with the names of the columns of targets of a list of its trials, or of one trial.

@@ -32,12 +32,12 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
     """Write the README.md of a dataset, with the YAML header that dataset hubs read."""
     episodes = len(throws) - throws["digest"].null_count
     size = next((label for limit, label in _SIZES if episodes < limit), _MORE)
-    measures = "release, apex, landing" if config.task.throws else "measures"
+    measures = ", ".join(config.task.events) or "measures"
     header = {
         "license": "apache-2.0",
         "pretty_name": config.name,
         "task_categories": ["robotics"],
-        "tags": ["robotics", config.task.keyword, "ros2", "mcap", config.robot.name, "simulation"],
+        "tags": ["robotics", config.task.keyword or config.task.name, "ros2", "mcap", config.robot.name, "simulation"],
         "size_categories": [size],
         "configs": [{"config_name": "throws", "data_files": "throws.parquet"}],
     }
@@ -46,7 +46,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         f"# {config.name}",
         "",
         f"{episodes} simulated {config.task.subject} by {robot_of(config).introduction}, each with the joint states of "
-        f"the robot and the odometry of the ball at {config.record.rate_hz} Hz. Made with throwcollect.",
+        f"the robot and the odometry of the {config.acted_on} at {config.record.rate_hz} Hz. Made with throwcollect.",
         "",
         *outcome_lines(throws),
         "",

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.journal import measure_collected_s
 from throwcollect.dataset.misses import read_targets, summarise_misses
 from throwcollect.dataset.reader import Dataset
@@ -44,7 +45,8 @@ def summary(dataset: Dataset) -> Info:
         episodes=episodes,
         outcomes=count_outcomes(dataset.throws),
         wanted=dataset.config.until.wanted if dataset.config.until else None,
-        landing=_find_landing_area(dataset.throws, dataset.config.task.success) if dataset.config.task.throws else None,
+        landing=_find_landing_area(dataset.throws, dataset.config.task),
+        end=next(iter(dataset.config.task.events[-1:]), ""),
         samples=samples,
         # An episode of n samples lasts n - 1 intervals.
         duration_s=(samples - episodes) / dataset.config.record.rate_hz,
@@ -60,12 +62,14 @@ def summary(dataset: Dataset) -> Info:
     )
 
 
-def _find_landing_area(throws: pa.Table, success: str) -> Mapping[str, tuple[float, float]] | None:
-    """Find where the throws of this outcome ended; a ball that hit the robot first may cross the landing plane, too."""
-    rows = np.array([outcome == success for outcome in throws["outcome"].to_pylist()], np.bool_)
+def _find_landing_area(throws: pa.Table, task: TaskConfig) -> Mapping[str, tuple[float, float]] | None:
+    """Find where trials that succeeded ended; a ball that hit the robot first may cross the landing plane, too."""
+    if not task.events:
+        return None
+    rows = np.array([outcome == task.success for outcome in throws["outcome"].to_pylist()], np.bool_)
     found = {}
     for axis in ("x_m", "y_m"):
-        ends = nan_where_null(throws[f"landing_{axis}"].combine_chunks())[rows]
+        ends = nan_where_null(throws[f"{task.events[-1]}_{axis}"].combine_chunks())[rows]
         if np.isnan(ends).all():
             return None
         found[axis] = float(np.nanmin(ends)), float(np.nanmax(ends))

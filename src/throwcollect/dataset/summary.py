@@ -40,8 +40,8 @@ class Info:
     Attributes:
         outcomes: Number of trials of each outcome, most frequent first.
         wanted: Number of trials that were to succeed; None if there was no such number.
-        landing: Lowest and highest ``x_m`` and ``y_m`` at which a ball landed [m], in world; None if none did, or
-            the task throws no ball.
+        landing: Lowest and highest ``x_m`` and ``y_m`` at which objects ended in trials that succeeded [m], in world;
+            None if none did, or the task has no such place.
         samples: Number of samples in all episodes.
         duration_s: Simulated time of all episodes together [s].
         shards: Number of MCAP files.
@@ -51,6 +51,7 @@ class Info:
         wall_s: Real time for which it was collected, without pauses [s]; None if no journal tells.
         success: Outcome of trials that succeeded.
         noun: What a trial is called.
+        end: Name of the instant of `landing`; empty if the task has none.
         misses: By how much targets were missed, by column such as ``miss_m``; empty if trials have no targets.
     """
 
@@ -70,6 +71,7 @@ class Info:
     wall_s: float | None = None
     success: str = "landed"
     noun: str = "throw"
+    end: str = "landing"
     misses: Mapping[str, MissSummary] = field(default_factory=dict)
 
 

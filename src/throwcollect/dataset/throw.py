@@ -79,15 +79,29 @@ class Events:
         release: When it left the tool; None if it never did.
         apex: At the highest point of its flight; None without a release.
         landing: When it crossed the landing plane; None if it never did.
+        hit: When the tool first touched the puck of a task such as ``slide``; None if it never did.
+        leave: When the tool last lost contact with the puck; None if it never did.
+        rest: Where it came to rest; None if it did not, or the task does not ask for that.
     """
 
     def __init__(self, row: Row, throw: Throw) -> None:
         self._throw = throw
         self.release, self.apex, self.landing = (_make_event(row, name) for name in ("release", "apex", "landing"))
+        self.hit, self.leave, self.rest = (_make_event(row, name) for name in ("hit", "leave", "rest"))
 
     def __repr__(self) -> str:
-        times = {"release": self.release, "apex": self.apex, "landing": self.landing}
-        return f"Events({', '.join(f'{name} at {at.time_s:.3f} s' for name, at in times.items() if at) or 'none'})"
+        times = {name: at for name, at in vars(self).items() if isinstance(at, BodyEvent)}
+        return f"Events({', '.join(f'{name} at {at.time_s:.3f} s' for name, at in times.items()) or 'none'})"
+
+    @property
+    def left(self) -> BodyEvent | None:
+        """When the tool had let the object go: its release, or when it left."""
+        return self.release or self.leave
+
+    @property
+    def end(self) -> BodyEvent | None:
+        """Where it ended: its landing, or its rest."""
+        return self.landing or self.rest
 
     @cached_property
     def contacts(self) -> tuple[ContactInterval, ...]:
@@ -144,9 +158,9 @@ class Throw:
         text = f"Throw({self.trial}: {self.outcome}"
         if self.reason is not None:
             text += f": {self.reason}"
-        if (landing := self.events.landing) is not None:
-            x, y, _ = landing.position
-            text += f" at x = {x:.3f} m, y = {y:.3f} m after {landing.time_s:.3f} s"
+        if (end := self.events.end) is not None:
+            x, y, _ = end.position
+            text += f" at x = {x:.3f} m, y = {y:.3f} m after {end.time_s:.3f} s"
         return f"{text}; {self.row['samples']} samples)" if self.recorded else f"{text}; not recorded)"
 
     def __getitem__(self, column: str) -> Any:

@@ -33,7 +33,7 @@ _GYM = 2
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     task = source.dataset.config.task
-    success, measure = task.success, "landing_x_m" if task.throws else "outcome"
+    success, measure = task.success, next(iter(task.targets), "outcome")
     return Layout(
         files={
             "throws.hdf5": "the throw of trial N is the group `data/demo_N`; "

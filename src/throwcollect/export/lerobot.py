@@ -277,7 +277,7 @@ def _describe_dataset(
 def _say_task(source: ExportSource, throw: Throw) -> str:
     """Say in words what the robot is to do, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
     task = source.dataset.config.task
-    said = "Throw the ball" if task.throws else task.name.replace("_", " ").capitalize()
+    said = task.instruction or task.name.replace("_", " ").capitalize()
     goal = [f"{each.word} {throw[each.name]:.2f} {unit_of(each.name)}" for each in source.targets]
     return f"{said} to {', '.join(goal)}." if goal else f"{said}."
 

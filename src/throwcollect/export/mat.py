@@ -87,7 +87,7 @@ _FIELDS = (
 def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as MATLAB files of version 5; see `Exporter.write`."""
     task = source.dataset.config.task
-    if not task.throws:
+    if "landing" not in task.events:
         raise refuse_argument(
             "to",
             f"mat has the structure of a throwing database, and the task {task.name} throws no ball",

@@ -72,7 +72,7 @@ _ROWS_PER_GROUP = 30_000
 
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
-    measures = "release, apex, landing" if source.dataset.config.task.throws else "measures"
+    measures = ", ".join(source.dataset.config.task.events) or "measures"
     return Layout(
         files={
             THROWS: f"one row a trial: swept values, outcome, {measures}.",

@@ -82,7 +82,7 @@ def _render_front_matter(config: Config, hub: Mapping[str, Any]) -> list[str]:
         "license": "apache-2.0",
         "pretty_name": config.name,
         "task_categories": ["robotics"],
-        "tags": [*hub["tags"], "robotics", config.task.keyword, config.robot.name, "simulation"],
+        "tags": [*hub["tags"], "robotics", config.task.keyword or config.task.name, config.robot.name, "simulation"],
         "configs": hub["configs"],
     }
     return ["---", to_yaml(header) + "---", ""]

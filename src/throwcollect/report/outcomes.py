@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED
+from throwcollect.tasks.slide.slide_result import SlideOutcome
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 from throwcollect.tasks.throw_into.into_result import IntoOutcome
 
@@ -41,13 +42,21 @@ _STYLES = {
     IntoOutcome.BOUNCED_OUT.value: Style("#CC6677", "bowtie"),
     IntoOutcome.SHORT.value: Style("#C4B04A", "triangle-left"),
     IntoOutcome.BEYOND.value: Style("#117733", "triangle-right"),
+    SlideOutcome.MISSED_PUCK.value: Style("#56B4E9", "circle-open"),
+    SlideOutcome.PUSHED_TWICE.value: Style("#CC79A7", "triangle-ne"),
+    SlideOutcome.OFF_TABLE.value: Style("#8A63D2", "triangle-se"),
+    SlideOutcome.ROBOT_HIT.value: Style("#D55E00", "x-thin-open"),
     ThrowOutcome.TIMEOUT.value: Style("#009E73", "triangle-down"),
     TRACKING_FAILED: Style("#999933", "cross"),
     LOST: Style("#7F7F7F", "hexagon"),
     REFUSED: Style("#B3B3B3", "star"),
 }
 _UNKNOWN = Style("#882255", "pentagon")
-_VERBS = {LANDED: ("land", "landed"), IntoOutcome.IN_BIN.value: ("stay in the bin", "stayed in the bin")}
+_VERBS = {
+    LANDED: ("land", "landed"),
+    IntoOutcome.IN_BIN.value: ("stay in the bin", "stayed in the bin"),
+    SlideOutcome.AT_REST.value: ("come to rest on the table", "came to rest on the table"),
+}
 _SHARED = (LIMIT_VIOLATED, TRACKING_FAILED, LOST, REFUSED)
 """Failures of any task."""
 _FAILURES = (_UNKNOWN, *(style for name, style in _STYLES.items() if name not in (LANDED, *_SHARED)))

@@ -81,9 +81,9 @@ class Feasibility:
         are computed by inverse dynamics plus viscous friction; the tool and the object in it count as part of
         the hand throughout, even after the object has left. The effort of locked joints is not limited, because they
         are simulated as rigid. Angles are true ones (`robot.joint_offsets`), and motions have their true speed
-        (`robot.speed_scale`). Collisions are those of the robot and the tool, also with bodies of the scene; the task
-        judges what the object hits. The tool has to move if the task throws, and to hold what lies in it in the start
-        posture (see `Tool.way_out`).
+        (`robot.speed_scale`). Collisions are those of the robot and the tool, also with bodies of the scene, and at the
+        start with an object that lies elsewhere; the task judges what the object hits. The tool has to move if it acts
+        on the object, and to hold what lies in it in the start posture (see `Tool.way_out`).
 
         Returns:
             None if the trial is feasible. Otherwise one sentence with joint or links, instant, value and limit, about
@@ -109,8 +109,8 @@ class Feasibility:
                 f"{' and '.join(approach.links)} {_describe_gap(approach.distance_m)} "
                 f"at {times[rows[approach.index]]:.3f} s; they must stay {MARGIN_M * 1000:.3g} mm apart"
             )
-        # A throw whose tool never moves is a mistake in the configuration, and not a short throw.
-        if config.task.throws and np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
+        # A trial whose tool never moves is a mistake in the configuration, and not a short throw.
+        if config.task.tool_acts and np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
             carrying = ", ".join(joints[column] for column in self._carrying)
             return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
         return self._explain_loss(config, posture)

@@ -16,7 +16,8 @@ from fastapi.responses import FileResponse, StreamingResponse
 from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
-from throwcollect.dataset.directory import CARD, JOURNAL, MANIFEST, PROVENANCE, THROWS
+from throwcollect.config.loader import load
+from throwcollect.dataset.directory import CARD, JOURNAL, MANIFEST, PROVENANCE, THROWS, config_path
 from throwcollect.dataset.journal import read_commits
 from throwcollect.dataset.manifest import read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
@@ -29,7 +30,6 @@ from throwcollect.sweep.parquet_file import read_parquet
 _PIECE_BYTES = 1 << 20
 _OWN_FILES = {CARD, PROVENANCE}
 """Files that the manifest leaves out, because they differ between two collections of the same dataset."""
-_LANDING = ("landing_x_m", "landing_y_m", "outcome", "trial")
 _MOST_LANDINGS = 20_000
 _JOURNAL_BYTES = 4_000_000
 """Most landings, and most bytes of a journal (about 15,000 throws), for one answer."""
@@ -105,11 +105,13 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
 
     @router.get("/landings")
     def landings(instance: str, first: Annotated[int, Query(ge=0)] = 0) -> LandingPoints:
-        """Where throws came down, of a finished dataset or of one that grows; none for other tasks."""
+        """Where throws came down, or pucks rest, of a finished dataset or of one that grows; none for other tasks."""
         directory = _get_collection(instances, instance).place.directory
+        end = next(reversed(load(config_path(directory)).task.events), "landing")
+        columns = (f"{end}_x_m", f"{end}_y_m", "outcome", "trial")
         if _is_finished(directory):
-            return _read_landings(directory)
-        return _read_landings_so_far(directory, first)
+            return _read_landings(directory, columns)
+        return _read_landings_so_far(directory, columns, first)
 
     return router
 
@@ -166,16 +168,16 @@ def _list_names(directory: Path) -> list[str]:
     ]
 
 
-def _read_landings(directory: Path) -> LandingPoints:
+def _read_landings(directory: Path, columns: tuple[str, ...]) -> LandingPoints:
     """Read the landings of a finished dataset."""
     # All columns of a million throws would take half a gigabyte.
-    table = read_parquet(directory / THROWS, (*_LANDING, "digest"))
+    table = read_parquet(directory / THROWS, (*columns, "digest"))
     recorded = table.filter(table["digest"].is_valid())
     outcomes = {each["values"]: each["counts"] for each in recorded["outcome"].value_counts().to_pylist()}
     rows: list[Any] = []
     total = 0
-    if set(_LANDING) <= set(table.column_names):
-        landed = table.select([*_LANDING]).drop_null()
+    if set(columns) <= set(table.column_names):
+        landed = table.select([*columns]).drop_null()
         total = len(landed)
         # The step is rounded up, so that there are never more landings than allowed.
         some = landed.take([*range(0, total, max(1, -(-total // _MOST_LANDINGS)))])
@@ -183,9 +185,9 @@ def _read_landings(directory: Path) -> LandingPoints:
     return LandingPoints(landings=rows, total=total, outcomes=outcomes, following=0, is_finished=True, has_more=False)
 
 
-def _read_landings_so_far(directory: Path, first: int) -> LandingPoints:
+def _read_landings_so_far(directory: Path, columns: tuple[str, ...], first: int) -> LandingPoints:
     """Read the landings of a dataset that grows, from a byte of its journal on."""
-    rows, following, has_more = read_commits(directory / JOURNAL, _LANDING, first=first, most_bytes=_JOURNAL_BYTES)
+    rows, following, has_more = read_commits(directory / JOURNAL, columns, first=first, most_bytes=_JOURNAL_BYTES)
     return LandingPoints(
         landings=rows, total=len(rows), outcomes={}, following=following, is_finished=False, has_more=has_more
     )

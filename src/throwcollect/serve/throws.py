@@ -32,7 +32,8 @@ from throwcollect.units import NS_PER_S
 _SPIN_S = 0.2
 _FLOAT_BYTES = 4
 _LENGTH = struct.Struct("<I")
-_LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
+_ENDS = ("landing", "rest")
+"""Instants that say where the object ended; the first one that a result has counts."""
 
 
 def encode_throw(
@@ -52,7 +53,7 @@ def encode_throw(
     samples = episode.samples()
     result = json.loads(episode.result)
     spacing_ns = int(samples.stamps_ns[1] - samples.stamps_ns[0]) if len(samples) > 1 else NS_PER_S
-    landing = [result.get(key) for key in _LANDING]
+    places = ([result.get(f"{end}_{axis}_m") for axis in "xyz"] for end in _ENDS)
     header = {
         "trial": episode.header.trial,
         "simulation": simulation,
@@ -60,7 +61,7 @@ def encode_throw(
         "joints": episode.table.joints,
         "samples": len(samples),
         "rate_hz": NS_PER_S / spacing_ns,
-        "landing": None if None in landing else landing,
+        "landing": next((place for place in places if None not in place), None),
         "values": dict(values),
         "bodies": None if bodies is None else [asdict(body) for body in bodies],
     }

@@ -1,4 +1,4 @@
-"""Parts of results that are more than a number: the ball at one instant, and the joint closest to its limit."""
+"""Parts of results that are more than a number: the object at one instant, and the joint closest to its limit."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class ObjectState:
-    """The ball at one instant; world frame.
+    """The object at one instant; world frame.
 
     Attributes:
         time_s: Time since the start of the trial [s].
-        position: Centre of the ball [m].
-        velocity: Velocity of the ball [m/s].
+        position: Its centre [m].
+        velocity: Its velocity [m/s].
     """
 
     time_s: float

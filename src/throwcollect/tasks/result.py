@@ -9,6 +9,7 @@ from enum import Enum
 from types import NoneType
 from typing import Any, Generic, TypeVar
 
+from throwcollect.config.scene import BALL
 from throwcollect.errors import DatasetError
 from throwcollect.tasks.measures import Peak
 from throwcollect.tasks.result_columns import Column, Columns, JointColumns, Number, PeakColumns, columns_of, measured
@@ -67,7 +68,13 @@ class ResultColumns(Generic[AnyResult]):
     """
 
     def __init__(
-        self, results: type[AnyResult], joints: Sequence[str], *, tool: str, sliding: Collection[str] = ()
+        self,
+        results: type[AnyResult],
+        joints: Sequence[str],
+        *,
+        tool: str,
+        acted_on: str = BALL,
+        sliding: Collection[str] = (),
     ) -> None:
         self._results = results
         self._joints = tuple(joints)
@@ -80,7 +87,7 @@ class ResultColumns(Generic[AnyResult]):
             for field, columns in _list_declared(results)
         ]
         self.columns = tuple(
-            replace(column, description=column.description.replace("{tool}", tool))
+            replace(column, description=column.description.replace("{tool}", tool).replace("{object}", acted_on))
             for _, _, declared in self._fields
             for column in declared
         )

@@ -5,7 +5,7 @@ A field of a result declares its columns by the function that makes it::
     release: ObjectState | None = measured(BodyColumns("when it left the {tool}"))
     flight_time_s: float | None = measured(Number("From release to landing [s]."))
 
-A description may name the ``{tool}``, by which contacts with it are recorded.
+A description may name the ``{tool}`` and the ``{object}``, by which contacts and samples are recorded.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ class BodyColumns(Columns):
         """List the columns; see `Columns`."""
         descriptions = [
             f"Time since the start of the trial {self.when} [s].",
-            *(f"Ball centre in world {self.when}, {axis} [m]." for axis in "xyz"),
-            *(f"Velocity of the ball in world {self.when}, {axis} [m/s]." for axis in "xyz"),
+            *(f"Centre of the {{object}} in world {self.when}, {axis} [m]." for axis in "xyz"),
+            *(f"Velocity of the {{object}} in world {self.when}, {axis} [m/s]." for axis in "xyz"),
         ]
         return [Column(column, "number", text) for column, text in zip(body_columns(name), descriptions, strict=True)]
 
@@ -107,14 +107,14 @@ def body_columns(name: str) -> list[str]:
 
 
 def join_body(values: Sequence[float]) -> ObjectState:
-    """Make a state of the ball from the values of its columns."""
+    """Make a state of the object from the values of its columns."""
     time_s, x, y, z, vx, vy, vz = values
     return ObjectState(time_s, (x, y, z), (vx, vy, vz))
 
 
 @dataclass(frozen=True)
 class SpinColumns(Columns):
-    """An angular velocity of the ball: ``<field>_x_radps`` and so on.
+    """An angular velocity of the object: ``<field>_x_radps`` and so on.
 
     Attributes:
         when: The instant, as the end of a sentence.
@@ -126,7 +126,9 @@ class SpinColumns(Columns):
         """List the columns; see `Columns`."""
         return [
             Column(
-                f"{name}_{axis}_radps", "number", f"Angular velocity of the ball in world {self.when}, {axis} [rad/s]."
+                f"{name}_{axis}_radps",
+                "number",
+                f"Angular velocity of the {{object}} in world {self.when}, {axis} [rad/s].",
             )
             for axis in "xyz"
         ]

@@ -91,8 +91,7 @@ def check_choices(task: str, sampler: str) -> None:
 
 def begin_at_default(robot: str, task: str) -> Beginning | None:
     """Find the default motion of a task with a robot; None if the default is for another robot and the task throws."""
-    throws = load_member("tasks", task).throws
-    if throws and robot != RobotConfig().name:
+    if "landing" in load_member("tasks", task).events and robot != RobotConfig().name:
         return None
     try:
         found = _describe_motion(robot, task).task
@@ -118,6 +117,9 @@ def _write_lines(task: str, sampler: str, beginning: Beginning) -> Iterator[str]
     yield ""
     yield "robot:"
     yield from (f"  {line}" for line in beginning.robot)
+    if (tool := load_member("tasks", task).tool) != Config().tool.name:
+        yield "tool:"
+        yield f"  name: {tool} # {_list_choices(names_of('tools'))}"
     yield "task:"
     yield f"  name: {task} # {_list_choices(names_of('tasks'))}"
     yield f"  duration_s: {duration_s:g} # how long the motion takes"
@@ -153,7 +155,8 @@ def _list_choices(names: Iterable[str]) -> str:
 
 def _describe_motion(robot: str, task: str, **motion: Mapping[str, float]) -> Config:
     """Make the configuration of a motion; whatever is not given is the default of the task."""
-    values = {"name": "throws", "robot": {"name": robot}, "task": {"name": task, **motion}}
+    tool = load_member("tasks", task).tool
+    values = {"name": "throws", "robot": {"name": robot}, "tool": {"name": tool}, "task": {"name": task, **motion}}
     return Config.model_validate(values, context=find_robot(robot))
 
 

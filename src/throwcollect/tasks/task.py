@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Generic
 
 from throwcollect.config.motion import MinimumJerk, MotionFile
 from throwcollect.config.schema import Config
+from throwcollect.engines.engine import GROUND
 from throwcollect.episode.record import EndReason, EpisodeHeader, Samples
 from throwcollect.members import explain_failure, load_part
 from throwcollect.robots.description import robot_of
@@ -17,6 +18,7 @@ from throwcollect.robots.surroundings import object_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
+from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
 from throwcollect.tasks.motions import file_trajectory
 from throwcollect.tasks.result import (
@@ -31,7 +33,8 @@ from throwcollect.tasks.result import (
 EndRule = Callable[[Sequence[float], Sequence[float], Collection[str]], EndReason | None]
 """Gets the object in one sample and in the next one, each as the last numbers of an engine's `Sample`, and the names of
 what presses on it; returns why the trial ends with the later sample, None if it goes on."""
-_HEIGHT = 2
+HEIGHT = 2
+"""Number of the object's height in what an `EndRule` gets."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,11 @@ class Task(ABC, Generic[AnyResult]):
     def columns(self) -> ResultColumns[AnyResult]:
         """The columns of the task's results, in the table of a collection of this configuration."""
         return ResultColumns(
-            self.results, tuple(self.config.task.end), tool=self.config.tool.name, sliding=robot_of(self.config).sliding
+            self.results,
+            tuple(self.config.task.end),
+            tool=self.config.tool.name,
+            acted_on=self.config.acted_on,
+            sliding=robot_of(self.config).sliding,
         )
 
     def trajectory(self) -> JointTrajectory:
@@ -139,9 +146,18 @@ class Task(ABC, Generic[AnyResult]):
         holders = {config.tool.name, *config.bodies}
 
         def has_landed(before: Sequence[float], now: Sequence[float], touching: Collection[str]) -> EndReason | None:
-            return "landed" if now[_HEIGHT] < plane_m <= before[_HEIGHT] and holders.isdisjoint(touching) else None
+            return "landed" if now[HEIGHT] < plane_m <= before[HEIGHT] and holders.isdisjoint(touching) else None
 
         return has_landed
+
+    def stands(self, body: str) -> bool:
+        """Whether a name in contacts is that of the ground, or of a body of the world: neither tool nor robot."""
+        return body == GROUND or body in self.config.bodies
+
+    def final_state(self, samples: Samples, header: EpisodeHeader) -> ObjectState:
+        """Return the object in the last sample."""
+        (x, y, z), (vx, vy, vz) = samples.object_position[-1].tolist(), samples.object_linear_velocity[-1].tolist()
+        return ObjectState(header.seconds_at(int(samples.stamps_ns[-1])), (x, y, z), (vx, vy, vz))
 
     @abstractmethod
     def assess(self, result: AnyResult, samples: Samples, header: EpisodeHeader) -> tuple[AnyResult, Failure | None]:

@@ -1,4 +1,4 @@
-"""The kind of part `Tool`: a body in the robot's hand from which a ball is thrown, as it lies in it or is held."""
+"""The kind of part `Tool`: a body in the robot's hand which throws what lies in it or is held, or hits other bodies."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, Problem
 from throwcollect.members import explain_failure, load_part
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.reproducible_math import add_up
@@ -35,7 +36,9 @@ class Box:
 
 
 class Tool(ABC):
-    """A tool; in the frame of its link, the cup must open along +x, and all else is up to the tool.
+    """A tool; in the frame of its link, a cup must open along +x, and all else is up to the tool.
+
+    Opening, depth, seat and way out are those of tools in which an object can lie; by default, a tool holds none.
 
     Attributes:
         name: Name of the tool, as of its entry point, such as ``spoon``, by which contacts with it are recorded; its
@@ -70,37 +73,45 @@ class Tool(ABC):
         """Inertia of the tool, in its frame."""
 
     @property
-    @abstractmethod
     def rim_radius_m(self) -> float:
-        """Radius of the opening through which the ball leaves [m]."""
+        """Radius of the opening through which the object leaves [m]; 0 if the tool holds none."""
+        return 0.0
 
     @property
-    @abstractmethod
     def depth_m(self) -> float:
-        """Depth of the cup below the opening [m]."""
+        """Depth of the cup below the opening [m]; 0 likewise."""
+        return 0.0
 
-    @abstractmethod
-    def ball_seat(self, radius: float) -> tuple[float, float, float]:
-        """Find the centre [m] of a ball that rests in the upright cup, in the tool's frame.
+    def ball_seat(self, radius: float) -> tuple[float, float, float]:  # noqa: ARG002 - tools that hold nothing
+        """Find the centre [m] of an object that rests in the upright cup, in the tool's frame.
 
         Args:
-            radius: Radius of the ball [m].
+            radius: Radius of the sphere around the object [m].
 
         Raises:
-            ConfigError: If the cup cannot hold such a ball.
+            ConfigError: If the tool cannot hold such an object.
         """
+        raise self._refuse()
 
-    @abstractmethod
-    def way_out(self, radius: float, up: NDArray[np.float64]) -> float:
-        """Find the slope of the lowest way on which a ball can leave the cup while the cup does not move.
+    def way_out(self, radius: float, up: NDArray[np.float64]) -> float:  # noqa: ARG002 - tools that hold nothing
+        """Find the slope of the lowest way on which an object can leave the cup while the cup does not move.
 
         Args:
-            radius: Radius of the ball [m].
+            radius: Radius of the sphere around the object [m].
             up: Unit vector against gravity in the tool's frame, shape ``(3,)``.
 
         Returns:
-            Slope [rad]; above zero, the way climbs and the ball stays; below zero, it goes down.
+            Slope [rad]; above zero, the way climbs and the object stays; below zero, it goes down.
+
+        Raises:
+            ConfigError: If the tool holds no object at all.
         """
+        raise self._refuse()
+
+    def _refuse(self) -> ConfigError:
+        """Make the error for a configuration in which the object starts in a tool that holds none."""
+        what = "set `object` to a body that lies elsewhere, or a task that has one, such as slide"
+        return ConfigError([Problem(f"the {self.name} holds no object; {what}", "tool.name")])
 
 
 def spread_mass(mass_kg: float, boxes: Sequence[Box]) -> pinocchio.Inertia:

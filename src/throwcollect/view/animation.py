@@ -21,7 +21,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.surroundings import bodies_of, looks_of, object_of
+from throwcollect.robots.surroundings import bodies_of, looks_of, object_of, starts_in_tool
 from throwcollect.view.drawn_robot import draw_bodies_of, draw_robot_of
 from throwcollect.view.viewer_directory import choose_throws
 
@@ -94,12 +94,12 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
 
 def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
-    (_, samples), landing = throw.read_samples(), throw.events.landing
+    (_, samples), landing = throw.read_samples(), throw.events.end
     robot, joints = draw_robot_of(config), robot_of(config).joints
     times_s = samples.seconds_since(samples.stamps_ns[0])
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
-    released_s = throw.row.get("release_time_s")
-    released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))
+    left = throw.events.left
+    released = len(samples) if left is None else int(np.searchsorted(times_s, left.time_s))
     colours = {look.name: shape.rgba for look, shape in zip(looks_of(config), draw_bodies_of(config), strict=True)}
     bodies = [(body, colours[body.link.name]) for body in (*bodies_of(config), object_of(config))]
     with Renderer(robot.urdf_with_files, config.robot.base_height_m, bodies) as renderer:
@@ -123,13 +123,17 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
             _place(renderer, joints, samples, number)
             picture = ground.picture()
             path = samples.object_position[: number + 1]
-            ground.mark(picture, path[-1], landing.position if landing and number == shown[-1] else None)
-            ground.trace(picture, path[: released + 1], _HELD)
-            ground.trace(picture, path[released:], _FLOWN)
+            end = landing.position if landing and number == shown[-1] else None
+            if flies := starts_in_tool(config):
+                ground.shade(picture, path[-1])
+                ground.mark(picture, path, released, end)
             seen = renderer.draw(*ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
             body = images.fromarray(seen)
             # The picture of the robot is its own mask, because it is transparent where nothing was drawn.
             picture.paste(body, (0, 0), body)
+            # What slides on a body would have its path behind the picture of that body.
+            if not flies:
+                ground.mark(picture, path, released, end)
             pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
     return pictures
 
@@ -195,19 +199,23 @@ class _Ground:
         """A picture of the ground alone."""
         return self._empty.copy()
 
-    def trace(self, picture: Any, path: NDArray[np.float64], color: tuple[int, int, int]) -> None:
-        """Draw a path of the object's centre in world [m], shape ``(n, 3)``."""
-        if len(path) > 1:
-            drawing.Draw(picture).line(self._find_pixels(path), fill=color, width=3, joint="curve")
+    def mark(self, picture: Any, path: NDArray[np.float64], left: int, end: NDArray[np.float64] | None) -> None:
+        """Draw a path of the object's centre in world [m], shape ``(n, 3)``, and a cross where it ended.
 
-    def mark(self, picture: Any, place: NDArray[np.float64], landing: NDArray[np.float64] | None) -> None:
-        """Draw the shadow of the object, and a cross where it landed."""
+        It left the tool with the sample of number `left`.
+        """
         pen = drawing.Draw(picture)
-        ((x, y),) = self._find_pixels(place[np.newaxis] * [1, 1, 0])
-        pen.ellipse((x - 9, y - 3, x + 9, y + 3), fill=_LINE)
-        if landing is not None:
+        for part, color in ((path[: left + 1], _HELD), (path[left:], _FLOWN)):
+            if len(part) > 1:
+                pen.line(self._find_pixels(part), fill=color, width=3, joint="curve")
+        if end is not None:
             for step in (np.array([0.1, 0.1, 0.0]), np.array([0.1, -0.1, 0.0])):
-                pen.line(self._find_pixels(np.stack([landing - step, landing + step])), fill=_LANDED, width=3)
+                pen.line(self._find_pixels(np.stack([end - step, end + step])), fill=_LANDED, width=3)
+
+    def shade(self, picture: Any, place: NDArray[np.float64]) -> None:
+        """Draw the shadow of the object on the ground."""
+        ((x, y),) = self._find_pixels(place[np.newaxis] * [1, 1, 0])
+        drawing.Draw(picture).ellipse((x - 9, y - 3, x + 9, y + 3), fill=_LINE)
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def throw_markers(throw: ShownThrow) -> Any:
     markers = [marker(header=make_header(WORLD, stamp), action=marker.DELETEALL)]
     markers += shape_markers("bodies", draw_bodies_of(throw.config), Path, stamp).markers
     markers.append(_make_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
-    for point in ("release", "apex", "landing"):
+    for point in throw.config.task.events:
         markers += _make_point(point, throw.throw.row, stamp)
     return array(markers=markers)
 
@@ -122,9 +122,9 @@ def path_cloud(throw: ShownThrow) -> Any:
 def _make_path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
     """A line, grey while the object was held, with the colour of the outcome from its release on."""
     point, color = get_message("geometry_msgs/msg/Point"), get_message("std_msgs/msg/ColorRGBA")
-    rate, released, last = throw.config.record.rate_hz, throw.throw.row.get("release_time_s"), len(throw.path) - 1
+    rate, left, last = throw.config.record.rate_hz, throw.throw.events.left, len(throw.path) - 1
     chosen = [*range(0, last, max(1, rate // _POINTS_PER_S)), last]
-    release = math.inf if released is None else released * rate
+    release = math.inf if left is None else left.time_s * rate
     flown = _SUCCEEDED if throw.throw["outcome"] == throw.config.task.success else _FAILED
     colors = {held: color(r=r, g=g, b=b, a=a * alpha) for held, (r, g, b, a) in ((True, _HELD), (False, flown))}
     marker = get_message("visualization_msgs/msg/Marker")
@@ -144,10 +144,10 @@ def _make_point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     (x, y, z), speed = state.position, math.hypot(*state.velocity)
     marker = get_message("visualization_msgs/msg/Marker")
     text = {
-        "release": f"release {state.time_s:.2f} s, {speed:.2f} m/s",
         "apex": f"apex {z:.2f} m",
         "landing": f"landing x {x:.2f} m, y {y:.2f} m, {speed:.2f} m/s",
-    }[name]
+        "rest": f"rest x {x:.2f} m, y {y:.2f} m",
+    }.get(name, f"{name} {state.time_s:.2f} s, {speed:.2f} m/s")
     dot = _make_marker(name, marker.SPHERE, _SUCCEEDED, (_POINT_M,) * 3, stamp_ns)
     label = _make_marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text

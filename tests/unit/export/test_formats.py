@@ -41,7 +41,7 @@ def test_every_format_has_a_card_with_digest_units_configuration_and_all_files(
     card = (directory / "README.md").read_text(encoding="utf-8")
     assert (directory / "config.yaml").read_bytes() == (source / "config.yaml").read_bytes()
     assert info(source).digest in card
-    assert "| `landing_x_m` | m | Ball centre in world when it crossed the landing plane, x [m]. |" in card
+    assert "| `landing_x_m` | m | Centre of the ball in world when it crossed the landing plane, x [m]. |" in card
     assert "| `task_end_arm_right_4_joint` | rad |" in card
     assert "| landed | 3 |" in card
     assert "| not_released | 1 |" in card

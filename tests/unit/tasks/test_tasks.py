@@ -44,7 +44,7 @@ def test_a_task_has_the_common_outcomes_and_its_success(section: type[TaskConfig
     assert {LIMIT_VIOLATED, TRACKING_FAILED, LOST, fill(section).success} <= words
     assert REFUSED not in words
     # `ThrowTask` finds these.
-    assert not section.throws or {"not_released", "dropped", "self_hit", "recaught"} <= words
+    assert "landing" not in section.events or {"not_released", "dropped", "self_hit", "recaught"} <= words
 
 
 @of_every_task

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -115,7 +114,7 @@ def describe(found: Info) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     lines = {
         "trials": f"{found.trials}: {outcomes}{_describe_shortage(found)}",
-        **({"landing": _describe_landing(found.landing)} if found.noun == "throw" else {}),
+        **({found.end: _describe_landing(found)} if found.end else {}),
         **{name: _describe_misses(name, misses) for name, misses in found.misses.items()},
         "episodes": f"{found.episodes}, {found.samples} samples, {found.duration_s:.0f} s of simulated time",
         "files": f"{found.shards} MCAP of {found.recordings_bytes / 1e6:.1f} MB, "
@@ -149,9 +148,9 @@ def _describe_misses(name: str, misses: MissSummary) -> str:
     return f"{targets}: median {median}, 9 of 10 below {share90}"
 
 
-def _describe_landing(landing: Mapping[str, tuple[float, float]] | None) -> str:
-    if landing is None:
-        return "no ball landed"
+def _describe_landing(found: Info) -> str:
+    if found.landing is None:
+        return "no ball landed" if found.end == "landing" else "none"
     # Adding 0 turns a negative zero into 0.
-    x, y = ([round(end, 3) + 0.0 for end in landing[name]] for name in ("x_m", "y_m"))
+    x, y = ([round(end, 3) + 0.0 for end in found.landing[name]] for name in ("x_m", "y_m"))
     return f"x {x[0]:.3f} to {x[1]:.3f} m, y {y[0]:.3f} to {y[1]:.3f} m"

@@ -13,6 +13,7 @@ from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.progress_log import log_progress
+from throwcollect.report.maps import Points
 from throwcollect.report.measured import read_numbers
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.tasks.throw.flight import flight_residual
@@ -31,41 +32,23 @@ _TITLES = {
 
 
 @dataclass(frozen=True)
-class Landings:
+class Landings(Points):
     """All throws whose ball crossed the landing plane, of any outcome; each array has the shape ``(n,)``.
 
     Attributes:
-        row: Place of the throw in the table.
-        trial: Number of the trial.
-        x_m: Ball centre in world [m], forward of the robot.
-        y_m: Ball centre in world [m], left of the robot.
         distance_m: Horizontal distance from the robot's base [m].
         hit_angle_rad: Direction of flight below the horizontal [rad].
-        speed_mps: Speed at release [m/s].
         elevation_rad: Direction of flight at release above the horizontal [rad].
-        code: Outcome, as index into `Outcomes.names`.
     """
 
-    row: NDArray[np.intp]
-    trial: NDArray[np.int64]
-    x_m: NDArray[np.float64]
-    y_m: NDArray[np.float64]
     distance_m: NDArray[np.float64]
     hit_angle_rad: NDArray[np.float64]
-    speed_mps: NDArray[np.float64]
     elevation_rad: NDArray[np.float64]
-    code: NDArray[np.intp]
 
     @property
     def elevation_deg(self) -> NDArray[np.float64]:
         """Direction of flight at release above the horizontal [°], as figures show it."""
         return np.degrees(self.elevation_rad)
-
-    def __len__(self) -> int:
-        return len(self.trial)
-
-    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Landings:
-        return Landings(**{name: column[rows] for name, column in vars(self).items()})
 
 
 def read_landings(throws: pa.Table, outcomes: Outcomes) -> Landings:

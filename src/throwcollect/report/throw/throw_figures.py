@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,56 +19,23 @@ from throwcollect.report.figures import (
     place_bars,
     single_precision,
 )
-from throwcollect.report.measured import choose_points
-from throwcollect.report.outcomes import LANDED, Outcomes, in_words
+from throwcollect.report.maps import SCALE, colour_bar, draw_bodies, draw_coloured
+from throwcollect.report.outcomes import Outcomes, in_words
 from throwcollect.report.throw.measured import CellAxis, Landings, Residuals
 from throwcollect.robots.surroundings import BodyLook
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
-_SCALE = "Viridis"
 _SHADES = ("#3b528b", "#2c728e", "#21908d", "#27ad81", "#5dc863", "#aadc32")
 """Colours of paths that landed, from the nearest to the farthest."""
-_MOST_SVG_POINTS = 1500
-"""Plots of more points are drawn by WebGL, which is faster."""
 _FEW = 8
 """Up to this many throws in a cell, the scale has a mark for each number of throws; plotly would also mark halves."""
 FLOOR_M = 1e-17
 """Smaller residuals are drawn as this value, as 0 has no place on a logarithmic axis."""
 
 
-def draw_landing_map(landings: Landings, outcomes: Outcomes, bodies: Sequence[BodyLook] = ()) -> go.Figure:
-    """Draw landings from above, coloured by release speed, or by outcome if there is more to success than a landing."""
-    figure = _draw_coloured(
-        landings,
-        outcomes,
-        columns=("x_m", "y_m", "speed_mps"),
-        hover="x %{x:.3f} m, y %{y:.3f} m, released at %{marker.color:.2f} m/s",
-        scale_title="release speed [m/s]" if outcomes.success == LANDED else None,
-    )
-    _draw_bodies(figure, bodies, "above_m")
-    robot = {"symbol": "star-triangle-up", "size": 13, "color": NEUTRAL, "line": {"width": 1, "color": "white"}}
-    figure.add_scatter(x=[0], y=[0], mode="markers", name="robot", marker=robot, hovertemplate="robot<extra></extra>")
-    figure.update_xaxes(title="x, forward [m]", constrain="domain")
-    figure.update_yaxes(title="y, left [m]", scaleanchor="x", constrain="domain")
-    return figure.update_layout(height=460)
-
-
-def _draw_bodies(figure: go.Figure, bodies: Sequence[BodyLook], outline: str) -> None:
-    """Draw one of the outlines of bodies behind all that a figure shows; the more of a name, the paler each is."""
-    shown, same = len(figure.data), Counter(body.name for body in bodies)
-    for body in bodies:
-        first, *others = getattr(body, outline)
-        x, y = zip(first, *others, first, strict=True)
-        red, green, blue = bytes.fromhex(body.color[1:])
-        fill = f"rgba({red}, {green}, {blue}, {0.2 / same[body.name]:.3f})"
-        look = {"mode": "lines", "fill": "toself", "fillcolor": fill, "line": {"color": body.color, "width": 1}}
-        figure.add_scatter(x=x, y=y, **look, name=body.name, showlegend=False, hoverinfo="skip")
-    figure.data = (*figure.data[shown:], *figure.data[:shown])
-
-
 def draw_release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
     """Draw speed and elevation at release, coloured by the distance at which the ball landed."""
-    figure = _draw_coloured(
+    figure = draw_coloured(
         landings,
         outcomes,
         columns=("speed_mps", "elevation_deg", "distance_m"),
@@ -81,50 +47,6 @@ def draw_release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
     return figure.update_layout(height=420)
 
 
-def _draw_coloured(
-    landings: Landings, outcomes: Outcomes, *, columns: tuple[str, str, str], hover: str, scale_title: str | None
-) -> go.Figure:
-    """Draw points in one colour scale, or without its title in the colours of outcomes; each of these has a marker."""
-    shown = landings[choose_points(len(landings))]
-    x, y, colour = (getattr(shown, name) for name in columns)
-    kind = go.Scattergl if len(shown) > _MOST_SVG_POINTS else go.Scatter
-    size = 8 if len(shown) <= 300 else 6 if len(shown) <= 1500 else 4
-    figure = go.Figure()
-    present = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
-    # Throws that succeeded are drawn last, on top of the others, because the colour scale is mostly about them.
-    for code, name in reversed(present):
-        own, style = shown.code == code, outcomes.style_of(name)
-        look: dict[str, object] = {"color": style.colour}
-        if scale_title is not None:
-            look = {"color": single_precision(colour[own]), "coloraxis": "coloraxis"}
-            if name != outcomes.success:
-                look |= {"size": 1.4 * size, "line": {"color": style.colour, "width": size / 5}}
-        figure.add_trace(
-            kind(
-                x=single_precision(x[own]),
-                y=single_precision(y[own]),
-                customdata=shown.trial[own],
-                mode="markers",
-                marker={"symbol": style.symbol, "size": size, **look},
-                showlegend=False,
-                hovertemplate=f"trial %{{customdata}}<br>{hover}<extra>{in_words(name)}</extra>",
-            )
-        )
-    # The legend has markers of its own, because the points have no single colour.
-    for _, name in present:
-        style = outcomes.style_of(name)
-        look = {"symbol": style.symbol, "color": style.colour if scale_title is None else NEUTRAL}
-        if scale_title is not None and name != outcomes.success:
-            look = {"symbol": f"{style.symbol}-open", "color": style.colour}
-        figure.add_scatter(x=[None], y=[None], mode="markers", name=in_words(name), marker={**look, "size": 9})
-    axis = {} if scale_title is None else {"colorscale": _SCALE, "colorbar": _colour_bar(scale_title)}
-    return figure.update_layout(coloraxis=axis, legend=LEGEND_ABOVE)
-
-
-def _colour_bar(title: str) -> dict[str, object]:
-    return {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
-
-
 def draw_coverage_map(x: CellAxis, y: CellAxis, counts: NDArray[np.intp]) -> go.Figure:
     """Draw the number of throws over two axes of the cells; empty cells are blank."""
     most = max(int(counts.max()), 1)
@@ -134,12 +56,12 @@ def draw_coverage_map(x: CellAxis, y: CellAxis, counts: NDArray[np.intp]) -> go.
             x=x.edges,
             y=y.edges,
             z=np.where(counts, counts, np.nan).T,
-            colorscale=_SCALE,
+            colorscale=SCALE,
             zmin=0,
             zmax=most,
             xgap=1,
             ygap=1,
-            colorbar={**_colour_bar("throws"), **marks},
+            colorbar={**colour_bar("throws"), **marks},
             hovertemplate="%{x:.3f}, %{y:.3f}<br>%{z} throws<extra></extra>",
         )
     )
@@ -179,8 +101,8 @@ def draw_ball_views(
 ) -> tuple[go.Figure, go.Figure]:
     """Draw paths of the ball as seen from the robot's right, and from above."""
     side, above = _draw_paths(throws, outcomes, 2), _draw_paths(throws, outcomes, 1)
-    _draw_bodies(side, bodies, "side_m")
-    _draw_bodies(above, bodies, "above_m")
+    draw_bodies(side, bodies, "side_m")
+    draw_bodies(above, bodies, "above_m")
     if landing_height_m is not None:
         side.add_hline(y=landing_height_m, line={"color": NEUTRAL, "width": 1})
     side.update_yaxes(title="z, up [m]")

@@ -13,6 +13,7 @@ from throwcollect.config.sweep import LANDING_HEIGHT
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
 from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile, format_share
+from throwcollect.report.maps import draw_map
 from throwcollect.report.measured import MOST_POINTS
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.throw import throw_figures
@@ -102,7 +103,8 @@ def _show_landings(
         )
     others = len(landings) - len(planned)
     text += f". {format_count(others, 'further ball')} crossed the {_name_plane(outcomes)}, too." if others else "."
-    figure = throw_figures.draw_landing_map(landings, outcomes, bodies)
+    # A landing is all that a throw is about, but only a part of what other tasks are about.
+    figure = draw_map(landings, outcomes, bodies, speed="release speed" if outcomes.success == LANDED else None)
     notes = [_say_how_many(landings)]
     if len({body.name for body in bodies}) < len(bodies):
         notes.append("Bodies differ from throw to throw; those of a few throws are drawn.")

@@ -5,8 +5,8 @@ import { drawErrors } from "./model_chart.js";
 import { describe, median, tabulate } from "./model_words.js";
 
 const HEIGHT = "scene.landing_height_m";
-/** Targets that lie on the landing map. */
-const PLACE = ["landing_x_m", "landing_y_m"];
+/** Ends of the names of targets that lie on the landing map, such as landing_x_m and rest_y_m. */
+const PLACE = ["_x_m", "_y_m"];
 
 /** The box of the page that shows one model. */
 export class Models {
@@ -37,7 +37,7 @@ export class Models {
 
   /** @returns {boolean} whether a model is shown that belongs on the landing map */
   get isOnMap() {
-    return this.#model !== null && PLACE.every((name, i) => this.#model.targets[i] === name);
+    return this.#model !== null && PLACE.every((end, i) => this.#model.targets[i]?.endsWith(end));
   }
 
   /** Fetch the names of all models, and the shown model again. */
@@ -59,7 +59,8 @@ export class Models {
    */
   aimAt([x, y, z]) {
     if (!this.isOnMap) return;
-    const values = { [PLACE[0]]: x, [PLACE[1]]: y, [HEIGHT]: z };
+    const [first, second] = this.#model.targets;
+    const values = { [first]: x, [second]: y, [HEIGHT]: z };
     for (const [name, field] of this.#fields()) {
       if (name in values) field.value = values[name].toFixed(3);
     }
@@ -143,8 +144,9 @@ export class Models {
 }
 
 function inWords(name) {
-  const known = { [PLACE[0]]: "x [m]", [PLACE[1]]: "y [m]", [HEIGHT]: "z [m]" };
-  return known[name] ?? name;
+  const axis = PLACE.find((end) => name.endsWith(end));
+  if (name === HEIGHT) return "z [m]";
+  return axis ? `${axis[1]} [m]` : name;
 }
 
 function inPlaces(values) {

@@ -6,6 +6,7 @@ export const TARGET_COLOR = "#d6246e";
 const COLORS = {
   landed: "#1f9e77",
   in_bin: "#1f9e77",
+  at_rest: "#1f9e77",
   dropped: "#d95f02",
   not_released: "#7570b3",
   recaught: "#e7298a",
@@ -17,6 +18,10 @@ const COLORS = {
   bounced_out: "#ff8f6b",
   short: "#d4b106",
   beyond: "#6a4fd0",
+  missed_puck: "#d95f02",
+  pushed_twice: "#e7298a",
+  off_table: "#7570b3",
+  robot_hit: "#c5352f",
   timeout: "#4a90d9",
   tracking_failed: "#a0522d",
   lost: "#808080",

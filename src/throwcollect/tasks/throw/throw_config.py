@@ -23,7 +23,11 @@ class SwingConfig(TaskConfig):
     """Keys of every task that throws: the arm swings from `start` to `end`, and the spoon brakes."""
 
     until: ClassVar[type[UntilConfig]] = UntilLanded
-    throws: ClassVar[bool] = True
+    tool_acts: ClassVar[bool] = True
+    noun: ClassVar[str] = "throw"
+    keyword: ClassVar[str] = "throwing"
+    instruction: ClassVar[str] = "Throw the ball"
+    events: ClassVar[tuple[str, ...]] = ("release", "apex", "landing")
     targets: ClassVar[tuple[str, ...]] = ("landing_x_m", "landing_y_m")
 
     name: str

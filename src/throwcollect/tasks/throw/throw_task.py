@@ -62,7 +62,7 @@ class ThrowTask(Task[ThrowResult]):
         impacts: list[Contact] = []
         if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
             flight = flight_after(samples, start_ns=header.start_ns, release_ns=release_ns)
-            impacts = [each for each in header.contacts if each.start_ns >= release_ns and self._stands(each.body)]
+            impacts = [each for each in header.contacts if each.start_ns >= release_ns and self.stands(each.body)]
             if impacts:
                 flight = without_impact(flight, header.seconds_at(impacts[0].start_ns), config=config)
             result = self.measure_flight(result, flight)
@@ -105,10 +105,6 @@ class ThrowTask(Task[ThrowResult]):
             return result, Failure(ThrowOutcome.TIMEOUT, reason)
         return result, None
 
-    def _stands(self, body: str) -> bool:
-        """Whether a name in contacts is that of the ground, or of a body of the scene."""
-        return body == GROUND or body in self.config.bodies
-
     def _find_failure(
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader, touched: list[Contact]
     ) -> Failure | None:
@@ -132,7 +128,7 @@ class ThrowTask(Task[ThrowResult]):
         """List the contacts with the robot between release and landing; contacts with the tool must have begun then."""
 
         def counts(contact: Contact) -> bool:
-            if self._stands(contact.body) or header.seconds_at(contact.start_ns) >= end_s:
+            if self.stands(contact.body) or header.seconds_at(contact.start_ns) >= end_s:
                 return False
             if contact.body == self.config.tool.name:
                 return contact.start_ns >= release_ns

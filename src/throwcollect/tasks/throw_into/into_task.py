@@ -73,11 +73,7 @@ class ThrowIntoTask(ThrowTask):
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader, impacts: Sequence[Contact]
     ) -> tuple[ThrowResult, Failure | None]:
         """Find where the ball ended; see `ThrowTask.judge_flight`."""
-        time_s = header.seconds_at(int(samples.stamps_ns[-1]))
-        rest = None
-        if header.end_reason == "rest":
-            (x, y, z), (vx, vy, vz) = samples.object_position[-1].tolist(), samples.object_linear_velocity[-1].tolist()
-            rest = ObjectState(time_s, (x, y, z), (vx, vy, vz))
+        rest = self.final_state(samples, header) if header.end_reason == "rest" else None
         result = replace(result, rest=rest, bounces=len(impacts))  # type: ignore[call-arg]
         return result, self._find_miss(result, rest, impacts, header)
 

@@ -15,7 +15,7 @@ def make_landings(distance: list[float], angle: list[float]) -> Landings:
     count, zero = len(distance), np.zeros(len(distance))
     trials = np.arange(count)
     return Landings(
-        trials, trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0
+        trials, trials, np.array(distance), zero, zero, trials * 0, np.array(distance), np.array(angle), zero
     )
 
 
