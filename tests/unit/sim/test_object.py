@@ -81,8 +81,16 @@ def test_what_lies_on_a_body_touches_its_upper_side(body: dict[str, Any], height
 @pytest.mark.parametrize(
     ("settings", "key", "required"),
     [
-        (configure("cup", puck=PUCK, table=TABLE), "object", "should be a body with a mass_kg, puck, got cup"),
-        (configure("table", table=TABLE), "object", "should be a body with a mass_kg, none, got table"),
+        (
+            configure("cup", puck=PUCK, table=TABLE),
+            "object",
+            "should be a box, cylinder or sphere with a mass_kg, puck, got cup",
+        ),
+        (
+            configure("table", table=TABLE),
+            "object",
+            "should be a box, cylinder or sphere with a mass_kg, none, got table",
+        ),
         ({**configure("puck", puck=PUCK, table=TABLE), "ball": {"mass_kg": 0.1}}, "ball", "acts on puck"),
         (configure(None, puck=PUCK), "scene.bodies.puck.lies_on", "a body that lies on none, none, got table"),
         (configure(None, cube=CUBE), "scene.bodies.cube.lies_on", "got claw"),
