@@ -21,6 +21,7 @@ PLACES: dict[str, tuple[float, int, str]] = {
     "cluster": (0.3, 1, "Slurm: many machines"),
     "serve": (1.5, 1, "page, REST, rosbridge"),
     "runs": (0.3, 2, "prepare, follow, stop"),
+    "gym": (2.7, 1, "environments to learn in"),
     "simulator": (1.5, 2, "throws for Python"),
     "runtimes": (0.3, 3, "where nodes live"),
     "replay": (0.3, 4, "throws once more"),

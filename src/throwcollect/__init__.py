@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from throwcollect.version import __version__
 
 if TYPE_CHECKING:
-    from throwcollect import runs
+    from throwcollect import gym, runs
     from throwcollect.config.loader import load as load_config
     from throwcollect.config.schema import Config
     from throwcollect.dataset.reader import Dataset, UnfinishedDatasetWarning, load
@@ -59,6 +59,7 @@ __all__ = [
     "export_dataset",
     "filter_dataset",
     "fit",
+    "gym",
     "load",
     "load_config",
     "load_model",
@@ -90,6 +91,7 @@ _PLACES = {
     "export_dataset": "export.export:export",
     "filter_dataset": "derive.derivation:filter_trials",
     "fit": "learning.fitting:fit",
+    "gym": "gym",
     "load": "dataset.reader:load",
     "load_config": "config.loader:load",
     "load_model": "learning.model:load_model",

@@ -23,11 +23,17 @@ _SOURCES = (".py", ".msg", ".srv", ".action", ".json")
 
 
 @cache
-def build_digest(engine: str, robot: str = "talos", tool: str = "spoon", task: str = "throw") -> str:
-    """Hash the installed sources, and versions of the packages of these parts; SHA-256, in hexadecimal."""
+def build_digest(engine: str, robot: str = "talos", tool: str = "spoon", task: str = "throw", policy: str = "") -> str:
+    """Hash the installed sources, and versions of the packages of these parts; SHA-256, in hexadecimal.
+
+    Of a policy ``module:function``, the file of the module counts.
+    """
     digest = hashlib.sha256(_hash_sources())
     for fact in _list_facts(engine, robots=robot, tools=tool, tasks=task):
         digest.update(fact.encode() + b"\n")
+    if policy:
+        facts = [_hash_module(policy.partition(":")[0])] if ":" in policy else list_origins("policies", policy)
+        digest.update("\n".join([policy, *facts]).encode())
     return digest.hexdigest()
 
 
@@ -58,6 +64,14 @@ def _list_facts(engine: str, **others: str) -> Iterator[str]:
         yield f"{package.module} {sizes or 'missing'} bytes"
     for family, name in {"engines": engine, **others}.items():
         yield from list_origins(family, name)
+
+
+def _hash_module(module: str) -> str:
+    try:
+        found = find_spec(module)
+        return hashlib.sha256(Path(found.origin or "").read_bytes()).hexdigest() if found else "missing"
+    except (ImportError, OSError, ValueError):
+        return "missing"
 
 
 def _version_of(distribution: str) -> str:

@@ -29,6 +29,7 @@ EXTRA_OF = MappingProxyType(
         "zenoh": "collect",
         "docker": "docker",
         "fastapi": "serve",
+        "gymnasium": "gym",
         "h5py": "export",
         "scipy": "export",
         "jinja2": "report",

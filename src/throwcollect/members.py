@@ -63,6 +63,7 @@ _OWN = MappingProxyType(
             "hdf5": "throwcollect.export.hdf5:HDF5",
             "mat": "throwcollect.export.mat:MAT",
         },
+        "policies": {},
     }
 )
 
@@ -74,11 +75,12 @@ _KINDS = MappingProxyType(
         "tasks": "throwcollect.config.task_config:TaskConfig",
         "runtimes": "throwcollect.runtimes.runtime:Runtime",
         "exporters": "throwcollect.export.exporter:Exporter",
+        "policies": "collections.abc:Callable",
     }
 )
 """The class of each family: its members are values of this class (see `_VALUES`), or else classes derived from it."""
 
-_VALUES = frozenset({"robots", "exporters"})
+_VALUES = frozenset({"robots", "exporters", "policies"})
 """The families whose members are values; members of all other families are classes."""
 
 _DEBUG = "THROWCOLLECT_DEBUG"
@@ -93,12 +95,13 @@ def names_of(family: str) -> tuple[str, ...]:
 
 @cache
 def load_member(family: str, name: str) -> Any:
-    """Import a member of ``robots``, ``tools``, ``engines``, ``tasks``, ``runtimes`` or ``exporters`` by its name.
+    """Import a member of a family by its name.
 
     The result is cached for callers that ask for it in every trial.
 
     Returns:
-        A `Robot` or an `Exporter`; the class of an engine or a runtime; for a tool or a task, the class of its section.
+        A `Robot`, an `Exporter`, or a function that makes a policy; the class of an engine or a runtime; for a tool or
+        a task, the class of its section.
     """
     entry = _find_members()[family][name]
     if is_own(family, name):
@@ -215,7 +218,11 @@ def _import(path: str, what: str) -> Any:
 def _describe(family: str, name: str) -> str:
     """Name a member of another package and that package, as the beginning of a message."""
     owners = sorted(map(_name_owner, _find_namesakes(family, name)))
-    return f"the {family.removesuffix('s')} {name} of {' and '.join(owners)}"
+    kind = "policy" if family == "policies" else family.removesuffix("s")
+    # A policy may be an object, or a function that no package has given a name.
+    return (
+        f"the {kind} {name}" if family == "policies" and not owners else f"the {kind} {name} of {' and '.join(owners)}"
+    )
 
 
 def _find_namesakes(family: str, name: str) -> list[EntryPoint]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.loader import load
+from throwcollect.config.policy import PolicyConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.task_config import LARGEST_TARGET
@@ -19,13 +20,15 @@ from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
+from throwcollect.sim.policy import Policy, check_observation
 from throwcollect.sweep.chosen_motions import complete_point
-from throwcollect.sweep.plan import make_trials, refusal
+from throwcollect.sweep.plan import Check, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.trials import Trial
 
@@ -102,10 +105,53 @@ class Simulator:
             ConflictError: If the simulator is closed.
             PlanError: If the plan of a collection would refuse the throw; the error gives the plan's reason.
         """
+        return self._run(self.config, None, values, trial=trial, target=target)
+
+    def roll_out(
+        self,
+        policy: Policy,
+        values: Point | None = None,
+        *,
+        trial: int = 0,
+        target: Point | None = None,
+        rate_hz: int = 50,
+        command: str = "position",
+        observation: Sequence[str] = (),
+    ) -> Throw:
+        """Let a policy command the joints in one trial, in the place of a planned motion.
+
+        The first observation is that of the start state. A policy that plays back the commands of a throw, one for each
+        physics step, gives the samples of that throw bit for bit.
+
+        Args:
+            policy: Has ``reset(seed, target)`` and ``act(observation)``; see `throwcollect.sim.policy.Policy`.
+            values: As for `throw`; `task.end` only says which joints move.
+            trial: As for `throw`; the seed that the policy gets follows from it.
+            target: As for `throw`; the policy gets it, too.
+            rate_hz: Commands per simulated second; divides `sim.physics_hz`.
+            command: What it commands: ``position`` [rad] or ``velocity`` [rad/s].
+            observation: Arrays that it gets; empty for all that there are.
+
+        Returns:
+            The trial, as `throw` gives it. Its commands are recorded in ``/policy/command``.
+
+        Raises:
+            ConfigError: As `throw`, or an argument is wrong.
+            ConflictError: If the simulator is closed.
+            MemberError: If the policy raises an error, or gives a wrong command; the error names the time.
+            PlanError: If the robot cannot rest in the start posture.
+        """
+        config = with_policy(self.config, policy, rate_hz=rate_hz, command=command, observation=observation)
+        return self._run(config, policy, values, trial=trial, target=target)
+
+    def _run(
+        self, config: Config, policy: Policy | None, values: Point | None, *, trial: int, target: Point | None
+    ) -> Throw:
+        """Simulate one trial of a configuration that is this simulator's own, but for the policy; see `throw`."""
         self._require_open()
         check_bounds("trial", trial, least=0, most=MOST_TRIALS - 1)
-        point = complete_point(values or {}, self.config)
-        wrong = self.config.task.find_wrong_targets(target or {})
+        point = complete_point(values or {}, config)
+        wrong = config.task.find_wrong_targets(target or {})
         wrong |= {
             name: f"should be from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {value}"
             for name, value in (target or {}).items()
@@ -114,12 +160,19 @@ class Simulator:
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
         # This checks the keys, too, which `make_trials` does not.
-        refused = self.find_refusal(point)
+        with self._lock:
+            refused = find_refusal(config, point, self._check)
         points = Points((*point, *(target or ())), np.array([[*point.values(), *(target or {}).values()]], np.float64))
-        (planned,) = make_trials(self.config, points, first=trial)
+        (planned,) = make_trials(config, points, first=trial)
         if refused is not None:
             raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
-        return self._throw(planned)
+        with self._lock:
+            # Another thread may have closed it since the throw was asked for.
+            self._require_open()
+            if policy is not None or self._simulator.config is not config:
+                self._simulator.use(config, policy)
+            episode = self._simulator.run(planned)
+        return self._make_throw(config, planned, episode)
 
     def find_refusal(self, values: Point) -> str | None:
         """Say why the plan of a collection would refuse a throw with these values; None if it would not.
@@ -127,20 +180,19 @@ class Simulator:
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
         """
-        values = complete_point(values, self.config)
-        wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
-        if wrong:
-            raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
         with self._lock:
-            return refusal(with_values(self.config, values), self._check)
+            return find_refusal(self.config, complete_point(values, self.config), self._check)
 
-    def throw_many(self, points: Iterable[Point], *, processes: int = 1) -> Iterator[Throw]:
+    def throw_many(
+        self, points: Iterable[Point], *, targets: Iterable[Point] = (), processes: int = 1
+    ) -> Iterator[Throw]:
         """Simulate many throws, which are the trials 0, 1, 2 and so on.
 
         With several processes, all points are taken before the first throw is there.
 
         Args:
             points: Values that differ from the configuration, for each throw.
+            targets: Where each throw should end; no more for none.
             processes: How many processes simulate, each with a physics engine of its own; 1 for only this process.
 
         Yields:
@@ -154,19 +206,20 @@ class Simulator:
         """
         check_bounds("processes", processes, least=1)
         self._require_open()
+        aimed = iter(targets)
+        numbered = ((trial, point, next(aimed, {})) for trial, point in enumerate(points))
         if processes == 1:
-            for trial, point in enumerate(points):
-                yield self._throw_numbered((trial, point))
+            yield from map(self._throw_numbered, numbered)
             return
         yield from work_side_by_side(
-            tuple(enumerate(points)), _begin, (self.config, self._source), processes=processes, doing="simulates"
+            tuple(numbered), _begin, (self.config, self._source), processes=processes, doing="simulates"
         )
 
-    def _throw_numbered(self, numbered: tuple[int, Point]) -> Throw:
-        """Simulate the throw of a point of a list, given as index and point; an error names the index."""
-        index, point = numbered
+    def _throw_numbered(self, numbered: tuple[int, Point, Point]) -> Throw:
+        """Simulate the throw of a point of a list, given as index, point and target; an error names the index."""
+        index, point, target = numbered
         try:
-            return self.throw(point, trial=index)
+            return self.throw(point, trial=index, target=target)
         except ConflictError:
             raise
         except ConfigError as error:
@@ -181,17 +234,32 @@ class Simulator:
         if not self._simulator.close.alive:
             raise ConflictError("this simulator is closed", hint="make another Simulator")
 
-    def _throw(self, trial: Trial) -> Throw:
-        with self._lock:
-            # Another thread may have closed it since the throw was asked for.
-            self._require_open()
-            episode = self._simulator.run(trial)
+    def _make_throw(self, config: Config, trial: Trial, episode: Episode) -> Throw:
         keys = tuple(trial.values)
-        table = ThrowsTable(keys, self.config, tuple(trial.target))
-        row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
+        table = ThrowsTable(keys, config, tuple(trial.target))
+        row = table.row(trial, judge_episode(with_values(config, trial.values), episode), None)
         # In a dataset, these two values come from a shard; the row was made without one.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
-        return Throw(table.table([row]), 0, keys, episode, self._source, self.config)
+        return Throw(table.table([row]), 0, keys, episode, self._source, config)
+
+
+def find_refusal(config: Config, values: Point, check: Check) -> str | None:
+    """Say why the plan of a collection would refuse a trial with these values; raise for keys that cannot vary."""
+    wrong = {key: reason for key in values if (reason := reason_not_sweepable(config, key)) is not None}
+    if wrong:
+        raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
+    return refusal(with_values(config, values), check)
+
+
+def with_policy(
+    config: Config, policy: Policy, *, rate_hz: int, command: str, observation: Sequence[str] = ()
+) -> Config:
+    """Make a copy of a configuration in which a policy commands the joints; its keys are checked as those of a file."""
+    config = with_values(config, {"task.policy": PolicyConfig(use=type(policy).__qualname__)})
+    config = with_values(config, {"task.policy.rate_hz": rate_hz, "task.policy.observation": list(observation)})
+    config = with_values(config, {"task.policy.command": command})
+    check_observation(config)
+    return config
 
 
 def _locate(problem: Problem, index: int, point: Point) -> Problem:
@@ -205,7 +273,7 @@ def _locate(problem: Problem, index: int, point: Point) -> Problem:
     return Problem(f"{problem.message} ({values or 'with no value of its own'})", place, argument=True)
 
 
-def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:
+def _begin(config: Config, source: str) -> Callable[[tuple[int, Point, Point]], Throw]:
     """Make the simulator of a process of `Simulator.throw_many`; the file is not read, because it may have changed."""
     simulator = Simulator(config)
     simulator._source = source

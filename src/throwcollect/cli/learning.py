@@ -192,6 +192,11 @@ def score(
     ] = None,
     settings: SetOption = None,
     scatter: ScatterOption = 0.0,
+    policy: Annotated[
+        str | None,
+        typer.Option("--policy", metavar="MODULE:FUNCTION", help="Score this policy instead; MODEL may be a dataset."),
+    ] = None,
+    hit: Annotated[float, typer.Option("--hit", help="With --policy: largest miss of a hit, in its unit.")] = 0.1,
     json: JsonOption = False,
 ) -> None:
     """Throw at targets in simulation, and note in the model how well it hits."""
@@ -200,6 +205,11 @@ def score(
     from throwcollect.learning.model import CONFIG, load_model
     from throwcollect.simulator import Simulator
 
+    if policy is not None:
+        own = directory / CONFIG
+        worlds = {own: overrides(settings)} if world is None else {own: [], world: overrides(settings)}
+        _score_policy(directory, policy, worlds, (targets, seed, seeds), hit, json=json)
+        return
     model = load_model(directory)
     if settings and world is None:
         raise ConfigError("--set: there is no other world", expected="--config CONFIG")
@@ -306,6 +316,40 @@ def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
     for number, aim in enumerate(aims, start=1):
         if not aim.reachable:
             tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
+
+
+def _score_policy(
+    directory: Path, policy: str, worlds: dict[Path, list[str]], asked: tuple[int, int, int], hit: float, *, json: bool
+) -> None:
+    """Score a policy at targets that a model or a dataset has, in some worlds, each with what `--set` changes.
+
+    Asked for is the number of targets, the first seed, and the number of seeds.
+    """
+    from contextlib import ExitStack
+
+    from throwcollect.config.loader import load as load_config
+    from throwcollect.config.policy import PolicyConfig
+    from throwcollect.config.values import with_values
+    from throwcollect.learning.policy_score import read_ends, score_policy
+    from throwcollect.learning.score import SCORE_HEAD
+    from throwcollect.simulator import Simulator
+
+    ends = read_ends(directory)
+    with ExitStack() as opened:
+        simulators = {}
+        for path, changes in worlds.items():
+            config = load_config(path, changes)
+            section = (config.task.policy or PolicyConfig(use=policy)).model_copy(update={"use": policy})
+            simulator = Simulator(with_values(config, {"task.policy": section}))
+            simulators[str(path)] = opened.enter_context(simulator)
+        found = score_policy(ends, simulators, *asked, hit=hit, processes=count_cores())
+    if json:
+        print_json([each.model_dump() for each in found])
+        return
+    aimed = f"{format_count(asked[0], 'target')} for each of {format_count(asked[2], 'seed')}"
+    typer.echo(f"{policy} throws at {aimed}, medians of the seeds, in simulation:")
+    rows = [(each.world, f"{each.hits:.0%}", *each.errors.cells) for each in found]
+    typer.echo("\n".join(align([("", "hits", *SCORE_HEAD), *rows], numbers=True)))
 
 
 def _describe_score(score: Score) -> list[str]:

@@ -186,6 +186,12 @@ class Config(Section):
         # Samples are taken at physics steps, with the same number of steps between each two.
         if self.sim.physics_hz % self.record.rate_hz:
             yield "record.rate_hz", f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
+        if (policy := self.task.policy) is not None:
+            if self.sim.physics_hz % policy.rate_hz:
+                sentence = f"should divide sim.physics_hz, {self.sim.physics_hz}, got {policy.rate_hz}"
+                yield "task.policy.rate_hz", sentence
+            if "controller_state" in self.record.topics:
+                yield "record.topics", "should not hold controller_state, as task.policy commands the joints"
         if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
             yield "robot.locked", f"should not hold joints that task.end moves, got {', '.join(moving)}"
         for joint in self.robot.joint_offsets:
@@ -213,6 +219,11 @@ class Config(Section):
     def bodies(self) -> dict[str, AnyBody]:
         """All bodies of the scene and of the task, by name."""
         return {**self.scene.bodies, **self.task.bodies}
+
+    @property
+    def moving_joints(self) -> tuple[str, ...]:
+        """Joints that the task moves, in the order of the robot's joints."""
+        return tuple(joint for joint in self.robot.find().joints if joint in self.task.end)
 
     @property
     def acted_on(self) -> str:

@@ -11,6 +11,7 @@ from pydantic import Field
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile, Trajectory
+from throwcollect.config.policy import PolicyConfig
 from throwcollect.config.scene import BALL, AnyBody
 from throwcollect.config.section import Section
 from throwcollect.wording import join_names, suggest
@@ -111,6 +112,8 @@ class TaskConfig(Section):
     """How the joints go from start to end."""
     points_hz: Annotated[float, Field(ge=5, le=1000)] = 25.0
     """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
+    policy: Annotated[PolicyConfig | None, Key(Effect.PHYSICS, swept=False)] = None
+    """Policy that commands the joints of `end` step by step, in place of a motion from `start` to `end`."""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

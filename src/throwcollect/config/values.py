@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar, get_args, get_origin
@@ -35,7 +35,7 @@ def keys_by_column(config: Config, columns: Iterable[str]) -> dict[str, str]:
     return {column: keys[column] for column in columns if column in keys}
 
 
-def with_values(config: Config, values: Mapping[str, float]) -> Config:
+def with_values(config: Config, values: Mapping[str, float | str | Section | Sequence[str]]) -> Config:
     """Make a configuration with some of its values replaced, such as the configuration of one trial.
 
     Args:

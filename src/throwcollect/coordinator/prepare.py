@@ -22,6 +22,7 @@ from throwcollect.robots.description import robot_of
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.oddities import find_placeholders
 from throwcollect.side_by_side import working_side_by_side
+from throwcollect.sim.policy import find_policy
 from throwcollect.sweep.plan import Check, Plan, check_some_left, make_trials, refusal
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
@@ -81,6 +82,8 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
         onlooker.warn(f"warning: {sentence}")
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
     ThrowsTable((), config)
+    if config.task.policy is not None:
+        find_policy(config)
     refuse_many_files(config, len(points.values))
     count = count_first(config, len(points.values))
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)

@@ -35,12 +35,14 @@ class ReplayCheck:
     Args:
         count: How many trials are simulated again.
         seed: Root seed of the collection, by which they are chosen.
+        policy: Name of the policy that commands the joints; empty if none does.
     """
 
-    def __init__(self, directory: Path, *, count: int, seed: int) -> None:
+    def __init__(self, directory: Path, *, count: int, seed: int, policy: str = "") -> None:
         self._directory = directory
         self._count = count
         self._seed = seed
+        self._policy = policy
         self.begun = False
         self._again: dict[int, Future[Row]] = {}
         self._held = ExitStack()
@@ -71,12 +73,21 @@ class ReplayCheck:
         wrong = {trial: sentence for trial, pair in pairs.items() if (sentence := _find_difference(*pair))}
         if wrong:
             counted = f"{len(wrong)} of {format_count(len(trials), 'trial')}"
+            hint = (
+                "this machine, or a package that adds an engine or a task, does not compute the same each time, "
+                "or something has changed what was simulated"
+            )
+            if self._policy:
+                hint = (
+                    f"the policy {self._policy} is not a function of its seed and its observations: it should draw "
+                    "random numbers by the seed of `reset` alone, and keep nothing from an earlier trial; "
+                    "task.policy.reproducible: false collects with it as it is"
+                )
             raise DatasetError(
                 f"{self._directory}: {counted} came out differently in a fresh process: "
                 f"trial {', '.join(map(str, wrong))}",
                 evidence="\n".join(f"trial {trial}: {sentence}" for trial, sentence in wrong.items()),
-                hint="this machine, or a package that adds an engine or a task, does not compute the same each time, "
-                "or something has changed what was simulated",
+                hint=hint,
             )
         if not trials:
             return None

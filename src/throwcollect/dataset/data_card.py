@@ -64,7 +64,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "## Limits",
         "",
         _describe_limits(config.sim.engine)
-        + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` says how.",
+        + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` says how."
+        + _describe_policy(config),
         "",
         "## Provenance",
         "",
@@ -94,6 +95,14 @@ def _describe_limits(engine: str) -> str:
             "ball leaves the tool when the tool would have to pull it. No robot throws like that."
         )
     return f"Simulated with the physics engine `{engine}`, without sensor noise."
+
+
+def _describe_policy(config: Config) -> str:
+    """Name the policy that commanded the joints, and say what follows if it is not reproducible."""
+    if (policy := config.task.policy) is None:
+        return ""
+    text = f" The policy `{policy.use}` commanded the joints at {policy.rate_hz} Hz."
+    return text if policy.reproducible else text + " It is not reproducible: collecting again gives other data."
 
 
 def _list_ranges(config: Config, throws: pa.Table) -> list[str]:

@@ -275,7 +275,7 @@ class Dataset(Sequence[Throw]):
     @property
     def moving_joints(self) -> tuple[str, ...]:
         """Joints that the task moves, in the order of `joints`, as exports have them; all others hold still."""
-        return tuple(joint for joint in self.joints if joint in self.config.task.end)
+        return self.config.moving_joints
 
     @cached_property
     def _stored(self) -> Sequence[EpisodePlace | None]:

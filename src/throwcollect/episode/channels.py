@@ -16,6 +16,7 @@ from throwcollect.episode.topics import (
     joint_states,
     make_fixed_transforms,
     odometry,
+    policy_command,
     transforms,
 )
 from throwcollect.robots.description import robot_of
@@ -28,6 +29,7 @@ OBJECT_ODOMETRY_ID = 4
 _CLOCK_ID = 5
 _TF_ID = 6
 _FIRST_CONTROLLER_ID = 7
+POLICY_COMMAND_ID = 199
 FIRST_BODY_ID = 200
 """Bodies of the scene that move, other than the object, follow from this number on."""
 
@@ -143,6 +145,8 @@ def _make_topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     topics, bodies = {JOINT_STATES_ID: joint_states(robot.joints)}, moving_bodies_of(config)
     for number, name in enumerate(bodies):
         topics[FIRST_BODY_ID + number - 1 if number else OBJECT_ODOMETRY_ID] = odometry(name, number)
+    if config.task.policy is not None:
+        topics[POLICY_COMMAND_ID] = policy_command(config.moving_joints)
     if "clock" in chosen:
         topics[_CLOCK_ID] = clock()
     if "tf" in chosen:

@@ -16,7 +16,13 @@ import zstandard
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from throwcollect.episode.channels import FIRST_BODY_ID, JOINT_STATES_ID, OBJECT_ODOMETRY_ID, Channels
+from throwcollect.episode.channels import (
+    FIRST_BODY_ID,
+    JOINT_STATES_ID,
+    OBJECT_ODOMETRY_ID,
+    POLICY_COMMAND_ID,
+    Channels,
+)
 from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, Chunk, encode_message_index
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.episode.topics import (
@@ -25,8 +31,10 @@ from throwcollect.episode.topics import (
     Rows,
     joint_states,
     odometry,
+    policy_command,
     read_body_name,
     read_joint_names,
+    read_policy_joints,
     read_stamps,
     rotate,
 )
@@ -199,8 +207,18 @@ class MessageTable:
             columns |= dict(zip(velocities, turned, strict=True))
             if number:
                 others.append(np.hstack([columns.pop(name) for name in list_body_fields(number).values()]))
+        if POLICY_COMMAND_ID in self.columns:
+            columns["command"] = self._read_commands()
         samples = Samples(**columns)
         return replace(samples, bodies=np.stack(others, axis=1)) if others else samples
+
+    def _read_commands(self) -> NDArray[np.float64]:
+        joints = read_policy_joints(self._read_first_message(POLICY_COMMAND_ID, "/policy/command"))
+        layout = policy_command(joints).layout
+        messages = np.ascontiguousarray(self.messages(POLICY_COMMAND_ID))
+        if messages.shape[1] != layout.dtype.itemsize:
+            raise DatasetError("chunk: the messages of /policy/command have another layout than those written here")
+        return np.array(messages.view(layout.dtype)[:, 0]["data"]).reshape(len(self), 2, len(joints))
 
 
 class ChunkEncoder:

@@ -34,6 +34,8 @@ class Samples:
         object_linear_velocity: In world [m/s], shape ``(n_samples, 3)``.
         object_angular_velocity: In world [rad/s], shape ``(n_samples, 3)``.
         bodies: The same four of each other body that moves, side by side, shape ``(n_samples, n_bodies, 13)``.
+        command: Positions that a policy asked for, and those that were sent, which limits may have clipped, of the
+            joints that it commands [rad], shape ``(n_samples, 2, n_commanded)``; none without a policy.
     """
 
     stamps_ns: NDArray[np.int64]
@@ -45,10 +47,13 @@ class Samples:
     object_linear_velocity: NDArray[np.float64]
     object_angular_velocity: NDArray[np.float64]
     bodies: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 13)))
+    command: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2, 0)))
 
     def __post_init__(self) -> None:
         if len(self.bodies) != len(self):
             object.__setattr__(self, "bodies", np.zeros((len(self), 0, 13)))
+        if len(self.command) != len(self):
+            object.__setattr__(self, "command", np.zeros((len(self), 2, 0)))
 
     def __len__(self) -> int:
         return len(self.stamps_ns)

@@ -276,4 +276,31 @@ def controller_state(robot: Robot, controller: str) -> Topic:
     return Topic(f"/{controller}/controller_state", kind, layout, fill)
 
 
+def policy_command(joints: tuple[str, ...]) -> Topic:
+    """``/policy/command``: std_msgs/Float64MultiArray with the positions that a policy asked for, and those sent."""
+    kind, count = "std_msgs/msg/Float64MultiArray", len(joints)
+    dimension = get_message("std_msgs/msg/MultiArrayDimension")
+    rows = dimension(label="asked,sent", size=2, stride=2 * count)
+    shape = get_message("std_msgs/msg/MultiArrayLayout")(
+        dim=[rows, dimension(label=",".join(joints), size=count, stride=count)]
+    )
+    layout = MessageLayout(get_message(kind)(layout=shape, data=np.zeros(2 * count)), ["data"])
+
+    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
+        # Clients of a running simulation get the commands of a trial only with its episode.
+        if samples.command.size:
+            rows["data"] = samples.command.reshape(len(samples), -1)
+
+    return Topic("/policy/command", kind, layout, fill)
+
+
+def read_policy_joints(message: bytes) -> tuple[str, ...]:
+    """Read the names of the joints in a message of `policy_command`."""
+    try:
+        found = deserialize(message, get_message("std_msgs/msg/Float64MultiArray"))
+        return tuple(found.layout.dim[1].label.split(","))
+    except (ValueError, IndexError) as error:
+        raise DatasetError(f"chunk: {error}") from error
+
+
 _TIMED = ("reference", "feedback", "error")

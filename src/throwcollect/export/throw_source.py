@@ -27,7 +27,7 @@ from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.task import trajectory_of
+from throwcollect.tasks.task import commanded_trajectory
 from throwcollect.units import NS_PER_S, ascii_unit, name_sliding, unit_of_name
 
 interpolate = lazily("scipy.interpolate", extra="export")
@@ -236,7 +236,7 @@ class ExportSource:
         for throw in throws:
             header, recorded = throw.read_samples()
             samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
-            trajectory = trajectory_of(self.dataset.config_of(throw))
+            trajectory = commanded_trajectory(self.dataset.config_of(throw), recorded)
             signals = _compute_signals(samples, trajectory, header.start_ns)
             for number, body in enumerate(moving_bodies_of(config)):
                 names = (f"{body}_{ending}" for ending in _BODY_SIGNALS)
@@ -294,6 +294,8 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     numbers = range(1, samples.bodies.shape[1] + 1)
     bodies = [np.hstack(elsewhere(*samples.parts_of(number))) for number in numbers]
     found["bodies"] = np.stack(bodies, axis=1) if bodies else np.zeros((count, 0, BODY_NUMBERS))
+    # A command holds until the next one.
+    found["command"] = samples.command[places.astype(np.intp)]
     found["position"] = _interpolate_cubically(samples.position, samples.velocity / recorded_hz, places)
     found |= {name: _interpolate_linearly(getattr(samples, name), places) for name in ("velocity", "effort")}
     elapsed_ns = np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64)

@@ -45,7 +45,13 @@ class Simulates(Protocol):
         """Say why a throw would be refused."""
         ...
 
-    def throw_many(self, points: Iterable[Mapping[str, float]], *, processes: int = 1) -> Iterator[Throw]:
+    def throw_many(
+        self,
+        points: Iterable[Mapping[str, float]],
+        *,
+        targets: Iterable[Mapping[str, float]] = (),
+        processes: int = 1,
+    ) -> Iterator[Throw]:
         """Simulate throws, in order."""
         ...
 

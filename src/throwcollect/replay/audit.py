@@ -177,7 +177,9 @@ def count_replayed(dataset: Dataset, replay: int | None) -> int:
             require_simulating(dataset.config.sim.engine)
         except MissingExtraError:
             return 0
-        replay = SAMPLE if provenance is not None and provenance.libraries == find_versions() else 0
+        policy = dataset.config.task.policy
+        same = provenance is not None and provenance.libraries == find_versions()
+        replay = SAMPLE if same and (policy is None or policy.reproducible) else 0
     return min(replay, len(dataset.recorded))
 
 

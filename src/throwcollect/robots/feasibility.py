@@ -110,7 +110,8 @@ class Feasibility:
                 f"at {times[rows[approach.index]]:.3f} s; they must stay {MARGIN_M * 1000:.3g} mm apart"
             )
         # A trial whose tool never moves is a mistake in the configuration, and not a short throw.
-        if config.task.tool_acts and np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
+        moves = config.task.tool_acts and config.task.policy is None
+        if moves and np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
             carrying = ", ".join(joints[column] for column in self._carrying)
             return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
         return self._explain_loss(config, posture)

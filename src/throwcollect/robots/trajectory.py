@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -64,3 +65,10 @@ class JointTrajectory:
         for values in (self.times, self.positions, self.velocities, self.accelerations):
             digest.update(np.asarray(values, "<f8").tobytes())
         return digest.hexdigest()
+
+
+def rest_at(posture: Mapping[str, float]) -> JointTrajectory:
+    """Make the trajectory of joints that rest, for a second, at these angles [rad]."""
+    still = np.zeros((2, len(posture)))
+    positions = np.tile(np.array(list(posture.values())), (2, 1))
+    return JointTrajectory(tuple(posture), np.array([0.0, 1.0]), positions, still, still)

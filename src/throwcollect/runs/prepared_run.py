@@ -95,6 +95,7 @@ class PreparedRun:
             config.robot.name,
             config.tool.name,
             config.task.name,
+            config.task.policy.use if config.task.policy else "",
         ).encode()
 
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:

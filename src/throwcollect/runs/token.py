@@ -37,6 +37,7 @@ class JoinToken:
     robot: str = "talos"
     tool: str = "spoon"
     task: str = "throw"
+    policy: str = ""
 
     def encode(self) -> str:
         """The token as one word."""
@@ -61,7 +62,7 @@ class JoinToken:
 
     def check_build(self) -> None:
         """Check that this machine would compute the same throws as the run's own machine."""
-        if self.build != build_digest(self.engine, self.robot, self.tool, self.task):
+        if self.build != build_digest(self.engine, self.robot, self.tool, self.task, self.policy):
             raise ConfigError(
                 f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
                 f"package of the robot {self.robot}, the tool {self.tool} or the task {self.task}, and would collect "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -20,6 +20,7 @@ from throwcollect.sim.pace import (
     stretch_steps,
 )
 from throwcollect.sim.simulator import STRETCH_S, Simulator
+from throwcollect.sweep.trials import NO_TARGET, Values
 from throwcollect.units import NS_PER_S
 
 
@@ -88,9 +89,9 @@ class LiveSimulator(Simulator):
         if state == StateCode.STOPPED:
             self.reset()
 
-    def begin(self, number: int, values: Mapping[str, float]) -> None:
+    def begin(self, number: int, values: Values, *, seed: int = 0, target: Values = NO_TARGET) -> None:
         """Begin a trial; see `Simulator.begin`."""
-        super().begin(number, values)
+        super().begin(number, values, seed=seed, target=target)
         self._begin_motion()
 
     def reset(self, *, time: bool = True, state: bool = True) -> None:

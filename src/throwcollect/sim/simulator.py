@@ -7,6 +7,7 @@ Replays, scores, the runtime in one process and Python programs call `Simulator.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import replace
 from weakref import finalize
 
 import numpy as np
@@ -23,9 +24,10 @@ from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sim.limb_controller import LimbController
+from throwcollect.sim.policy import Policy, PolicyLoop, make_policy
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup, trial_goals
 from throwcollect.sim.world import World
-from throwcollect.sweep.trials import Trial
+from throwcollect.sweep.trials import NO_TARGET, Trial, Values
 from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.trial.conditions import Settings
 from throwcollect.units import NS_PER_S
@@ -37,8 +39,13 @@ STRETCH_S = 0.5
 class Simulator:
     """Simulates trials of one configuration, one after the other; an episode depends on its trial alone, bit for bit.
 
+    Args:
+        config: The configuration.
+        policy: Policy in the place of the one that the configuration names.
+
     Attributes:
         config: The configuration; a trial replaces some of its values.
+        loop: Lets the policy of the configuration command the joints; None if it has none.
         channels: The topics that are recorded of a trial.
         world: The world: engine, robot, ball and clock.
         limbs: The controllers, by name.
@@ -50,9 +57,7 @@ class Simulator:
         WorkerError: If the physics engine does not start.
     """
 
-    def __init__(self, config: Config) -> None:
-        self.config = config
-        self.channels = Channels(config, full_description(config))
+    def __init__(self, config: Config, policy: Policy | None = None) -> None:
         self.world = World(config)
         self.close = finalize(self, self.world.close)
         # This is not called when the process ends, which frees all worlds, because engines may be unloaded by then.
@@ -71,10 +76,28 @@ class Simulator:
         """Limbs whose controllers look at the measured state in every step."""
         self._keeps_states = "controller_state" in config.record.topics
         self._results: list[tuple[str, GoalResult]] = []
+        try:
+            self.use(config, policy)
+            self.reset()
+        except BaseException:
+            self.close()
+            raise
+
+    def use(self, config: Config, policy: Policy | None = None) -> None:
+        """Simulate a configuration from now on that differs from the present one at most in its policy.
+
+        Args:
+            config: The configuration.
+            policy: Policy in the place of the one that it names.
+        """
+        self.config = config
+        self.channels = Channels(config, full_description(config))
         self._settings = Settings(config)
         self._encoder = ChunkEncoder(self.channels, level=config.record.zstd_level)
         self._columns = task_of(config).columns
-        self.reset()
+        self.loop: PolicyLoop | None = None
+        if config.task.policy is not None:
+            self.loop = PolicyLoop(config, policy or make_policy(config), self.world)
 
     @property
     def now_ns(self) -> int:
@@ -83,25 +106,27 @@ class Simulator:
 
     def run(self, trial: Trial) -> Episode:
         """Simulate a trial, which need not be in a plan; return its episode, with its result and conditions."""
-        self.begin(trial.number, trial.values)
+        self.begin(trial.number, trial.values, seed=trial.seed, target=trial.target)
         steps = round(STRETCH_S * self.config.sim.physics_hz)
         while (episode := self.hand_over()) is None:
             self.step(steps)
         self.pop_results()
         return episode
 
-    def begin(self, number: int, values: Mapping[str, float]) -> None:
+    def begin(self, number: int, values: Values, *, seed: int = 0, target: Values = NO_TARGET) -> None:
         """Begin a trial: controllers are as they are configured, and get the goals that follow from the trial.
 
         Args:
             number: Number of the trial.
             values: Values by dotted key, which replace the values of the configuration.
+            seed: Seed of the trial, which a policy gets.
+            target: Where the trial should end, by column, which a policy gets.
         """
         # If this trial cannot begin, the next episode must not be judged by what is left of an earlier trial.
         self.trial.motion = None
         config = with_values(self.config, values)
         motion = trajectory_of(config)
-        goals = trial_goals(robot_of(config), motion, start_posture(config))
+        goals = {} if self.loop else trial_goals(robot_of(config), motion, start_posture(config))
         for limb in self.limbs.values():
             limb.restore()
         self.trial.setup = TrialSetup(number, tuple(goals), config)
@@ -110,6 +135,8 @@ class Simulator:
             # The id of a client's goal is a number. This id is none, so that no client gets the result of this goal.
             if (refusal := self.give(controller, ("trial", number), goal)) is not None:
                 raise ThrowcollectError(f"trial {number}: {controller} refuses its goal: {refusal}")
+        if self.loop is not None:
+            self.loop.begin(config, number, seed, target)
         self.trial.motion = motion
 
     def drop(self) -> None:
@@ -187,8 +214,10 @@ class Simulator:
         """Return what was recorded of a trial that has ended, only once; None while there is no such recording."""
         if not self._in_trial or (end_reason := self.world.end_reason) is None:
             return None
-        self._in_trial, self.trial.motion = False, None
+        begun, self._in_trial, self.trial.motion = self.trial.motion is not None, False, None
         samples = self.world.samples()
+        if self.loop is not None and begun:
+            samples = replace(samples, command=self.loop.commands(np.arange(len(samples)) * self._stride))
         header = EpisodeHeader(
             trial=self.trial.begun.number,
             start_ns=int(samples.stamps_ns[0]),
@@ -232,6 +261,11 @@ class Simulator:
             free = 0
         for limb in moving:
             free = min(free, limb.controller.next_decision())
+        loop = self.loop if self.trial.motion is not None else None
+        if loop is not None:
+            if (phase := self.world.steps % loop.stride) == 0:
+                loop.ask()
+            free = min(free, loop.stride - phase)
         if free > 0:
             commands = np.tile(self._command, (free, 1))
             for limb in moving:
@@ -239,6 +273,8 @@ class Simulator:
         else:
             self._look(moving)
             commands = self._command[np.newaxis].copy()
+        if loop is not None:
+            loop.fill(commands)
         self._command = commands[-1].copy()
         taken = self.world.run(commands, stop_at_end=self._in_trial)
         self._collect_results()

@@ -118,6 +118,16 @@ class World(Observer):
         return self._stamp_ns(self.steps)
 
     @property
+    def touching(self) -> frozenset[str]:
+        """Names of what presses on the object now."""
+        return self._touching
+
+    @property
+    def physics_hz(self) -> int:
+        """Physics steps per simulated second."""
+        return self._hz
+
+    @property
     def recorded(self) -> int:
         """Number of samples recorded in this trial, the start state included."""
         return len(self._log)

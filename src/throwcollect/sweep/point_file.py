@@ -108,7 +108,8 @@ def _check_columns(names: tuple[str, ...], line: int | None, *, path: Path, conf
         elif not is_target(name) and (reason := reason_not_sweepable(config, name)):
             problems.append(Problem(reason, name or f"column {index + 1}", path, line))
     problems += [Problem(reason, name, path, line) for name, reason in config.task.find_wrong_targets(targets).items()]
-    if len(targets) == len(names):
+    # Only a policy gets the target, so without one all trials would be the same.
+    if len(targets) == len(names) and (not names or config.task.policy is None):
         sentence = "has no column of a key, only targets" if names else "the file is empty"
         problems.append(Problem(sentence, path=path))
     if problems:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.sweep.points import Points
+
+Values = Mapping[str, float]
+NO_TARGET: Values = MappingProxyType({})
 
 DIGEST_BYTES = 32
 """Size of a SHA-256 [bytes]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,11 @@ def measure_joints(
     positions = shares_of(np.abs(measured - middle[:, np.newaxis]).max(axis=1), limits.upper[moving] - middle)
     desired = sample_positions(trajectory, samples.seconds_since(start_ns)).T
     errors = np.abs(measured - desired).max(axis=1)
+    # Only the results of trials with a policy have this measure.
+    clipped: dict[str, Any] = {}
+    if config.task.policy is not None:
+        asked, sent = samples.command.swapaxes(0, 1)
+        clipped["clipped_share"] = float((asked != sent).any(axis=1).mean())
     saturated = 0.0
     # In most trials, no torque reaches its limit, and the samples need not be searched.
     if effort_peak.share >= _AT_LIMIT:
@@ -56,6 +62,7 @@ def measure_joints(
         effort_peak=effort_peak,
         effort_saturated_share=saturated,
         tracking_error_rad=dict(zip(trajectory.joints, errors.tolist(), strict=True)),
+        **clipped,
     )
 
 

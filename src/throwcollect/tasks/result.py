@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import Field, dataclass, fields, replace
+from dataclasses import Field, dataclass, fields, make_dataclass, replace
 from enum import Enum
+from functools import cache
 from types import NoneType
 from typing import Any, Generic, TypeVar
 
@@ -54,6 +55,15 @@ class Result:
     )
     tracking_error_rad: Mapping[str, float] | None = measured(
         JointColumns("Largest distance of {joint} from its commanded trajectory [rad].")
+    )
+
+
+@cache
+def with_policy(results: type[Result]) -> type[Result]:
+    """Derive the results of trials in which a policy commands the joints, which have one measure more."""
+    clipped = Number("Share of samples in which the policy's command was beyond a limit, and was clipped [-].")
+    return make_dataclass(
+        results.__name__, [("clipped_share", "float | None", measured(clipped))], bases=(results,), frozen=True
     )
 
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic
 
+import numpy as np
+
 from throwcollect.config.motion import MinimumJerk, MotionFile
 from throwcollect.config.schema import Config
 from throwcollect.engines.engine import GROUND
@@ -15,7 +17,7 @@ from throwcollect.episode.record import EndReason, EpisodeHeader, Samples
 from throwcollect.members import explain_failure, load_part
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import object_of
-from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.robots.trajectory import JointTrajectory, rest_at
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
 from throwcollect.tasks.measures import ObjectState
@@ -28,6 +30,7 @@ from throwcollect.tasks.result import (
     AnyResult,
     Outcome,
     ResultColumns,
+    with_policy,
 )
 
 EndRule = Callable[[Sequence[float], Sequence[float], Collection[str]], EndReason | None]
@@ -71,6 +74,8 @@ class Task(ABC, Generic[AnyResult]):
 
     def __init__(self, config: Config) -> None:
         self.config = config
+        if config.task.policy is not None:
+            self.results = with_policy(self.results)  # type: ignore[assignment, arg-type]
 
     @property
     def columns(self) -> ResultColumns[AnyResult]:
@@ -120,6 +125,7 @@ class Task(ABC, Generic[AnyResult]):
             header: Contacts, goals and start of the trial; the trajectory starts at its `start_ns`.
             trajectory: The trajectory that the controllers followed as a quintic curve and then held at its end.
         """
+        trajectory = commanded_trajectory(self.config, samples, planned=trajectory)
         success = self.results(self.outcomes(self.config.task.success))
         measured = measure_joints(success, samples, header.start_ns, config=self.config, trajectory=trajectory)
         if not (measured and math.isfinite(samples.object_position.sum() + samples.object_linear_velocity.sum())):
@@ -194,9 +200,36 @@ def task_of(config: Config) -> Task[Any]:
 def trajectory_of(config: Config) -> JointTrajectory:
     """Plan the motion of the trial that a configuration describes; see `Task.trajectory`.
 
+    With a policy, nothing is planned: the joints rest at the start.
+
     Raises:
         ConfigError: If there is no usable motion for these parameters.
         MemberError: If the task comes from another package and fails.
     """
+    if config.task.policy is not None:
+        return rest_at({joint: config.task.start[joint] for joint in config.moving_joints})
     with explain_failure("tasks", config.task.name, "plan its motion"):
         return task_of(config).trajectory()
+
+
+def commanded_trajectory(
+    config: Config, samples: Samples, *, planned: JointTrajectory | None = None
+) -> JointTrajectory:
+    """Return the motion that was commanded in a trial: the planned one, or else one through the commands of the policy.
+
+    Args:
+        config: Configuration of the trial.
+        samples: Its recorded samples.
+        planned: What `trajectory_of` gives, if that is known.
+    """
+    planned = planned or trajectory_of(config)
+    if config.task.policy is None:
+        return planned
+    rate_hz = config.task.policy.rate_hz
+    # Each command is due when the next one is given. Rounding keeps samples at such instants in the right period.
+    number, first = np.unique(np.floor(samples.seconds_since(samples.stamps_ns[0]) * rate_hz + 1e-6), return_index=True)
+    times = np.append(0.0, (number + 1) / rate_hz)
+    positions = np.vstack((planned.positions[:1], samples.command[first, 1]))
+    velocities = np.gradient(positions, times, axis=0)
+    velocities[[0, -1]] = 0
+    return JointTrajectory(planned.joints, times, positions, velocities, np.gradient(velocities, times, axis=0))

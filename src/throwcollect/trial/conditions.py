@@ -38,7 +38,8 @@ def explain_difference(used: str, expected: str) -> str | None:
 
 def build_of(config: Config) -> str:
     """Digest of what computes the episodes of a configuration here (`build.build_digest`)."""
-    return build_digest(config.sim.engine, config.robot.name, config.tool.name, config.task.name)
+    policy = (config.task.policy.use,) if config.task.policy else ()
+    return build_digest(config.sim.engine, config.robot.name, config.tool.name, config.task.name, *policy)
 
 
 class Settings:

@@ -9,13 +9,14 @@ from __future__ import annotations
 import json
 import secrets
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import Signer
+from throwcollect.sweep.trials import NO_TARGET, Values
 
 LEASES = "trial.leases"
 """Name of the parameter."""
@@ -31,6 +32,8 @@ class Lease:
         values: Values of the trial that replace those of the configuration, by dotted key.
         nonce: Random text by which two leases of the same trial differ: with a new one, a trial that is done is done
             again.
+        seed: Seed of the trial, which a policy gets.
+        target: Where the trial should end, by column, which a policy gets, too.
         signature: Signature of the coordinator over all other attributes.
     """
 
@@ -38,12 +41,16 @@ class Lease:
     trial: int
     values: Mapping[str, float]
     nonce: str = ""
+    seed: int = 0
+    target: Mapping[str, float] = field(default_factory=dict)
     signature: str = ""
 
     @classmethod
-    def make(cls, simulation: str, trial: int, values: Mapping[str, float], signer: Signer) -> Lease:
+    def make(
+        cls, simulation: str, trial: int, values: Values, signer: Signer, *, seed: int = 0, target: Values = NO_TARGET
+    ) -> Lease:
         """Make a new lease, and sign it with the key of the run."""
-        unsigned = cls(simulation, trial, values, secrets.token_hex(8))
+        unsigned = cls(simulation, trial, values, secrets.token_hex(8), seed, {**target})
         return replace(unsigned, signature=signer.sign(unsigned._text))
 
     def is_signed(self, signer: Signer) -> bool:
@@ -58,7 +65,8 @@ class Lease:
     @cached_property
     def _text(self) -> bytes:
         # The values are sorted, because the same values in another order must have the same signature.
-        return json.dumps([self.nonce, self.simulation, self.trial, sorted(self.values.items())]).encode()
+        numbers = (sorted(self.values.items()), self.seed, sorted(self.target.items()))
+        return json.dumps([self.nonce, self.simulation, self.trial, *numbers]).encode()
 
 
 _LEASES = TypeAdapter(tuple[Lease, ...])

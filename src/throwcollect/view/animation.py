@@ -110,17 +110,17 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
             low, *_, high = sorted(z for _, z in look.side_m)
             points.append(np.array([(*corner, z) for corner in look.above_m for z in (low, high)]))
         for number in shown:
-            _place(renderer, joints, samples, number)
+            place(renderer, joints, samples, number)
             frames = np.array(renderer.find_frames())
             points += [frames - _ROOM_M, frames + _ROOM_M]
         everything = np.concatenate(points)
         # The box around the feet would reach below the ground, where there is nothing to see.
         everything[:, 2] = np.maximum(everything[:, 2], 0)
         camera = camera_on(everything, _WIDTH / _HEIGHT, _find_heading(samples.object_position[released:]))
-        ground = _Ground(camera, everything[:, :2].mean(axis=0))
+        ground = Ground(camera, everything[:, :2].mean(axis=0))
         pictures = []
         for number in shown:
-            _place(renderer, joints, samples, number)
+            place(renderer, joints, samples, number)
             picture = ground.picture()
             path = samples.object_position[: number + 1]
             end = landing.position if landing and number == shown[-1] else None
@@ -162,7 +162,8 @@ def _reduce_colours(pictures: list[Any]) -> list[Any]:
     return [picture.quantize(palette=palette, dither=images.Dither.NONE) for picture in pictures]
 
 
-def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number: int) -> None:
+def place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number: int) -> None:
+    """Put robot and bodies where they are in a sample."""
     angles = map(float, samples.position[number])
     row = samples[number : number + 1]
     moving = (*range(1, samples.bodies.shape[1] + 1), 0)
@@ -170,14 +171,14 @@ def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number
     renderer.place(dict(zip(joints, angles, strict=True)), bodies)
 
 
-class _Ground:
+class Ground:
     """Draws the ground, with lines every half metre, and everything on it but robot and bodies.
 
     `middle` is the middle of the ground in world [m], shape ``(2,)``.
     """
 
     def __init__(self, camera: Camera, middle: NDArray[np.float64]) -> None:
-        self._camera = camera
+        self.camera = camera
         self.size = (round(_WIDTH * _FINER), round(_HEIGHT * _FINER))
         self._empty = images.new("RGB", self.size, _SKY)
         pen = drawing.Draw(self._empty)
@@ -193,7 +194,7 @@ class _Ground:
                 pen.line(self._find_pixels(line[camera.faces(line)]), fill=_LINE, width=1)
 
     def _find_pixels(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:
-        return [(float(x), float(y)) for x, y in self._camera.project(points) * self.size]
+        return [(float(x), float(y)) for x, y in self.camera.project(points) * self.size]
 
     def picture(self) -> Any:
         """A picture of the ground alone."""
@@ -216,6 +217,37 @@ class _Ground:
         """Draw the shadow of the object on the ground."""
         ((x, y),) = self._find_pixels(place[np.newaxis] * [1, 1, 0])
         drawing.Draw(picture).ellipse((x - 9, y - 3, x + 9, y + 3), fill=_LINE)
+
+
+class Still:
+    """Draws single pictures of a world of a configuration, from one place, with the ground."""
+
+    def __init__(self, config: Config) -> None:
+        colours = (shape.rgba for shape in draw_bodies_of(config))
+        bodies = list(zip((*bodies_of(config), object_of(config)), colours, strict=True))
+        self._joints = robot_of(config).joints
+        self._renderer = Renderer(draw_robot_of(config).urdf_with_files, config.robot.base_height_m, bodies)
+        self._ground: Ground | None = None
+
+    def close(self) -> None:
+        """Free the renderer."""
+        self._renderer.__exit__()
+
+    def draw(self, samples: Samples) -> NDArray[np.uint8]:
+        """Draw the first sample, shape ``(400, 640, 3)``; the first call chooses the place of the camera."""
+        place(self._renderer, self._joints, samples, 0)
+        if self._ground is None:
+            frames = np.array(self._renderer.find_frames())
+            # A throw ends some two metres in front of the robot.
+            front = np.add(samples.object_position, (2.0, 0.0, 0.5))
+            points = np.concatenate([frames - _ROOM_M, frames + _ROOM_M, front, np.zeros((1, 3)), [[2.0, 0.0, 0.0]]])
+            points[:, 2] = np.maximum(points[:, 2], 0)
+            self._ground = Ground(camera_on(points, _WIDTH / _HEIGHT), points[:, :2].mean(axis=0))
+        picture, camera = self._ground.picture(), self._ground.camera
+        seen = self._renderer.draw(*self._ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
+        body = images.fromarray(seen)
+        picture.paste(body, (0, 0), body)
+        return np.array(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS).convert("RGB"))
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from throwcollect.report.throw.measured import (
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.surroundings import BodyLook, looks_of
-from throwcollect.tasks.task import task_of, trajectory_of
+from throwcollect.tasks.task import commanded_trajectory, task_of
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 from throwcollect.tasks.throw.throw_task import ThrowTask
 from throwcollect.wording import format_count
@@ -176,7 +176,8 @@ def _show_examples(
         Panel("above", "The ball from above", above),
     )
     middle = _choose_middle(throws, outcomes.success)
-    release, trajectory = middle.events.release, trajectory_of(dataset.config_of(middle))
+    release = middle.events.release
+    trajectory = commanded_trajectory(dataset.config_of(middle), middle.read_samples()[1])
     note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
     note += "; the vertical line is the release." if release is not None else "."
     commanded = dict(zip(trajectory.joints, sample_positions(trajectory, middle.joints.time_s).T, strict=True))

@@ -175,7 +175,8 @@ class Coordinator(Node):
         simulation.ask(self._collection.lease(namespace))
 
     def _make_lease(self, namespace: str, trial: int) -> Lease:
-        return Lease.make(namespace, trial, self._collection.writer.plan.trial(trial).values, self._signer)
+        planned = self._collection.writer.plan.trial(trial)
+        return Lease.make(namespace, trial, planned.values, self._signer, seed=planned.seed, target=planned.target)
 
     def _receive(self, namespace: str, message: bytes) -> None:
         try:

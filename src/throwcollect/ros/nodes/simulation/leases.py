@@ -45,7 +45,7 @@ class LeaseQueue:
             return None
         lease = self._waiting.popleft()
         try:
-            self._simulator.begin(lease.trial, lease.values)
+            self._simulator.begin(lease.trial, lease.values, seed=lease.seed, target=lease.target)
         except ThrowcollectError as error:
             self._simulator.drop()
             return self._refuse(lease, error)
