@@ -244,7 +244,11 @@ class Simulator:
 
 
 def find_refusal(config: Config, values: Point, check: Check) -> str | None:
-    """Say why the plan of a collection would refuse a trial with these values; raise for keys that cannot vary."""
+    """Say why the plan of a collection would refuse a trial with these values; None if it would not.
+
+    Raises:
+        ConfigError: If a key cannot vary, or a value is out of its range.
+    """
     wrong = {key: reason for key in values if (reason := reason_not_sweepable(config, key)) is not None}
     if wrong:
         raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
