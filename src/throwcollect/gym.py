@@ -59,8 +59,8 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
     by their columns, such as ``release_time_s`` and ``miss_m``; each `info` has ``touching``, the names of what presses
     on the object, and ``clipped``, whether the command was beyond a limit.
 
-    Rewards are 1 for a success and 0 otherwise; with a target for x and y, a landing farther than `hit_m` from it is no
-    success. With ``reward="shaped"``, each step adds by how much nearer to the target the object would land if it were
+    Rewards are 1 for a success and 0 otherwise; with a target for x and y, a trial that ends farther than `hit_m` from it is
+    no success. With ``reward="shaped"``, each step adds by how much nearer to the target the object would land if it were
     let go [m], without drag; so all steps add up to the distance at the start minus the one at the end.
 
     Args:
@@ -106,8 +106,11 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
         self._aims = all(name in self._targets for name in _PLACE)
-        if reward not in ("success", "shaped") or (reward == "shaped" and not self._aims):
-            raise ConfigError(f"reward {reward!r}", expected=f"success, or shaped with targets {' and '.join(_PLACE)}")
+        flies = self._aims and "landing" in config.task.events
+        if reward not in ("success", "shaped") or (reward == "shaped" and not flies):
+            expected = f"success, or shaped if what the task throws has targets {' and '.join(_PLACE)}"
+            raise ConfigError(f"reward {reward!r}", expected=expected)
+        self._ends = {each.name: each.of for each in config.task.target_columns}
         observation = observation or [
             name for name in shape_observation(config) if name in self._targets or not name.startswith("target_")
         ]
@@ -244,9 +247,12 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
         result = json.loads(episode.result) if episode is not None else {}
         success = result["outcome"] == self.config.task.success
         if self._aims:
-            # A throw has both or none.
-            x, y = (math.nan if (end := result.get(name)) is None else end for name in ("landing_x_m", "landing_y_m"))
-            result["miss_m"] = math.hypot(x - self._target[_PLACE[0]], y - self._target[_PLACE[1]])
+            # A trial has both or none.
+            ends = (result.get(self._ends[name]) for name in _PLACE)
+            away = [
+                math.nan if end is None else end - self._target[name] for name, end in zip(_PLACE, ends, strict=True)
+            ]
+            result["miss_m"] = math.hypot(*away)
             success = success and result["miss_m"] <= self._hit_m
         return {name: value for name, value in result.items() if value is not None} | {"is_success": success}
 

@@ -53,6 +53,7 @@ def play(env: Any, actions: Any) -> list[Any]:
         ("Throw", {"targets": TARGETS, "reward": "shaped"}),
         ("Throw", {"command": "velocity", "render_mode": "rgb_array"}),
         ("ThrowInto", {"config": None, "observation": ["ball_position_m", "task_bin_x_m"]}),
+        ("Slide", {"config": CONFIG.with_name("slide.yaml"), "targets": {"target_x_m": (1, 2), "target_y_m": (-1, 0)}}),
     ],
 )
 def test_gymnasium_finds_no_fault(task: str, arguments: dict[str, Any]) -> None:
