@@ -20,7 +20,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: up ros dist test test-fast \
     test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client wait-for-image wait-for-cluster test-containers \
-    test-image test-processes test-cluster image sif sif-without-engine \
+    test-containers-of-commands test-containers-of-runs test-image test-processes test-cluster image sif sif-without-engine \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
@@ -84,12 +84,12 @@ test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
 # What waits for others is run beside what computes, and each group begins as soon as it can, so that both cores always have something
-# to do. Tests of containers take longest, one by one, so they begin as soon as there is an image; next come those of processes, which
-# take nearly as long. Continuous integration makes the image and then the cluster meanwhile, and names the processes that do.
+# to do. Tests of containers wait for most, so they begin as soon as there is an image; next come those of processes, which compute
+# most. Continuous integration makes the image and then the cluster meanwhile, and names the processes that do.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 5 test-containers test-processes test-units test-ros test-image test-cluster
+	$(MAKE) $(BESIDE) -j 6 test-containers test-processes test-units test-ros test-image test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -123,15 +123,20 @@ WITH_ENGINE := tests/ros/test_containers.py
 test-ros: ros
 	$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE)
 
-# Tests of runs in containers look at all runs that are on the engine, so one by one; also those on genuine rclpy.
-test-containers: ros wait-for-image
-	$(BIN)/python -m pytest tests/docker $(addprefix --ignore=,$(WITHOUT_RUNS))
+# Three groups that take about as long, as tests of containers wait more than they compute; each looks at its own runs alone.
+OF_RUNS := $(addprefix tests/docker/,test_component.py test_package_in_image.py test_runtime.py)
+OF_IMAGE := $(addprefix tests/docker/,test_compose.py test_image.py)
+test-containers: test-containers-of-commands test-containers-of-runs
+
+test-containers-of-commands: ros wait-for-image
+	$(BIN)/python -m pytest tests/docker $(addprefix --ignore=,$(OF_RUNS) $(OF_IMAGE))
 	$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE)
 
-# What starts no run on the engine need not wait for those tests: the image itself, and Compose, which knows no runs.
-WITHOUT_RUNS := $(addprefix tests/docker/,test_compose.py test_image.py)
+test-containers-of-runs: wait-for-image
+	$(BIN)/python -m pytest $(OF_RUNS)
+
 test-image: wait-for-image
-	$(BIN)/python -m pytest $(WITHOUT_RUNS)
+	$(BIN)/python -m pytest $(OF_IMAGE)
 
 # Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both processes have
 # something to do until then.

@@ -69,5 +69,6 @@ why=$(install_missing docker-compose:docker-compose) || echo "no Compose 1.29 fo
 .ci/compose.sh || echo "no Compose v2 for the tests"
 [ -z "${AFTER:-}" ] || tail --pid="$AFTER" -f /dev/null
 "$python" docker/wheelhouse.py --ros docker/wheelhouse
-make image BUILD="--build-arg BASE_IMAGE=$base" > build/image.log 2>&1 \
+# tests/docker/test_image.py tests what is built, beside others.
+make image BUILD="--build-arg BASE_IMAGE=$base --build-arg SELFTEST=true" > build/image.log 2>&1 \
     || { tail -n 25 build/image.log; exit 1; }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,6 +18,7 @@ from throwcollect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = pytest.mark.docker
 
+ROOT = Path(__file__).parents[2]
 CONFINED = {
     "init": True,
     "read_only": True,
@@ -59,6 +61,14 @@ def test_any_user_may_write_into_a_new_volume_for_data(client: DockerClient, vol
     mounted = {volume: {"bind": "/data", "mode": "rw"}}
     assert script(client, "pwd && mkdir mine && ls", user=user, volumes=mounted) == "/data\nmine\n"
     assert script(client, "stat -c %a /data", volumes=mounted) == "1777\n"
+
+
+def test_the_image_has_all_that_its_nodes_load(client: DockerClient) -> None:
+    """The self-test of the build; other tests collect in containers on genuine rclpy."""
+    files = ("docker/selftest.sh", "configs/quickstart.yaml")
+    mounted = {ROOT / file: {"bind": f"/build/{Path(file).name}", "mode": "ro"} for file in files}
+    done = script(client, "sh /build/selftest.sh embedded", volumes=mounted, environment={"HOME": "/tmp"})
+    assert "replayed: 4 of 4 throws, the same bit for bit" in done
 
 
 def test_the_image_has_no_tools_that_build_or_install(client: DockerClient) -> None:

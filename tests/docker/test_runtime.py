@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -91,27 +89,28 @@ def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
     (prepared / "logs").mkdir()
     for path in (prepared, *prepared.iterdir()):
         os.chown(path, caller, -1)
-    with collecting(client, tmp_path, run=run) as collection:
+    with collecting(client, tmp_path, "containers.sim.memory=512m", run=run) as collection:
         collection.until(lambda: collection.status("sim_1") == "running")
         known = next(each for each in find_held_runs(client) if each.run_id == run)
         assert known.source == str(prepared)
         assert [node.name for node in known.nodes] == [COORDINATOR, ROUTER, "sim_0", "sim_1"]
         for node in collection.runtime.running():
-            details = container(client, collection, node).attrs
+            running = container(client, collection, node)
+            details = running.attrs
             host = details["HostConfig"]
-            assert (host["Privileged"], host["PidMode"], host["CapDrop"]) == (False, "", ["ALL"])
+            assert (host["Privileged"], host["PidMode"], host["CapDrop"], host["CapAdd"]) == (False, "", ["ALL"], None)
             assert (host["ReadonlyRootfs"], host["SecurityOpt"], host["Init"]) == (True, ["no-new-privileges"], True)
             assert host["NetworkMode"] == f"throwcollect-{run}"
-            assert not any(details["NetworkSettings"]["Ports"].values())
-            binds = [(each["Source"], each["Destination"], each["RW"]) for each in details["Mounts"]]
-            writes = node == COORDINATOR
-            assert [bind for bind in binds if bind[1] != "/key"] == (
-                [] if node == ROUTER else [(str(prepared), "/data", writes)]
-            )
+            assert (host["Memory"] == 512 * 1024**2) == node.startswith("sim")
+            assert not any((*(host["PortBindings"] or {}), *details["NetworkSettings"]["Ports"].values()))
+            mounts = {each["Destination"]: (each["Source"], each["RW"]) for each in details["Mounts"]}
+            assert mounts.pop("/key")[1] is False
+            assert mounts == ({} if node == ROUTER else {"/data": (str(prepared), node == COORDINATOR)})
+            sockets = running.exec_run(["cat", "/proc/net/tcp", "/proc/net/tcp6"]).output.decode()
+            listening = [line.split()[1] for line in sockets.splitlines() if " 0A " in line]
+            assert not [address for address in listening if set(address.split(":")[0]) == {"0"}]
+            assert any(address.endswith(":1D17") for address in listening) == (node == ROUTER)
         assert client.networks.get(f"throwcollect-{run}").attrs["Internal"]
-        listening = container(client, collection, ROUTER).exec_run(["cat", "/proc/net/tcp"]).output.decode()
-        assert ":1D17" in listening
-        assert "00000000:1D17 00000000:0000 0A" not in listening
         assert collection.finish() == digest
     assert list_what_is_left(client, f"throwcollect.run={run}") == []
     assert {path.stat().st_uid for path in prepared.iterdir()} == {caller}
@@ -184,49 +183,6 @@ def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_
         assert client.volumes.get(volume).attrs["Labels"]["throwcollect.run"] == run
     finally:
         assert remove(client, run, volumes=True) == [f"volume {volume}"]
-
-
-LAUNCHER = """
-import sys, time
-from pathlib import Path
-from throwcollect.config.loader import load
-from throwcollect.ros.middleware import Middleware
-from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.docker_nodes import DockerNodes
-from throwcollect.runtimes.node_collection import roster
-from throwcollect.runtimes.runtime import Place
-from throwcollect.runtimes.supervisor import Supervisor
-run, directory = sys.argv[1], Path(sys.argv[2])
-config = load(directory / "config.yaml")
-key = RunKey(directory.parent / "key")
-runtime = DockerNodes(Place(run, directory, None, directory / "logs", 2, Middleware(), key), config)
-runtime.open()
-supervisor = Supervisor(runtime, config.run, roster(runtime, 2))
-supervisor.start()
-while True:
-    supervisor.poll()
-    time.sleep(0.02)
-"""
-
-
-def test_a_run_whose_launcher_vanished_is_taken_over(client: DockerClient, tmp_path: Path, digest: str) -> None:
-    run = new_run()
-    dataset = tmp_path / "dataset"
-    prepare(config_for(tmp_path), dataset, sweep_directory=tmp_path)
-    key_in(tmp_path)
-    launcher = subprocess.Popen([sys.executable, "-c", LAUNCHER, run, str(dataset)])
-    nodes = (ROUTER, "sim_0", "sim_1", COORDINATOR)
-    try:
-        until(lambda: any(path.stat().st_size for path in dataset.glob("*.mcap*")))
-    finally:
-        launcher.kill()
-        launcher.wait()
-    client.containers.get(f"throwcollect-{run}-sim_1").kill()
-    with collecting(client, tmp_path, run=run, found=nodes) as collection:
-        assert collection.finish() == digest
-    assert [line for line in collection.news if "sim_1 was lost (ended by SIGKILL)" in line]
-    # The second launcher does not copy log lines that the first one has copied.
-    assert (dataset / "logs" / "sim_0.log").read_text().count("sim_0 is ready") == 1
 
 
 @pytest.fixture
