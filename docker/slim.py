@@ -180,8 +180,9 @@ def slim(directory: Path) -> None:
     for name, path in files.items():
         if name not in staying or name in superfluous:
             path.unlink()
-        elif ".so" in name and is_elf(content := path.read_bytes()):
-            path.write_bytes(strip(content))
+        # Whatever is written, be it the same, is in one more layer of the image.
+        elif ".so" in name and is_elf(content := path.read_bytes()) and (stripped := strip(content)) != content:
+            path.write_bytes(stripped)
     for path in sorted(directory.rglob("*"), reverse=True):
         if path.is_dir() and not any(path.iterdir()):
             path.rmdir()
