@@ -12,7 +12,7 @@ import pytest
 
 from tests.docker.conftest import client
 from tests.docker.test_up import containers_of, engine
-from tests.e2e.collection import FAST, INPROCESS, collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, collect_here, fingerprints, start, write_config
 from throwcollect.heartbeat import SILENT_S
 from throwcollect.runtimes.docker.docker_engine import RMW_LABEL, default_tag
 
@@ -20,14 +20,28 @@ pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 __all__ = ["client", "engine"]
 
 
-def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.DockerClient, tmp_path: Path) -> None:
-    config, directory = write_config(tmp_path, trials=45, sim=FAST), tmp_path / "data"
-    collect(config, tmp_path / "undisturbed", 1, *INPROCESS, "--set", "run.ros=embedded")
+def test_nodes_that_are_stuck_are_unhealthy_and_that_are_killed_come_back_and_find_each_other(
+    engine: docker.DockerClient, tmp_path: Path
+) -> None:
+    config, directory = write_config(tmp_path, trials=32, sim=FAST), tmp_path / "data"
+    collect_here(config, tmp_path / "undisturbed", "--set", "run.ros=embedded")
     # Slow enough to go on for longer than a router that was killed stays away.
     slow = ("--set", "sim.real_time_factor=1", "--set", "run.trial_timeout_s=20")
     rclpy = ("--runtime", "docker", "--set", "run.ros=rclpy", *slow)
     running = start(config, directory, 2, *rclpy)
     running.wait_until(lambda: running.count_bytes() > 0)
+    nodes = containers_of(engine, directory)
+    assert nodes.keys() == {"router", "sim_0", "sim_1", "coordinator"}
+    for node in nodes.values():
+        running.wait_until(lambda node=node: look_at(node) == 0)
+    # Only the process is suspended, not the container, so that the launcher does not replace the node.
+    (stuck,) = psutil.Process(nodes["sim_1"].attrs["State"]["Pid"]).children()
+    stuck.suspend()
+    try:
+        time.sleep(SILENT_S + 1)
+        assert look_at(nodes["sim_1"]) == 1
+    finally:
+        stuck.resume()
     for name in ("router", "sim_0", "coordinator"):
         size = running.count_bytes()
         before = containers_of(engine, directory)[name]
@@ -42,27 +56,6 @@ def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.Dock
     collected, undisturbed = fingerprints(directory), fingerprints(tmp_path / "undisturbed")
     for name in ("small_00000.mcap", "throws.parquet"):
         assert collected[name] == undisturbed[name]
-
-
-def test_a_container_with_a_stuck_loop_is_unhealthy(engine: docker.DockerClient, tmp_path: Path) -> None:
-    directory = tmp_path / "data"
-    slow = ("--runtime", "docker", "--set", "run.ros=rclpy", "--set", "sim.real_time_factor=1", "--trials", "300")
-    running = start(write_config(tmp_path, trials=8, sim=FAST), directory, 1, *slow)
-    running.wait_until(lambda: running.count_bytes() > 0)
-    nodes = containers_of(engine, directory)
-    assert nodes.keys() == {"router", "sim_0", "coordinator"}
-    for node in nodes.values():
-        assert look_at(node) == 0, node.name
-    # Only the process is suspended, not the container, so that the launcher does not replace the node.
-    (stuck,) = psutil.Process(nodes["sim_0"].attrs["State"]["Pid"]).children()
-    stuck.suspend()
-    try:
-        time.sleep(SILENT_S + 1)
-        assert look_at(nodes["sim_0"]) == 1
-    finally:
-        stuck.resume()
-    running.process.terminate()
-    running.finish()
 
 
 def test_a_label_of_the_image_names_the_rmw_of_its_rclpy(client: docker.DockerClient) -> None:
