@@ -46,7 +46,7 @@ def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, doc
 def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
     engine: docker.DockerClient, tmp_path: Path
 ) -> None:
-    """Every kind of node is killed and a simulation paused; then the launcher dies, and after it one more simulation."""
+    """Nodes of each kind are killed, a simulation is paused; then the launcher dies, and after it a simulation."""
     # Slow enough that the collection outlives all kills even on a fast machine.
     config = write_config(tmp_path, trials=30, sim=f"{FAST}, real_time_factor: 2")
     directory = tmp_path / "data"
