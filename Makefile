@@ -85,7 +85,7 @@ test-fast: $(READY_DEV)
 
 # What waits for others is run beside what computes, and each group begins as soon as it can, so that both cores always have something
 # to do. Tests of containers wait for most, so they begin as soon as there is an image; next come those of processes, which compute
-# most. Continuous integration makes the image and then the cluster meanwhile, and names the processes that do.
+# most. Continuous integration makes the image and the cluster meanwhile, and names the processes that do.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
@@ -144,7 +144,7 @@ test-processes: wait-for-image
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
-test-cluster: wait-for-cluster
+test-cluster: wait-for-image wait-for-cluster
 	$(BIN)/python -m pytest tests/cluster
 
 # Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.

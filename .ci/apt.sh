@@ -19,22 +19,25 @@ install_missing() {
 install_packages() {
     # Another installation may be under way.
     local apt=(apt-get -qq -o DPkg::Lock::Timeout=300)
-    is_new build/apt-updated || { "${apt[@]}" update && touch build/apt-updated; } || return
+    is_new build/apt-updated || { flock -o build/apt.lock "${apt[@]}" update && touch build/apt-updated; } || return
     "${apt[@]}" install -y --no-install-recommends "$@"
 }
 
 # Downloads packages of another release into a directory: `download_packages RELEASE DIRECTORY PACKAGE...`. The release has lists
 # of its own, in build/apt, so that those of the machine stay as they are.
-download_packages() {
+download_packages() (
     local own=$PWD/build/apt/$1 release=$1 directory=$2 mirror
     shift 2
     mirror=$(awk '/^URIs:/ { print $2; exit }' /etc/apt/sources.list.d/debian.sources 2> /dev/null)
     [ -n "$mirror" ] || { echo "there is no Debian mirror to take packages of $release from" >&2; return 1; }
     mkdir -p "$own/lists/partial" "$own/cache/archives/partial"
+    # Two scripts may want packages of the same release at the same time, and apt would refuse the second one.
+    exec 9> "$own/lock"
+    flock 9
     printf 'Types: deb\nURIs: %s\nSuites: %s\nComponents: main\nSigned-By: %s\n' "$mirror" "$release" \
         /usr/share/keyrings/debian-archive-keyring.gpg > "$own/debian.sources"
     local apt=(apt-get -qq -o Dir::Etc::sourcelist="$own/debian.sources" -o Dir::Etc::sourceparts=/dev/null
         -o Dir::State::lists="$own/lists" -o Dir::Cache="$own/cache" -o APT::Sandbox::User=root -o Acquire::Languages=none)
     is_new "$own/updated" || { "${apt[@]}" update && touch "$own/updated"; } || return
     (cd "$directory" && "${apt[@]}" download "$@")
-}
+)
