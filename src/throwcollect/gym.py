@@ -59,9 +59,9 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
     by their columns, such as ``release_time_s`` and ``miss_m``; each `info` has ``touching``, the names of what presses
     on the object, and ``clipped``, whether the command was beyond a limit.
 
-    Rewards are 1 for a success and 0 otherwise; with a target for x and y, a trial that ends farther than `hit_m` from it is
-    no success. With ``reward="shaped"``, each step adds by how much nearer to the target the object would land if it were
-    let go [m], without drag; so all steps add up to the distance at the start minus the one at the end.
+    Rewards are 1 for a success and 0 otherwise; with a target for x and y, a trial that ends farther than `hit_m` from
+    it is no success. With ``reward="shaped"``, each step adds by how much nearer to the target the object would land if
+    it were let go [m], without drag; so all steps add up to the distance at the start minus the one at the end.
 
     Args:
         config: YAML file of a configuration, or a `Config`; its sweep is not looked at.

@@ -209,7 +209,7 @@ def test_a_watched_run_outlives_its_server_and_can_be_stopped_and_resumed(
             frame = shown.recv(timeout=60)
             assert isinstance(frame, bytes)
             header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
-            numbers = header["samples"] * (len(header["joints"]) + 3)
+            numbers = header["samples"] * (len(header["joints"]) + 3 + 7)
             assert {"trial", "outcome", "joints", "samples", "rate_hz", "landing"} <= set(header)
             assert len(frame) % 4 == 0
             assert 0 <= len(frame) - 4 * numbers - 4 - len(json.dumps(header)) < 4

@@ -47,7 +47,7 @@ def run(text: str, call: Call, *few: str) -> dict[str, str]:
 
 
 def test_the_world_with_a_table_is_right_and_its_table_can_be_swept(tmp_path: Path) -> None:
-    yaml, moving = blocks("yaml", BODIES)
+    yaml, moving, _files = blocks("yaml", BODIES)
     (tmp_path / "table.yaml").write_text(yaml, encoding="utf-8")
     config = load(tmp_path / "table.yaml")
     table = config.scene.bodies["table"]

@@ -35,6 +35,9 @@ CONTROL = [
     "GetEntitiesStates",
     "GetEntityState",
     "SetEntityState",
+    "GetSpawnables",
+    "SpawnEntity",
+    "DeleteEntity",
 ]
 PARAMETERS = [
     "DescribeParameters",

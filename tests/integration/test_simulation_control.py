@@ -35,7 +35,12 @@ def test_get_simulator_features_lists_the_supported_features(robot: Robot) -> No
         [
             Features.ENTITY_STATE_GETTING,
             Features.ENTITY_STATE_SETTING,
+            Features.SPAWNING,
+            Features.SPAWNING_RESOURCE_STRING,
+            Features.SPAWNABLES,
+            Features.DELETING,
             Features.SIMULATION_RESET,
+            Features.SIMULATION_RESET_SPAWNED,
             Features.SIMULATION_RESET_TIME,
             Features.SIMULATION_RESET_STATE,
             Features.SIMULATION_STATE_GETTING,
@@ -46,7 +51,7 @@ def test_get_simulator_features_lists_the_supported_features(robot: Robot) -> No
             Features.STEP_SIMULATION_ACTION,
         ]
     )
-    assert list(features.spawn_formats) == []
+    assert list(features.spawn_formats) == ["urdf"]
     assert "one step is one physics step of 0.002 s" in features.custom_info
 
 
@@ -99,7 +104,7 @@ def test_a_reset_brings_time_robot_and_ball_back(scope: int, robot: Robot) -> No
     assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
 
 
-@pytest.mark.parametrize("scope", [Reset.SCOPE_SPAWNED, 7, 9, 254])
+@pytest.mark.parametrize("scope", [8, 9, 254])
 def test_a_reset_with_unsupported_scope_bits_is_refused_and_changes_nothing(scope: int, robot: Robot) -> None:
     robot.put_into(PAUSED)
     robot.step(5)

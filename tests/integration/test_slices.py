@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -250,11 +251,11 @@ def test_a_slice_with_a_lost_trial_keeps_its_others_for_the_next_attempt(
 ) -> None:
     begin, refused, begun = Simulator.begin, True, set[int]()
 
-    def begin_or_refuse(self: Simulator, trial: int, values: Mapping[str, float]) -> None:
+    def begin_or_refuse(self: Simulator, trial: int, values: Mapping[str, float], **further: Any) -> None:
         if trial == 1 and refused:
             raise ThrowcollectError("no")
         begun.add(trial)
-        begin(self, trial, values)
+        begin(self, trial, values, **further)
 
     monkeypatch.setattr(Simulator, "begin", begin_or_refuse)
     on_scratch = [*INPROCESS, f"cluster.scratch={tmp_path / 'scratch'}"]
