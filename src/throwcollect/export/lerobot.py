@@ -87,6 +87,7 @@ def list_features(moving: Sequence[str], targets: Sequence[TargetColumn], bodies
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     success = source.dataset.config.task.success
+    longest = max(map(source.count_samples, source.throws))
     return Layout(
         files={
             "data/": "one row a frame.",
@@ -102,6 +103,10 @@ dataset = LeRobotDataset("me/throws", root=".")
             f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a throw. Frames are float32, "
             "as usual there. Joints that do not move, orientation and spin of the ball, and commanded velocities are "
             "left out.",
+            f"The longest episode has {longest} frames. A policy of LeRobot commands all of it at once with "
+            f"`--policy.chunk_size={longest} --policy.n_action_steps={longest}` (ACT), and is to be asked at "
+            f"{source.rate_hz} Hz. ACT and Diffusion train without images, because there is "
+            "`observation.environment_state`; they normalise it only if `normalization_mapping` names `ENV`.",
         ),
         over_time=[
             "| feature | unit | |",
