@@ -19,8 +19,8 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 
 .PHONY: up ros dist test test-fast \
-    test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client wait-for-image wait-for-cluster test-containers \
-    test-containers-of-commands test-containers-of-runs test-image test-processes test-cluster image sif sif-without-engine \
+    test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client test-lerobot wait-for-image wait-for-cluster \
+    test-containers test-containers-of-commands test-containers-of-runs test-image test-processes test-cluster image sif sif-without-engine \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
@@ -116,6 +116,17 @@ wait-for-cluster: MAKER = $(MAKES_CLUSTER)
 wait-for-image wait-for-cluster:
 	@while [ -n "$(MAKER)" ] && kill -0 $(MAKER) 2> /dev/null; do sleep 1; done
 
+# LeRobot and torch need Python 3.12, and 7 GB; what needs them is skipped elsewhere.
+LEROBOT_VENV := .venv-lerobot
+test-lerobot: $(LEROBOT_VENV)/.ready
+	HF_HUB_OFFLINE=1 $(LEROBOT_VENV)/bin/python -m pytest tests/unit/export/test_lerobot.py \
+	    tests/unit/export/test_exporting_page.py tests/e2e/test_policy_lerobot.py
+
+$(LEROBOT_VENV)/.ready: pyproject.toml | $(READY_DEV)
+	$(BIN)/uv venv --quiet --python 3.12 $(LEROBOT_VENV)
+	$(BIN)/uv pip install --quiet --python $(LEROBOT_VENV)/bin/python -e '.[collect,export]' 'lerobot[dataset]==0.6.1' pytest psutil
+	touch $@
+
 # These tests of genuine ROS 2 need an engine, too.
 WITH_ENGINE := tests/ros/test_containers.py
 
@@ -208,4 +219,4 @@ dist: | $(VENV)/bin/python
 	build/tried/bin/throwcollect config configs/quickstart.yaml > build/tried/config.yaml
 
 clean:
-	rm -rf $(VENV) $(ROS_VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(ROS_VENV) $(LEROBOT_VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -75,7 +75,7 @@ def collect(config: str, out: Path, trials: int) -> None:
 
 
 def train(export: Path, policy: Path, steps: int) -> None:
-    """Train a small ACT: from the first observation of a throw, which holds the target, to all commands of the swing."""
+    """Train a small ACT from the first observation of a throw, which holds the target, to all commands of its swing."""
     torch.manual_seed(0)
     ahead = {"action": [frame / RATE_HZ for frame in range(CHUNK)]}
     dataset = LeRobotDataset("me/throws", root=export, delta_timestamps=ahead)
