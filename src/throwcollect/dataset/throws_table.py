@@ -52,7 +52,7 @@ def make_field(name: str, kind: pa.DataType, description: str, *, unit: str | No
 
 
 def body_state(row: Row, name: str) -> ObjectState | None:
-    """Read the state of the ball at ``release``, ``apex`` or ``landing`` from a row of the table of throws.
+    """Read the state of the object at ``release``, ``apex`` or ``landing`` from a row of the table of throws.
 
     It is None if the trial came to no such event, or its task knows none.
     """

@@ -61,7 +61,7 @@ def verify(directory: Path, *, processes: int = 1) -> list[Finding]:
 
     Checked are: size and hash of every file but logs; whether configuration and plan belong together; the columns of
     the table of throws; of each recording every byte, which is written again from its episodes; of each episode its
-    hashes, its row in the table, for which it is judged again, and whether the ball flies ballistically where nothing
+    hashes, its row in the table, for which it is judged again, and whether the object flies ballistically where nothing
     touches it; the bag's metadata and the digest in them. Checks that need packages that are not installed are left
     out; `find_unchecked` names them.
 

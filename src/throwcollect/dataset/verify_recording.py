@@ -40,7 +40,7 @@ _VELOCITY_MPS = 1e-10
 """Largest errors of rounding from one sample of a flight to the next."""
 _AFTER_CONTACT_S = 0.02
 _AFTER_CONTACT_STEPS = 10
-"""The contact solver may act on a ball for some steps after its normal force has gone: up to 12 ms were seen."""
+"""The contact solver may act on an object for some steps after its normal force has gone: up to 12 ms were seen."""
 
 
 @dataclass
@@ -192,7 +192,7 @@ def _explain_missing(contents: McapContents, row: Row) -> str:
 
 
 def find_flight_problems(episode: Episode, config: Config) -> Iterator[str]:
-    """Find departures of the ball from ballistic motion where nothing touches it, a sentence each."""
+    """Find departures of the object from ballistic motion where nothing touches it, a sentence each."""
     samples, steps = episode.samples(), config.sim.physics_hz // config.record.rate_hz
     if len(samples) < 2:
         return
@@ -207,7 +207,7 @@ def find_flight_problems(episode: Episode, config: Config) -> Iterator[str]:
     if wrong.any():
         time_s = episode.header.seconds_at(int(samples.stamps_ns[1:][wrong][0]))
         yield (
-            f"the ball departs from ballistic motion by up to {apart_m[wrong].max():.3g} m and "
+            f"the {config.acted_on} departs from ballistic motion by up to {apart_m[wrong].max():.3g} m and "
             f"{apart_mps[wrong].max():.3g} m/s, first at {time_s:.3f} s, where no contact is"
         )
 

@@ -56,7 +56,7 @@ class StepRequest:
 class LiveSimulator(Simulator):
     """A simulator that clients drive, too: it plays, pauses, steps and keeps pace with real time.
 
-    Outside of trials, the clock runs while a limb or the ball moves, and stands still otherwise.
+    Outside of trials, the clock runs while a limb or the object moves, and stands still otherwise.
 
     Attributes:
         state: Whether the clock may run.
@@ -173,7 +173,7 @@ class LiveSimulator(Simulator):
         elif factor:
             steps = stretch_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)
-        # A trial ends when its rules say so; a motion by hand, when limbs and ball rest, or it rolls for too long.
+        # A trial ends when its rules say so; a motion by hand, when limbs and object rest, or it rolls for too long.
         if self._in_trial:
             self._running = self.world.end_reason is None
         elif any(limb.is_driven for limb in self.limbs.values()):

@@ -47,7 +47,7 @@ class Simulator:
         config: The configuration; a trial replaces some of its values.
         loop: Lets the policy of the configuration command the joints; None if it has none.
         channels: The topics that are recorded of a trial.
-        world: The world: engine, robot, ball and clock.
+        world: The world: engine, robot, bodies and clock.
         limbs: The controllers, by name.
         trial: The trial that is simulated, and the one that the next reset begins.
         close: Frees the world, as the end of this object does, too; no trial can be run afterwards.
@@ -206,7 +206,7 @@ class Simulator:
             self.trial.set_up_nothing()
         conditions = self._settings.conditions_of(config, motion.digest if motion else "")
         state, table = self._encoder.encode(samples, states)
-        # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
+        # The samples are judged as readers of the dataset see them: recorded velocities are in the frames of bodies.
         result = self._judge(config, motion, table.samples, header) if motion else ""
         return Episode(header, state, result=result, conditions=conditions)
 
