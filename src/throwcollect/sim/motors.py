@@ -55,7 +55,7 @@ class Motors:
         if self._lag_s:
             targets = lag_behind(targets, self._targets[0], hz=self._hz, lag_s=self._lag_s)
         self._targets = np.concatenate((self._targets[:1], targets))
-        return self._targets, np.diff(self._targets, axis=0) * self._hz
+        return self._targets, (self._targets[1:] - self._targets[:-1]) * self._hz
 
     def advance(self, steps: int) -> None:
         """Go on by a number of the steps that were planned."""

@@ -267,7 +267,7 @@ class Simulator:
                 loop.ask()
             free = min(free, loop.stride - phase)
         if free > 0:
-            commands = np.tile(self._command, (free, 1))
+            commands = np.repeat(self._command[np.newaxis], free, axis=0)
             for limb in moving:
                 limb.take(commands)
         else:
