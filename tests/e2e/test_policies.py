@@ -138,8 +138,13 @@ def test_trials_in_which_a_policy_fails_are_lost_and_all_others_are_kept(lab: Pa
     assert re.search(r"lab:Fails cannot act at 0\.3\d\d s of trial \d+: RuntimeError: the network is lost", done.stderr)
 
 
-def test_the_example_plays_episodes() -> None:
+def test_the_example_trains_and_compares_policies() -> None:
     pytest.importorskip("gymnasium")
-    words = [sys.executable, str(ROOT / "examples" / "policy_gym.py")]
+    words = [sys.executable, str(ROOT / "examples" / "policy_gym.py"), "--quick"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert re.findall(r"^(\w+), seed \d: (\w+)", done.stdout, flags=re.MULTILINE)[-3:] == [("scripted", "landed")] * 3
+    assert done.returncode == 0, done.stderr
+    assert "trained on 8 throws" in done.stdout
+    rewards = dict(re.findall(r"^(random|scripted|trained) .* (\S+)$", done.stdout, flags=re.MULTILINE))
+    # The scripted swing comes nearer to the targets than random actions, and the map that was learned changes it.
+    assert float(rewards["scripted"]) > float(rewards["random"])
+    assert rewards["trained"] != rewards["scripted"]
