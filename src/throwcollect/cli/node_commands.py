@@ -41,6 +41,10 @@ def sim(
         str | None,
         typer.Option("--namespace", help="Namespace; /<name> by default. / is where nodes of the real robot look."),
     ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", metavar="DIR", help="Dataset that clients record into, by the service `record`."),
+    ] = None,
 ) -> None:
     """Run one simulation."""
     from socket import gethostname
@@ -48,7 +52,7 @@ def sim(
     from throwcollect.ros.nodes.simulation.process import run
     from throwcollect.runtimes.nodes import simulation_name_of
 
-    run(config, name=name or simulation_name_of(gethostname()), namespace=namespace)
+    run(config, name=name or simulation_name_of(gethostname()), namespace=namespace, record=record)
 
 
 def coordinator(

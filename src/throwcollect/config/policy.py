@@ -9,6 +9,9 @@ from pydantic import Field
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.section import Section
 
+SESSION = "session"
+"""`task.policy.use` of a dataset that clients of a session have recorded; nothing can be simulated by it."""
+
 
 class PolicyConfig(Section):
     """A policy in the loop."""

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from throwcollect.config.loader import load, load_locating_errors
+from throwcollect.config.policy import SESSION
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
@@ -43,6 +44,7 @@ from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points, read_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST, REFUSED, Result
+from throwcollect.wording import command
 
 _NO_EPISODE = "no whole episode of it was left"
 
@@ -77,6 +79,12 @@ def resume(
                 "was derived from other datasets, so nothing is collected into it",
                 path=directory,
                 hint="derive it again if it is damaged",
+            )
+        if config.task.policy is not None and config.task.policy.use == SESSION:
+            raise DatasetError(
+                "was recorded in a session, so nothing of it can be simulated again",
+                path=directory,
+                hint=f"{command('sim', 'CONFIG', '--record', directory)} records more into it",
             )
         given = make_self_contained(config)
         stored = _read_stored_config(directory)

@@ -6,6 +6,7 @@ import math
 
 import pyarrow as pa
 
+from throwcollect.config.policy import SESSION
 from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.config.values import keys_by_column
@@ -55,7 +56,8 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "- `metadata.yaml` and `*.mcap`: the recordings, a rosbag2 bag (`ros2 bag info`, Foxglove, `rosbags`, `mcap`).",
         f"- `throws.parquet`: one row a trial: swept values, outcome, {measures}, place of its recording.",
         "- `plan.parquet`: the trials, each as it was drawn before it ran.",
-        "- `config.yaml`: the configuration; collecting with it again yields the same data.",
+        "- `config.yaml`: the configuration"
+        + ("; collecting with it again yields the same data." if is_reproducible(config) else "."),
         *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
         *([f"- `{MOTIONS}`: the motions of the trials."] if config.task.trajectory.family == "file" else []),
         "",
@@ -101,8 +103,15 @@ def _describe_policy(config: Config) -> str:
     """Name the policy that commanded the joints, and say what follows if it is not reproducible."""
     if (policy := config.task.policy) is None:
         return ""
+    if policy.use == SESSION:
+        return " Recorded in a session: clients commanded the joints, and no trial can be simulated again."
     text = f" The policy `{policy.use}` commanded the joints at {policy.rate_hz} Hz."
     return text if policy.reproducible else text + " It is not reproducible: collecting again gives other data."
+
+
+def is_reproducible(config: Config) -> bool:
+    """Whether collecting with a configuration again gives the same data."""
+    return config.task.policy is None or config.task.policy.reproducible
 
 
 def _list_ranges(config: Config, throws: pa.Table) -> list[str]:
@@ -145,6 +154,8 @@ def _list_targets(config: Config, throws: pa.Table) -> list[str]:
 
 def _describe_drawing(config: Config) -> list[str]:
     """Tell how the values were drawn, one sentence a line."""
+    if config.task.policy is not None and config.task.policy.use == SESSION:
+        return ["Nothing was drawn: what differs is what clients did."]
     lines = [f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}."]
     if config.until is not None:
         wanted = f"{config.until.wanted} {config.task.noun}s had {config.until.outcome()}"

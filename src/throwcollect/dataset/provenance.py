@@ -71,6 +71,7 @@ class Provenance:
             in no clone.
         image: Id of the image that ran; None without one.
         robot_sha256: SHA-256 of the robot's description; None if not known.
+        session: Simulation whose clients were recorded; None if the trials were collected.
     """
 
     finished: datetime
@@ -84,6 +85,7 @@ class Provenance:
     revision: str | None = None
     image: str | None = None
     robot_sha256: str | None = None
+    session: str | None = None
 
     @classmethod
     def of_this_machine(
@@ -117,6 +119,7 @@ class Provenance:
             "image": self.image,
             "robot description": self.robot_sha256 and f"SHA-256 {self.robot_sha256}",
             "simulations": None if self.simulations is None else str(self.simulations),
+            "session": self.session and f"clients of {self.session}; no function of `config.yaml`",
             "wall time": None if self.wall_s is None else f"{self.wall_s:.1f} s",
             "open": _OPEN if self.was_open else None,
         }

@@ -240,12 +240,17 @@ def _move_recording(source: Path, target: Path, entry: FileEntry) -> FileSummary
             os.replace(source, target)
         except OSError as error:
             raise unwritable(target, error) from error
+    return read_statistics(target, entry)
+
+
+def read_statistics(target: Path, entry: FileEntry) -> FileSummary:
+    """Read the statistics of a finished recording, which has the size that a manifest says."""
     try:
         with open(open_regular(target), "rb") as file:
             size = os.fstat(file.fileno()).st_size
             # Only the size is checked: hashing would mean to read all recordings of the dataset in one process.
             if size != entry.bytes:
-                raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as its slice says")
+                raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as its manifest says")
             summary = make_reader(file).get_summary()
     except OSError as error:
         raise unreadable(target, error) from error

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
+
+import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.control import JointTrajectoryController, Trajectory, TrajectoryGoal, TrajectoryRefusal
-from throwcollect.engines.engine import SceneBody
-from throwcollect.episode.record import Samples
+from throwcollect.engines.engine import BodyState, SceneBody
+from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import RequestError
 from throwcollect.sim.pace import (
     WATCHED_STRETCH_S,
@@ -19,6 +22,7 @@ from throwcollect.sim.pace import (
     longest_steps,
     stretch_steps,
 )
+from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.sim.simulator import STRETCH_S, Simulator
 from throwcollect.sweep.trials import NO_TARGET, Values
 from throwcollect.units import NS_PER_S
@@ -124,7 +128,53 @@ class LiveSimulator(Simulator):
             raise RequestError("RESULT_INCORRECT_STATE", "there is no start state until a reset succeeds")
         self.world.set_spawned(spawned.values())
         # What follows is not the trial that a client has set up.
-        self._spawned, self._in_trial, self._published = spawned, False, 0
+        self._spawned, self._in_trial, self._sent, self._published = spawned, False, None, 0
+
+    def place(self, name: str, state: BodyState) -> None:
+        """Set pose and velocity of a body that moves."""
+        self.trial.require_free()
+        if self.records and self.world.steps:
+            raise RequestError(
+                "RESULT_INCORRECT_STATE", "a recording runs, and bodies are placed before its first step"
+            )
+        self.world.place(name, state)
+
+    @property
+    def records(self) -> bool:
+        """Whether what clients do is recorded; every reset ends that."""
+        return self._sent is not None
+
+    def begin_recording(self) -> None:
+        """Reset everything, and record what clients do until they or the task end it, or `sim.max_trial_s` is over."""
+        self.trial.require_free()
+        if self.records:
+            raise RequestError("RESULT_INCORRECT_STATE", "a recording runs already")
+        if self.trial.setup != TrialSetup(NO_TRIAL, (), self.config):
+            message = "parameters set up a trial, or other physics than the file; a recording has those of the file"
+            raise RequestError("RESULT_INCORRECT_STATE", message)
+        self.reset()
+        self.world.may_rest, self._in_trial, self._sent = True, True, []
+
+    @property
+    def recording_ended(self) -> bool:
+        """Whether a recording is over, and waits for `end_recording`."""
+        return self.records and self.world.end_reason is not None
+
+    def end_recording(self) -> tuple[EpisodeHeader, Samples] | None:
+        """End the recording that runs, return it, and reset everything; None if nothing has moved since it began."""
+        sent, columns = self._sent or [], [self.world.moving.index(joint) for joint in self.config.moving_joints]
+        self.world.end_reason = self.world.end_reason or ("rest" if self.world.rests else "timeout")
+        recorded = self.take_recording()
+        # Behind the last sample, the last command holds.
+        command = np.vstack([*sent, self._command])[:, columns]
+        self.reset()
+        if recorded is None or len(recorded[1]) == 1:
+            return None
+        return recorded[0], replace(recorded[1], command=np.stack([command, command], axis=1))
+
+    def hand_over(self) -> Episode | None:
+        """Return the episode of a trial that has ended, only once; a recording is none."""
+        return None if self.records else super().hand_over()
 
     def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
         """Give a goal to a controller, or refuse it; a run begins once all controllers that need a goal have one."""
@@ -174,7 +224,7 @@ class LiveSimulator(Simulator):
             steps = stretch_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)
         # A trial ends when its rules say so; a motion by hand, when limbs and object rest, or it rolls for too long.
-        if self._in_trial:
+        if self._in_trial and not (self.records and self.world.end_reason is None):
             self._running = self.world.end_reason is None
         elif any(limb.is_driven for limb in self.limbs.values()):
             self._driven_until_ns = self.now_ns

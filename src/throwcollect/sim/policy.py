@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.config.policy import SESSION
 from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of
 from throwcollect.engines.engine import BODY_NUMBERS
@@ -71,6 +72,9 @@ def find_policy(config: Config) -> Callable[[Config], Policy]:
     """
     check_observation(config)
     use = config.task.policy.use if config.task.policy else ""
+    if use == SESSION:
+        sentence = "is what clients of a session commanded, so nothing can be simulated again"
+        raise ConfigError([Problem(sentence, "task.policy.use")])
     if ":" not in use and use not in (names := names_of("policies")):
         expected = join_names(["module:function", *names], "or")
         raise ConfigError(

@@ -11,6 +11,7 @@ from dataclasses import replace
 from weakref import finalize
 
 import numpy as np
+from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
@@ -74,6 +75,8 @@ class Simulator:
         }
         self._watched: list[LimbController] = []
         """Limbs whose controllers look at the measured state in every step."""
+        self._sent: list[NDArray[np.float64]] | None = None
+        """Set points of the moving joints at the samples after the first, while a client records; otherwise None."""
         self._keeps_states = "controller_state" in config.record.topics
         self._results: list[tuple[str, GoalResult]] = []
         try:
@@ -151,7 +154,7 @@ class Simulator:
             time: Whether the clock goes to the start of the trial.
             state: Whether world and controllers go to the start state of the trial.
         """
-        self._in_trial = False
+        self._in_trial, self._sent = False, None
         self.trial.begin()
         setup = self.trial.setup
         start_ns = self.now_ns
@@ -276,7 +279,10 @@ class Simulator:
         if loop is not None:
             loop.fill(commands)
         self._command = commands[-1].copy()
+        due = -(self.world.steps + 1) % self._stride
         taken = self.world.run(commands, stop_at_end=self._in_trial)
+        if self._sent is not None:
+            self._sent.append(commands[due : taken : self._stride])
         self._collect_results()
         return taken
 

@@ -68,6 +68,7 @@ class World(Observer):
         moving: Names of the joints that are simulated and commanded, in the order of `Robot.joints`.
         steps: Number of physics steps taken in this trial.
         end_reason: Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on.
+        may_rest: Whether this trial goes on when arm and object rest.
 
     Raises:
         ConfigError: If the configuration does not describe a world (see `reset`).
@@ -79,6 +80,7 @@ class World(Observer):
     moving: tuple[str, ...]
     steps: int
     end_reason: EndReason | None
+    may_rest: bool
     _ends: EndRule
     _scene: Scene
     _own_bodies: tuple[SceneBody, ...]
@@ -330,6 +332,7 @@ class World(Observer):
         self._has_moved = False
         self._resting_since = 0
         self.end_reason = None
+        self.may_rest = False
 
     def _settle(self, trial: Config) -> None:
         """Let the object come to rest where it starts, with the robot still, and keep that state."""
@@ -391,6 +394,6 @@ class World(Observer):
             self._resting_since = self.steps
         if (reason := self._ends(before[-BODY_NUMBERS:], now[-BODY_NUMBERS:], self._contacts.bodies)) is not None:
             return reason
-        if self._has_moved and self.rests:
+        if self._has_moved and self.rests and not self.may_rest:
             return "rest"
         return "timeout" if self.steps >= self._last_step else None

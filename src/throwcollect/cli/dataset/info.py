@@ -12,6 +12,7 @@ import typer
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.printing import print_progress, print_result
 from throwcollect.cli.streams import ensure_written
+from throwcollect.config.policy import SESSION
 from throwcollect.errors import DatasetError
 from throwcollect.extras import MissingExtraError, install_command, require, require_engine
 from throwcollect.side_by_side import count_cores
@@ -76,6 +77,8 @@ def _describe_replay(dataset: Dataset, replay: int | None) -> str:
     """Say how many throws were simulated again in a dataset in which nothing is wrong, and how to simulate more."""
     from throwcollect.replay.audit import count_replayed
 
+    if (policy := dataset.config.task.policy) is not None and policy.use == SESSION:
+        return "replayed: none, as clients of a session commanded the joints, which cannot be simulated again"
     count, recorded = count_replayed(dataset, replay), len(dataset.recorded)
     text = f"replayed: {count} of {format_count(recorded, 'throw')}"
     if count == recorded:

@@ -138,7 +138,7 @@ class EntityServices:
         self._require(request.entity)
         if request.entity not in self._simulation.world.free:
             raise RequestError("RESULT_OPERATION_FAILED", f"{request.entity} is fixed to the world")
-        self._simulation.world.place(request.entity, read_state(request.state))
+        self._simulation.place(request.entity, read_state(request.state))
 
     def _select(self, filters: EntityFilters) -> list[str]:
         if filters != EntityFilters():

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from throwcollect.config.key import Effect
 from throwcollect.config.schema import FASTEST, SLOWEST, Config
@@ -42,6 +43,9 @@ from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.trial.lease import LEASES, Lease, leases_from_json
 from throwcollect.units import NS_PER_S
 
+if TYPE_CHECKING:
+    from throwcollect.ros.nodes.simulation.recording import RecordService
+
 _CLOCK = "rosgraph_msgs/msg/Clock"
 Clock: Any = get_message(_CLOCK)
 
@@ -78,10 +82,12 @@ class SimulationNode(Node):
     """Serves one simulation, with all names in one namespace, by default ``/<name>``.
 
     Raises:
-        ConfigError: If another simulation has this namespace.
+        ConfigError: If another simulation has this namespace, or nothing can be recorded into the directory `record`.
     """
 
-    def __init__(self, name: str, simulation: LiveSimulator, *, namespace: str | None = None) -> None:
+    def __init__(
+        self, name: str, simulation: LiveSimulator, *, namespace: str | None = None, record: Path | None = None
+    ) -> None:
         super().__init__(name, namespace=namespace or f"/{name}")
         self._require_own_namespace()
         self._simulation = simulation
@@ -109,6 +115,12 @@ class SimulationNode(Node):
         SimulationControl(self, simulation)
         SpawningServices(self, simulation)
         self._stepping = Stepping(self, simulation)
+        self._recording: RecordService | None = None
+        if record is not None:
+            # Simulations that record nothing do without the libraries that datasets need.
+            from throwcollect.ros.nodes.simulation.recording import RecordService
+
+            self._recording = RecordService(self, simulation, record)
         # This publisher comes last: a coordinator that sees it takes the whole simulation for ready.
         self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
 
@@ -160,6 +172,8 @@ class SimulationNode(Node):
             self._begin_next()
             self._episodes.publish(pack(handed, self._signer))
         self._stepping.follow_up()
+        if self._recording is not None:
+            self._recording.follow_up()
 
     def _require_own_namespace(self) -> None:
         """Refuse the namespace of another simulation, because clients could not tell the two apart."""

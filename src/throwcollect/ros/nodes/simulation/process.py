@@ -14,7 +14,7 @@ from throwcollect.ros.self_check import begin_to_serve
 from throwcollect.sim.live import LiveSimulator
 
 
-def run(config: Path, *, name: str, namespace: str | None = None) -> None:
+def run(config: Path, *, name: str, namespace: str | None = None, record: Path | None = None) -> None:
     """Serve one simulation until SIGTERM, SIGINT or SIGHUP, or until a client sets its state to quitting.
 
     While a trial runs, the process reads messages between two stretches; otherwise it sleeps until a message arrives.
@@ -23,13 +23,14 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
         config: YAML file of the collection.
         name: Name of the node.
         namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
+        record: Directory of the dataset that clients may record into; None if they may not.
     """
     simulation = LiveSimulator(load(config))
     if namespace is None and simulation.config.run.root_namespace:
         namespace = "/"
     ros.init()
     try:
-        node = SimulationNode(name, simulation, namespace=namespace)
+        node = SimulationNode(name, simulation, namespace=namespace, record=record)
     except ros.NameValidationException as error:
         raise ConfigError(str(error)) from error
     nodes = (node, *node.other_nodes)

@@ -1,0 +1,68 @@
+"""Offers the service by which clients record what they do with a simulation into a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from throwcollect.dataset.session import SessionDataset
+from throwcollect.errors import RequestError, ThrowcollectError
+from throwcollect.ros import Node, get_service
+from throwcollect.sim.live import LiveSimulator
+
+SetBool: Any = get_service("std_srvs/srv/SetBool")
+
+
+class RecordService:
+    """Offers ``record`` under a relative name: true begins an episode, and false ends it."""
+
+    def __init__(self, node: Node, simulation: LiveSimulator, directory: Path) -> None:
+        self._node, self._simulation = node, simulation
+        self._dataset = SessionDataset(directory, simulation.config, name=node.get_name())
+        self._told: str | ThrowcollectError | None = None
+        """What the client that ends the last recording gets: that it is written, or why it is not."""
+        node.create_service(SetBool, "record", self._answer)
+
+    def follow_up(self) -> None:
+        """Write a recording that has ended without a client."""
+        if self._simulation.recording_ended:
+            self._write()
+
+    def _answer(self, request: Any, response: Any) -> Any:
+        try:
+            response.message = self._begin() if request.data else self._end()
+            response.success = True
+        except ThrowcollectError as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _begin(self) -> str:
+        self._simulation.begin_recording()
+        self._told = None
+        return f"records for at most {self._simulation.config.sim.max_trial_s:g} s into {self._dataset.directory}"
+
+    def _end(self) -> str:
+        if self._simulation.records:
+            self._write()
+        told, self._told = self._told, None
+        if told is None:
+            raise RequestError(
+                "RESULT_INCORRECT_STATE", "nothing is recorded: no recording was begun, or a reset ended it"
+            )
+        if isinstance(told, ThrowcollectError):
+            raise told
+        return told
+
+    def _write(self) -> None:
+        recorded = self._simulation.end_recording()
+        if recorded is None:
+            self._told = RequestError("RESULT_INCORRECT_STATE", "nothing has moved, so nothing was written")
+            return
+        try:
+            number, result = self._dataset.append(*recorded)
+        except ThrowcollectError as error:
+            self._told = error
+            self._node.get_logger().error(f"a recording is lost: {error}")
+            return
+        self._told = f"trial {number}: {result.outcome.value}{f', {result.reason}' if result.reason else ''}"
+        self._node.get_logger().info(f"recorded into {self._dataset.directory}: {self._told}")
