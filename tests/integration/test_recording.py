@@ -7,21 +7,20 @@ import numpy as np
 import pytest
 
 import throwcollect
-from tests.commands import Command
-from tests.integration.robot import ARM, ELBOW, OWN, POSTURE, Robot, goal, start_simulation, swing
-from throwcollect.cli.main import main
+from tests.integration.robot import ARM, CONFIG, ELBOW, OWN, POSTURE, Robot, goal, start_simulation, swing
 from throwcollect.control import GoalStatus
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros import Context
 
 
 @pytest.fixture
-def recorder(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[Command, Robot, Path]]:
+def recorder(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[Robot, Path]]:
     directory = tmp_path / "recorded"
     process = start_simulation(tmp_path, endpoint, OWN, options=("--record", str(directory)))
     try:
         robot = Robot(session, OWN)
         robot.wait_until_ready(process)
-        yield process, robot, directory
+        yield robot, directory
     finally:
         process.kill()
         process.communicate()
@@ -34,10 +33,9 @@ def record(robot: Robot, begin: bool) -> tuple[bool, str]:
     return response.success, response.message
 
 
-def test_client_records_episodes(
-    recorder: tuple[Command, Robot, Path], capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    process, robot, directory = recorder
+def test_client_records_episodes(recorder: tuple[Robot, Path]) -> None:
+    robot, directory = recorder
+    assert not directory.exists()
     assert record(robot, False) == (False, "nothing is recorded: no recording was begun, or a reset ended it")
     assert record(robot, True) == (True, f"records for at most 6 s into {directory}")
     assert record(robot, True) == (False, "a recording runs already")
@@ -62,3 +60,10 @@ def test_client_records_episodes(
     assert dataset.throws["trial"].to_pylist() == [0, 1]
     assert thrown.startswith(f"trial 0: {dataset.throws['outcome'][0]}")
     assert told.startswith(f"trial 1: {dataset.throws['outcome'][1]}")
+
+    # What was sent is the action of exports, one frame ahead of what was measured.
+    _, samples = dataset.throw(1).read_samples()
+    elbow = CONFIG.moving_joints.index(ELBOW)
+    measured = samples.position[:, TALOS.joints.index(ELBOW)]
+    assert np.abs(samples.command[:-1, 1, elbow] - measured[1:]).max() < 1e-3
+    assert np.ptp(measured) > 0.1

@@ -75,7 +75,7 @@ def begin_run(
     Args:
         config: The configuration's file.
         overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
-        output: Directory of the dataset, new or empty unless it is resumed; a session does not use it.
+        output: Directory of the dataset, new or empty unless it is resumed; a session makes it when clients record.
         run: Id of the run; None makes a new one.
         origin: The request of a client; None if no client asks.
         kind: Kind of the run.
@@ -284,7 +284,9 @@ def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onl
         write_config(directory, config)
         choice = choose(config, say=onlooker.say, warn=onlooker.warn)
         simulations = choice.runtime.simulations(config)
-        run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations)
+        # Containers do not see the directory.
+        recordings = str(order.output) if choice.name == "local" else None
+        run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations, recordings=recordings)
         # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
         choice.runtime.host(run.place, config, warn=onlooker.warn).close()
         return PreparedRun(records, run, config, directory, onlooker=onlooker)

@@ -102,6 +102,7 @@ class RunRecord:
         origin: The request of a client; None if a command or a program began the run.
         stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.
         planning: How far the plan is while a large one is made in the background; else None.
+        recordings: Directory into which clients of a session record; None if they cannot.
         version: Version of this layout.
     """
 
@@ -128,6 +129,7 @@ class RunRecord:
     origin: Origin | None = None
     stopping: bool = False
     planning: Planning | None = None
+    recordings: str | None = None
     version: Literal[1] = VERSION
 
     def place(self, key: RunKey) -> Place:
@@ -141,6 +143,7 @@ class RunRecord:
             middleware=self.middleware,
             key=key,
             collects=self.kind == "collection",
+            recordings=self.recordings,
         )
 
     @property

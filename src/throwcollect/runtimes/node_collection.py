@@ -53,7 +53,7 @@ def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     rest_s = SERVER_REST_S if host.place.middleware.is_fast_dds else 0.0
     return [
         NodeSpec(ROUTER, ("router", "--listen", host.listen), NodeRole.VITAL, rest_s=rest_s),
-        *simulation_nodes([*map(simulation_name, range(simulations))], host.data),
+        *simulation_nodes([*map(simulation_name, range(simulations))], host.data, recordings=host.place.recordings),
         *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.place.collects else []),
     ]
 

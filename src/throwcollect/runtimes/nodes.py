@@ -72,15 +72,16 @@ class NodeSpec:
     rest_s: float = 0.0
 
 
-def simulation_nodes(names: Sequence[str], data: str) -> list[NodeSpec]:
-    """Simulations of these names, for the configuration in the directory `data`."""
+def simulation_nodes(names: Sequence[str], data: str, *, recordings: str | None = None) -> list[NodeSpec]:
+    """Simulations of these names, for the configuration in the directory `data`; each records for itself, if at all."""
     cores = sorted(os.sched_getaffinity(0))
     # Where simulations fill all cores, letting them move between cores was measured to cost a tenth of the speed.
     bound = len(names) >= len(cores)
     return [
         NodeSpec(
             name,
-            ("sim", f"{data}/config.yaml", "--name", name),
+            ("sim", f"{data}/config.yaml", "--name", name)
+            + (("--record", f"{recordings}/{name}") if recordings is not None else ()),
             NodeRole.EXPENDABLE,
             core=cores[index % len(cores)] if bound else None,
         )

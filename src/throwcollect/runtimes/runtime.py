@@ -90,6 +90,7 @@ class Place:
         simulations: Number of simulations at the start.
         key: The key that the router asks for.
         collects: Whether the run collects a dataset; if not, its simulations serve clients until it is stopped.
+        recordings: Directory into which clients of these simulations record; None if they cannot.
     """
 
     run: str
@@ -100,6 +101,7 @@ class Place:
     middleware: Middleware
     key: RunKey
     collects: bool = True
+    recordings: str | None = None
 
     @property
     def dataset(self) -> str:

@@ -416,3 +416,75 @@ def test_after_a_failed_reset_the_clock_stands_still_until_one_succeeds() -> Non
     episode = simulation.take_recording()
     assert episode is not None
     assert [each.status for each in episode[0].goals] == [4]
+
+
+def test_recording_is_the_same_as_a_trial_by_hand(simulation: LiveSimulator) -> None:
+    trial(simulation)
+    run(simulation)
+    handed = simulation.hand_over()
+    assert handed is not None
+    by_hand = handed.samples(TALOS.joints)
+    simulation.trial.set_up_nothing()
+
+    simulation.begin_recording()
+    for controller, wish in ((ARM, swing()), (TORSO, goal(TORSO))):
+        assert simulation.submit(controller, controller, wish) is None
+    run(simulation)
+    assert simulation.hand_over() is None
+    assert simulation.recording_ended
+    recorded = simulation.end_recording()
+    assert recorded is not None
+    header, samples = recorded
+    assert (header.end_reason, len(header.goals)) == ("landed", 2)
+    assert np.array_equal(samples.position, by_hand.position)
+    assert np.array_equal(samples.object_position, by_hand.object_position)
+    # Commands are those of the next sample; the motors have followed them by then.
+    moved = [TALOS.joints.index(joint) for joint in CONFIG.moving_joints]
+    assert samples.command.shape == (len(samples), 2, len(moved))
+    assert np.abs(samples.command[:-1, 1] - samples.position[1:, moved]).max() < 1e-3
+    assert np.abs(samples.command[:-1, 1] - samples.position[:-1, moved]).max() > 1e-2
+    assert not simulation.records
+
+
+def test_recording_goes_on_while_all_rests_and_ends_when_its_time_is_over(simulation: LiveSimulator) -> None:
+    def move(number: int, duration_s: float) -> None:
+        wish = goal(ARM, duration_s, arm_right_4_joint=POSTURE["arm_right_4_joint"] + 0.1 * number)
+        # Without its first point, a trajectory begins where the arm is.
+        joints, points = wish.trajectory.joint_names, wish.trajectory.points[1:]
+        assert simulation.submit(ARM, number, TrajectoryGoal(Trajectory(joints, points))) is None
+        run(simulation)
+
+    simulation.begin_recording()
+    for number in range(3):
+        move(number, 0.5)
+        assert simulation.world.rests
+        assert not simulation.recording_ended
+    move(3, 9.0)
+    assert simulation.recording_ended
+    recorded = simulation.end_recording()
+    assert recorded is not None
+    assert recorded[0].end_reason == "timeout"
+    assert recorded[1].seconds_since(recorded[0].start_ns)[-1] == CONFIG.sim.max_trial_s
+
+
+def test_reset_ends_a_recording_without_an_episode(simulation: LiveSimulator) -> None:
+    simulation.begin_recording()
+    with pytest.raises(RequestError, match="a recording runs already"):
+        simulation.begin_recording()
+    simulation.reset()
+    assert not simulation.records
+    simulation.trial.setup = TrialSetup(-1, (), with_values(CONFIG, {"ball.mass_kg": 0.1}))
+    with pytest.raises(RequestError, match="other physics than the file"):
+        simulation.begin_recording()
+
+
+def test_recording_has_no_body_that_jumps(simulation: LiveSimulator) -> None:
+    simulation.begin_recording()
+    simulation.place("ball", BodyState((1.0, 0.0, 1.0)))
+    simulation.submit(ARM, 1, goal(ARM))
+    simulation.advance(watched=True)
+    with pytest.raises(RequestError, match="before its first step"):
+        simulation.place("ball", BodyState((1.0, 0.0, 1.0)))
+    recorded = simulation.end_recording()
+    assert recorded is not None
+    assert recorded[1].object_position[0].tolist() == [1.0, 0.0, 1.0]

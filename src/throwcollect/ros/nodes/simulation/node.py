@@ -82,7 +82,7 @@ class SimulationNode(Node):
     """Serves one simulation, with all names in one namespace, by default ``/<name>``.
 
     Raises:
-        ConfigError: If another simulation has this namespace, or nothing can be recorded into the directory `record`.
+        ConfigError: If another simulation has this namespace.
     """
 
     def __init__(

@@ -18,7 +18,8 @@ class RecordService:
 
     def __init__(self, node: Node, simulation: LiveSimulator, directory: Path) -> None:
         self._node, self._simulation = node, simulation
-        self._dataset = SessionDataset(directory, simulation.config, name=node.get_name())
+        self._directory = directory
+        self._dataset: SessionDataset | None = None
         self._told: str | ThrowcollectError | None = None
         """What the client that ends the last recording gets: that it is written, or why it is not."""
         node.create_service(SetBool, "record", self._answer)
@@ -37,9 +38,12 @@ class RecordService:
         return response
 
     def _begin(self) -> str:
+        config = self._simulation.config
+        # The directory is made, and kept from others, once it is needed.
+        self._dataset = self._dataset or SessionDataset(self._directory, config, name=self._node.get_name())
         self._simulation.begin_recording()
         self._told = None
-        return f"records for at most {self._simulation.config.sim.max_trial_s:g} s into {self._dataset.directory}"
+        return f"records for at most {config.sim.max_trial_s:g} s into {self._directory}"
 
     def _end(self) -> str:
         if self._simulation.records:
@@ -55,7 +59,7 @@ class RecordService:
 
     def _write(self) -> None:
         recorded = self._simulation.end_recording()
-        if recorded is None:
+        if recorded is None or self._dataset is None:
             self._told = RequestError("RESULT_INCORRECT_STATE", "nothing has moved, so nothing was written")
             return
         try:
@@ -65,4 +69,4 @@ class RecordService:
             self._node.get_logger().error(f"a recording is lost: {error}")
             return
         self._told = f"trial {number}: {result.outcome.value}{f', {result.reason}' if result.reason else ''}"
-        self._node.get_logger().info(f"recorded into {self._dataset.directory}: {self._told}")
+        self._node.get_logger().info(f"recorded into {self._directory}: {self._told}")

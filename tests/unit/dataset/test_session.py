@@ -1,0 +1,107 @@
+"""Datasets that grow by what clients of a session do."""
+
+import subprocess
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.commands import command
+
+import throwcollect
+from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
+from throwcollect.dataset.session import SessionDataset
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.talos import TALOS
+from throwcollect.simulator import Simulator
+
+CONFIG = Config()
+
+
+@pytest.fixture(scope="module")
+def recorded() -> tuple[EpisodeHeader, Samples]:
+    """A throw, as a session hands it over."""
+    with Simulator(CONFIG) as simulator:
+        episode = simulator.throw({}).read_episode()
+    samples = episode.samples(TALOS.joints)
+    moved = samples.position[:, [TALOS.joints.index(joint) for joint in CONFIG.moving_joints]]
+    command = np.stack([np.vstack([moved[1:], moved[-1:]])] * 2, axis=1)
+    return episode.header, replace(samples, command=command)
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[SessionDataset]:
+    dataset = SessionDataset(tmp_path / "recorded", CONFIG, name="sim_0")
+    yield dataset
+    dataset.close()
+
+
+def test_sessions_append_to_a_dataset_that_is_finished_after_each_episode(
+    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples]
+) -> None:
+    number, result = session.append(*recorded)
+    assert (number, result.outcome.value, verify(session.directory)) == (0, "landed", [])
+    with pytest.raises(DatasetError, match="another process collects into it"):
+        SessionDataset(session.directory, CONFIG, name="sim_1")
+    session.close()
+    later = SessionDataset(session.directory, CONFIG, name="sim_1")
+    assert later.append(*recorded)[0] == 1
+    later.close()
+    assert verify(session.directory) == []
+    dataset = throwcollect.load(session.directory)
+    first, second = dataset.throw(0), dataset.throw(1)
+    assert first["landing_x_m"] == second["landing_x_m"]
+    assert first["digest"] != second["digest"]
+    card = (session.directory / "README.md").read_text()
+    assert "no trial can be simulated again" in card
+    assert "clients of sim_1" in card
+    assert "collecting with it again" not in card
+
+
+def test_directories_of_other_contents_are_refused(session: SessionDataset, tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "notes.txt").touch()
+    with pytest.raises(ConfigError, match=r"holds notes\.txt"):
+        SessionDataset(tmp_path / "taken", CONFIG, name="sim_0")
+
+
+def test_sessions_of_other_configurations_are_refused(
+    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples]
+) -> None:
+    session.append(*recorded)
+    session.close()
+    with pytest.raises(ConfigError, match="was not recorded in a session of this configuration"):
+        SessionDataset(session.directory, with_values(CONFIG, {"ball.mass_kg": 0.1}), name="sim_0")
+
+
+@pytest.mark.parametrize("step", ["append", "finish"])
+def test_episode_after_one_that_cannot_be_written_takes_its_place(
+    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples], monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    session.append(*recorded)
+    with monkeypatch.context() as patch:
+
+        def fail(*_: object, **__: object) -> None:
+            raise DatasetError("no space left on device")
+
+        patch.setattr(DatasetWriter, step, fail)
+        with pytest.raises(DatasetError, match="no space"):
+            session.append(*recorded)
+    assert session.append(*recorded)[0] == 1
+    assert verify(session.directory) == []
+
+
+def test_commands_say_that_nothing_can_be_simulated_again(
+    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples]
+) -> None:
+    session.append(*recorded)
+    session.close()
+    for words, code in (("dataset verify", 0), ("dataset replay --all", 2), ("resume", 4)):
+        done = subprocess.run(command(*words.split(), session.directory), capture_output=True, text=True, check=False)
+        assert done.returncode == code
+        assert "can be simulated again" in (done.stdout + done.stderr).replace("cannot", "can")
