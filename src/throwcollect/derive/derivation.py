@@ -99,7 +99,7 @@ def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
     )
     _check_copies(copies, plan)
     channels = _read_channels(sources)
-    create(directory, plan, listed=plan.trials.points)
+    create(directory, plan, listed=plan.trials.points if plan.config.sweep.file else None)
     carry_robot(sources[0].config, directory)
     table = ThrowsTable.of(plan)
     tables, recordings = [], []

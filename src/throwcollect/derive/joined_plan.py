@@ -34,10 +34,13 @@ def join_plans(plans: Sequence[Plan]) -> tuple[Plan, list[int]]:
         different += [plan] if place == len(different) else []
         places.append(place)
     firsts = np.cumsum([0, *(len(plan.trials) for plan in different)]).tolist()
-    sweep = SweepConfig(sampler="list", file=TRIALS, target=plans[0].config.sweep.target)
+    trials, sweep = _join_trials(different), SweepConfig()
+    # Trials of sessions have no values.
+    if trials.points.names:
+        sweep = SweepConfig(sampler="list", file=TRIALS, target=plans[0].config.sweep.target)
     config = plans[0].config.without_run().model_copy(update={"sweep": sweep, "trials": None, "until": None})
     parts = tuple(part for plan in different for part in plan.parts)
-    joined = Plan(config, _join_trials(different), joined=parts if len(parts) > 1 else ())
+    joined = Plan(config, trials, joined=parts if len(parts) > 1 else ())
     return joined, [firsts[place] for place in places]
 
 

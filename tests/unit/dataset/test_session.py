@@ -15,6 +15,7 @@ from throwcollect.config.values import with_values
 from throwcollect.dataset.session import SessionDataset
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.derive.derivation import merge
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.talos import TALOS
@@ -105,3 +106,15 @@ def test_commands_say_that_nothing_can_be_simulated_again(
         done = subprocess.run(command(*words.split(), session.directory), capture_output=True, text=True, check=False)
         assert done.returncode == code
         assert "can be simulated again" in (done.stdout + done.stderr).replace("cannot", "can")
+
+
+def test_datasets_of_two_sessions_can_be_merged(
+    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples], tmp_path: Path
+) -> None:
+    other = SessionDataset(tmp_path / "other", CONFIG, name="sim_1")
+    for dataset in (session, other):
+        dataset.append(*recorded)
+        dataset.close()
+    merged = tmp_path / "merged"
+    assert merge([session.directory, other.directory], merged).trials == 2
+    assert verify(merged) == []
