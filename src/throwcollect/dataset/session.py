@@ -35,7 +35,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import remove, unwritable
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, make_trials
@@ -50,10 +50,6 @@ class SessionDataset:
         directory: New, empty, or a dataset that an earlier session of the same configuration has recorded.
         config: Configuration of the session.
         name: Name of the simulation, for the provenance.
-
-    Raises:
-        ConfigError: If the directory holds something else, or nothing can be recorded with this configuration.
-        DatasetError: If the directory cannot be used, or another process uses it.
     """
 
     def __init__(self, directory: Path, config: Config, *, name: str) -> None:
@@ -79,14 +75,7 @@ class SessionDataset:
             self.close = held.pop_all().close
 
     def append(self, header: EpisodeHeader, samples: Samples) -> tuple[int, Result]:
-        """Write a recording as the next trial, whose number and result are returned.
-
-        If it fails, the next recording takes the place of this one.
-
-        Raises:
-            ConfigError: If the dataset has as many files as a dataset can have.
-            DatasetError: If it cannot be written.
-        """
+        """Write a recording as the next trial, whose number and result are returned; if this fails, the next one is."""
         throws, recordings = self._read()
         number = len(recordings)
         refuse_many_files(self._config, number + 1)
@@ -94,11 +83,17 @@ class SessionDataset:
         episode = self._encode(number, header, samples)
         result = judge_episode(self._config, episode)
         remove_unfinished(self.directory)
-        remove(path_of_part(self.directory / shard_name(self._config.name, number)))
+        part = path_of_part(self.directory / shard_name(self._config.name, number))
+        remove(part)
         with closing(DatasetWriter(self.directory, plan, channels=self._channels)) as writer:
             for earlier, recording in enumerate(recordings):
                 writer.take_shard(earlier, recording, throws.slice(earlier, 1))
-            writer.append(episode, result)
+            try:
+                writer.append(episode, result)
+            except DatasetError:
+                # On a full disk, nothing else may free the room that it takes.
+                remove(part)
+                raise
             plan.write(self.directory / PLAN)
             made = Provenance.of_this_machine(simulations=1, wall_s=None, was_open=False, robot=self._channels.robot)
             writer.finish(provenance=replace(made, session=self._name))

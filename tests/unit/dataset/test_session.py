@@ -13,6 +13,7 @@ import throwcollect
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.dataset.session import SessionDataset
+from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.derivation import merge
@@ -80,9 +81,9 @@ def test_sessions_of_other_configurations_are_refused(
         SessionDataset(session.directory, with_values(CONFIG, {"ball.mass_kg": 0.1}), name="sim_0")
 
 
-@pytest.mark.parametrize("step", ["append", "finish"])
+@pytest.mark.parametrize("writes", [OpenShard, DatasetWriter])
 def test_episode_after_one_that_cannot_be_written_takes_its_place(
-    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples], monkeypatch: pytest.MonkeyPatch, step: str
+    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples], monkeypatch: pytest.MonkeyPatch, writes: type
 ) -> None:
     session.append(*recorded)
     with monkeypatch.context() as patch:
@@ -90,9 +91,11 @@ def test_episode_after_one_that_cannot_be_written_takes_its_place(
         def fail(*_: object, **__: object) -> None:
             raise DatasetError("no space left on device")
 
-        patch.setattr(DatasetWriter, step, fail)
+        patch.setattr(writes, "finish", fail)
         with pytest.raises(DatasetError, match="no space"):
             session.append(*recorded)
+    if writes is OpenShard:
+        assert verify(session.directory) == []
     assert session.append(*recorded)[0] == 1
     assert verify(session.directory) == []
 
