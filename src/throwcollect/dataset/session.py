@@ -18,7 +18,7 @@ from throwcollect.config.policy import SESSION, PolicyConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import SweepConfig
 from throwcollect.config.values import with_values
-from throwcollect.dataset.carried_robot import config_text
+from throwcollect.dataset.carried_robot import carry_robot, config_text
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import refuse_many_files, refuse_taken
 from throwcollect.dataset.directory import CONFIG, MANIFEST, PLAN, THROWS, path_of_part, shard_name
@@ -65,7 +65,7 @@ class SessionDataset:
                 refuse_taken(directory)
             # Trials of other sessions have other seeds, so that they have other digests, and datasets can be merged.
             self._config = _as_recorded(config, read_config(directory).seed if begun else secrets.randbits(32))
-            if begun and (directory / CONFIG).read_text(encoding="utf-8") != config_text(self._config):
+            if begun and (directory / CONFIG).read_text(encoding="utf-8") != config_text(self._config.without_run()):
                 raise ConfigError(
                     f"{directory}: was not recorded in a session of this configuration", expected="another directory"
                 )
@@ -94,6 +94,7 @@ class SessionDataset:
                 # On a full disk, nothing else may free the room that it takes.
                 remove(part)
                 raise
+            carry_robot(self._config, self.directory)
             plan.write(self.directory / PLAN)
             made = Provenance.of_this_machine(simulations=1, wall_s=None, was_open=False, robot=self._channels.robot)
             writer.finish(provenance=replace(made, session=self._name))
@@ -127,7 +128,5 @@ class SessionDataset:
 def _as_recorded(config: Config, seed: int) -> Config:
     """Make the configuration of the dataset of a session."""
     policy = PolicyConfig(use=SESSION, rate_hz=config.record.rate_hz, reproducible=False)
-    plain = config.without_run().model_copy(
-        update={"seed": seed, "sweep": SweepConfig(), "trials": None, "until": None}
-    )
+    plain = config.model_copy(update={"seed": seed, "sweep": SweepConfig(), "trials": None, "until": None})
     return with_values(plain, {"task.policy": policy, "record.trials_per_shard": 1})

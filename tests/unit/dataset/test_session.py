@@ -10,6 +10,7 @@ import pytest
 from tests.commands import command
 
 import throwcollect
+from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.dataset.session import SessionDataset
@@ -19,19 +20,25 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.derivation import merge
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.robots.talos import TALOS
+from throwcollect.robots.description import robot_of
 from throwcollect.simulator import Simulator
 
 CONFIG = Config()
+CONFIGS = Path(__file__).parents[3] / "configs"
 
 
 @pytest.fixture(scope="module")
 def recorded() -> tuple[EpisodeHeader, Samples]:
-    """A throw, as a session hands it over."""
-    with Simulator(CONFIG) as simulator:
+    return record(CONFIG)
+
+
+def record(config: Config) -> tuple[EpisodeHeader, Samples]:
+    """Simulate a throw, as a session hands it over."""
+    with Simulator(config) as simulator:
         episode = simulator.throw({}).read_episode()
-    samples = episode.samples(TALOS.joints)
-    moved = samples.position[:, [TALOS.joints.index(joint) for joint in CONFIG.moving_joints]]
+    joints = robot_of(config).joints
+    samples = episode.samples(joints)
+    moved = samples.position[:, [joints.index(joint) for joint in config.moving_joints]]
     command = np.stack([np.vstack([moved[1:], moved[-1:]])] * 2, axis=1)
     return episode.header, replace(samples, command=command)
 
@@ -121,3 +128,13 @@ def test_datasets_of_two_sessions_can_be_merged(
     merged = tmp_path / "merged"
     assert merge([session.directory, other.directory], merged).trials == 2
     assert verify(merged) == []
+
+
+def test_dataset_carries_the_files_of_its_robot(tmp_path: Path) -> None:
+    config = load(CONFIGS / "ur5.yaml")
+    recording = record(config)
+    for number in range(2):
+        dataset = SessionDataset(tmp_path / "recorded", config, name="sim_0")
+        assert dataset.append(*recording)[0] == number
+        dataset.close()
+    assert verify(tmp_path / "recorded") == []
