@@ -71,6 +71,8 @@ def test_the_scene_has_the_bodies_of_scene_and_task(client: TestClient, remember
         "rpy_rad": [0.0, 0.5, 0.0],
         "color": "#8a6f4d",
         "moves": False,
+        "mesh": "",
+        "within": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
     }
     assert all(len(corner) == 2 for outline in outlines.values() for corner in outline)
 
