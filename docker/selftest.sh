@@ -16,15 +16,16 @@ from throwcollect.ros.middleware import uses_rclpy
 
 EXTRAS = {
     *("docker", "plotly", "jinja2", "markupsafe", "h5py"),
-    *("fastapi", "starlette", "uvicorn", "websockets", "orjson", "cbor2"),
+    *("fastapi", "starlette", "uvicorn", "websockets", "orjson", "cbor2", "gymnasium"),
 }
 modules = [module for root in (rclzenoh, throwcollect) for module in pkgutil.walk_packages(root.__path__, f"{root.__name__}.")]
 for module in modules:
     if not module.name.endswith("__main__") and (uses_rclpy() or module.name != "throwcollect.ros.genuine"):
         try:
             importlib.import_module(module.name)
-        except ModuleNotFoundError as missing:
-            if (missing.name or "").partition(".")[0] not in EXTRAS:
+        except ImportError as error:
+            missing = error.__cause__ or error
+            if (getattr(missing, "name", "") or "").partition(".")[0] not in EXTRAS:
                 raise
 PYTHON
 throwcollect --help > help
