@@ -24,7 +24,9 @@ def test_images_are_labelled_with_version_commit_and_digest_of_the_sources() -> 
     assert values["VERSION"] == __version__
     assert values["SOURCES"] == digest_sources()
     # Both builders reject an argument that their file does not declare.
-    assert set(re.findall(r"^ARG (\w+)", DOCKERFILE, re.MULTILINE)) - {"BASE_IMAGE", "ROS_IMAGE", "SELFTEST"} == set(values)
+    assert set(re.findall(r"^ARG (\w+)", DOCKERFILE, re.MULTILINE)) - {"BASE_IMAGE", "ROS_IMAGE", "SELFTEST"} == set(
+        values
+    )
     declared = DEFINITION.partition("%arguments")[2].partition("%files")[0]
     assert set(re.findall(r"(\w+)=", declared)) - {"BASE_IMAGE", "BOOTSTRAP"} == set(values)
 

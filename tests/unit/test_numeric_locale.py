@@ -33,7 +33,7 @@ def test_the_renderer_draws_the_same_robot_with_a_decimal_comma(use_decimal_comm
     urdf = (Path(__file__).parents[1] / "plugins" / "planar_arm" / "planar_arm.urdf").read_text(encoding="utf-8")
 
     def load() -> list[Vector]:
-        with Renderer(urdf, 1.0, 0.025, (1.0, 0.5, 0.0, 1.0)) as renderer:
+        with Renderer(urdf, 1.0) as renderer:
             return renderer.find_frames()
 
     usual = load()

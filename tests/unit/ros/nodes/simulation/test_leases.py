@@ -22,7 +22,7 @@ class Runner:
         self.dropped = 0
         self.yields: Any = None
 
-    def begin(self, trial: int, _values: Mapping[str, float]) -> None:
+    def begin(self, trial: int, _values: Mapping[str, float], **_further: object) -> None:
         if trial == BAD.trial:
             raise ThrowcollectError("out of reach")
         self.begun.append(trial)
