@@ -20,7 +20,8 @@ export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: up ros dist test test-fast \
     test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client test-lerobot wait-for-image wait-for-cluster \
-    test-containers test-containers-of-commands test-containers-of-runs test-image test-processes test-cluster image sif sif-without-engine \
+    test-containers test-containers-of-commands test-containers-of-runs test-containers-of-ros test-image test-processes test-cluster image sif \
+    sif-without-engine \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
@@ -89,7 +90,7 @@ test-fast: $(READY_DEV)
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 6 test-containers test-processes test-units test-ros test-image test-cluster
+	$(MAKE) $(BESIDE) -j 5 test-ros test-containers test-processes test-units test-image test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -137,10 +138,13 @@ test-ros: ros
 # Three groups that take about as long, as tests of containers wait more than they compute; each looks at its own runs alone.
 OF_RUNS := $(addprefix tests/docker/,test_component.py test_package_in_image.py test_runtime.py)
 OF_IMAGE := $(addprefix tests/docker/,test_compose.py test_image.py)
-test-containers: test-containers-of-commands test-containers-of-runs
+test-containers: test-containers-of-commands test-containers-of-runs test-containers-of-ros
 
-test-containers-of-commands: ros wait-for-image
+test-containers-of-commands: wait-for-image
 	$(BIN)/python -m pytest tests/docker $(addprefix --ignore=,$(OF_RUNS) $(OF_IMAGE))
+
+# After the other tests of genuine ROS 2, whose nodes find each other late where many groups run at once.
+test-containers-of-ros: test-ros wait-for-image
 	$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE)
 
 test-containers-of-runs: wait-for-image
