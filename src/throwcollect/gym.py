@@ -236,7 +236,7 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
         """Compute how far from the target the object would land if it flew freely from now on [m]."""
         x, y, z, *_, vx, vy, vz, _, _, _ = self._loop.object.tolist()
         height = max(0.0, z - self._plane_m)
-        time_s = (vz + math.sqrt(vz * vz + 2 * self._gravity * height)) / self._gravity if self._gravity else 0.0
+        time_s = (vz + math.sqrt(vz * vz + 2 * self._gravity * height)) / self._gravity
         goal_x, goal_y = (self._target[name] for name in _PLACE)
         return math.hypot(x + vx * time_s - goal_x, y + vy * time_s - goal_y)
 
@@ -248,12 +248,10 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
         success = result["outcome"] == self.config.task.success
         if self._aims:
             # A trial has both or none.
-            ends = (result.get(self._ends[name]) for name in _PLACE)
-            away = [
-                math.nan if end is None else end - self._target[name] for name, end in zip(_PLACE, ends, strict=True)
-            ]
-            result["miss_m"] = math.hypot(*away)
-            success = success and result["miss_m"] <= self._hit_m
+            x, y = (result.get(self._ends[name]) for name in _PLACE)
+            if x is not None and y is not None:
+                result["miss_m"] = math.hypot(x - self._target[_PLACE[0]], y - self._target[_PLACE[1]])
+            success = success and result.get("miss_m", math.inf) <= self._hit_m
         return {name: value for name, value in result.items() if value is not None} | {"is_success": success}
 
 

@@ -20,7 +20,7 @@ class RecordService:
         self._node, self._simulation = node, simulation
         self._directory = directory
         self._dataset: SessionDataset | None = None
-        self._told: str | ThrowcollectError | None = None
+        self._ended_as: str | ThrowcollectError | None = None
         """What the client that ends the last recording gets: that it is written, or why it is not."""
         node.create_service(SetBool, "record", self._answer)
 
@@ -42,31 +42,31 @@ class RecordService:
         # The directory is made, and kept from others, once it is needed.
         self._dataset = self._dataset or SessionDataset(self._directory, config, name=self._node.get_name())
         self._simulation.begin_recording()
-        self._told = None
+        self._ended_as = None
         return f"records for at most {config.sim.max_trial_s:g} s into {self._directory}"
 
     def _end(self) -> str:
         if self._simulation.records:
             self._write()
-        told, self._told = self._told, None
-        if told is None:
+        ended, self._ended_as = self._ended_as, None
+        if ended is None:
             raise RequestError(
                 "RESULT_INCORRECT_STATE", "nothing is recorded: no recording was begun, or a reset ended it"
             )
-        if isinstance(told, ThrowcollectError):
-            raise told
-        return told
+        if isinstance(ended, ThrowcollectError):
+            raise ended
+        return ended
 
     def _write(self) -> None:
         recorded = self._simulation.end_recording()
         if recorded is None or self._dataset is None:
-            self._told = RequestError("RESULT_INCORRECT_STATE", "nothing has moved, so nothing was written")
+            self._ended_as = RequestError("RESULT_INCORRECT_STATE", "nothing has moved, so nothing was written")
             return
         try:
             number, result = self._dataset.append(*recorded)
         except ThrowcollectError as error:
-            self._told = error
+            self._ended_as = error
             self._node.get_logger().error(f"a recording is lost: {error}")
             return
-        self._told = f"trial {number}: {result.outcome.value}{f', {result.reason}' if result.reason else ''}"
-        self._node.get_logger().info(f"recorded into {self._directory}: {self._told}")
+        self._ended_as = f"trial {number}: {result.outcome.value}{f', {result.reason}' if result.reason else ''}"
+        self._node.get_logger().info(f"recorded into {self._directory}: {self._ended_as}")
