@@ -12,7 +12,6 @@ import json
 import os
 import re
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -81,48 +80,6 @@ def size_of_file(path: Path) -> int:
             return os.fstat(file.fileno()).st_size
     except OSError as error:
         raise unreadable(path, error) from error
-
-
-class RunningHash:
-    """SHA-256 of a file while it is written, computed in a thread of its own, so that the writer need not wait."""
-
-    def __init__(self) -> None:
-        self._hash = hashlib.sha256()
-        self._held: list[bytes] = []
-        self._held_bytes = 0
-        self._pool: ThreadPoolExecutor | None = None
-        self._running: Future[None] | None = None
-
-    def update(self, data: bytes) -> None:
-        """Take in the next bytes of the file."""
-        self._held.append(data)
-        self._held_bytes += len(data)
-        # Handing over to a thread takes some 20 µs, so it is done with the bytes of many episodes at once.
-        if self._held_bytes >= _BLOCK:
-            self._hand_over()
-
-    def hexdigest(self) -> str:
-        """Return the hash of everything, in hexadecimal."""
-        if self._running is not None:
-            self._running.result()
-        self._add(self._held)
-        self._held = []
-        if self._pool is not None:
-            self._pool.shutdown()
-        return self._hash.hexdigest()
-
-    def _hand_over(self) -> None:
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(1)
-        # Blocks are hashed in order; while one is hashed, at most one other is held in memory.
-        if self._running is not None:
-            self._running.result()
-        self._running = self._pool.submit(self._add, self._held)
-        self._held, self._held_bytes = [], 0
-
-    def _add(self, parts: Iterable[bytes]) -> None:
-        for part in parts:
-            self._hash.update(part)
 
 
 def list_promised_names(directory: Path) -> list[str]:

@@ -7,6 +7,7 @@ file ``<name>_00000.mcap``, and the other vanishes.
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import path_of_part
-from throwcollect.dataset.manifest import FileEntry, RunningHash
+from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.mcap_file import McapFile, RecordGroup, episode_run
 from throwcollect.dataset.mcap_reader import McapContents
 from throwcollect.dataset.throws_table import Row
@@ -46,7 +47,7 @@ def write_runs(
     write: Callable[[bytes], None], channels: Channels, runs: Iterable[tuple[int, RecordGroup]], *, name: str
 ) -> FinishedShard:
     """Write the finished file of some episodes, at least one, each with its trial; it depends on nothing but them."""
-    sha256, file, offsets = RunningHash(), None, {}
+    sha256, file, offsets = hashlib.sha256(), None, {}
 
     def put(data: bytes) -> None:
         write(data)
@@ -113,7 +114,7 @@ class OpenShard:
 
     def adopt(self, runs: Mapping[int, RecordGroup]) -> None:
         """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off."""
-        size = max(run.offset + run.length for run in runs.values())
+        size = max(run.end for run in runs.values())
         try:
             self._descriptor = open_regular(self.part, os.O_RDWR)
             self._cut(self._descriptor, size)

@@ -111,8 +111,8 @@ def flip_latched(path: Path) -> None:
 
 
 def flip_index(path: Path) -> None:
-    """Flip a bit in the message index of an episode, whose samples stay whole."""
-    flip(path, find_stored(path, 3).chunk.end + 100)
+    """Flip a bit in the message index of an episode, which is no longer whole then."""
+    flip(path, (run := find_stored(path, 3).run).offset + run.chunk_index.chunk_length + 100)
 
 
 def swap(path: Path) -> None:
@@ -137,7 +137,7 @@ DAMAGE = [
     (SHARD, flip_bit, {0, 1, 2}),
     (SHARD, flip_latched, ALL),
     (SHARD, flip_end, ALL),
-    (SHARD, flip_index, ALL),
+    (SHARD, flip_index, {0, 1, 2}),
     (SHARD, swap, set()),
     (SHARD, rename_to_part, ALL),
     ("README.md", delete, ALL),
