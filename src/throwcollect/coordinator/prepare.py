@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -42,8 +41,6 @@ _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
 _DEEPEST_SOLE_M = 0.01
 """A robot that stands deeper in the ground is misplaced; less can come from the shape of its sole."""
-_LEAST_BYTES = 40
-"""Bytes that each trial takes in the file of a plan: its digest and its seed, which nothing compresses."""
 
 
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: Onlooker = SILENT) -> Plan:
@@ -59,14 +56,10 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
             that calls this, as processes of `multiprocessing` do.
         onlooker: Is told how many trials of a large plan have been checked, and warned of a robot that is misplaced.
     """
-    points = _draw_points(config, directory, onlooker)
-    return _check_trials(config, points, processes=processes, onlooker=onlooker)
-
-
-def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
     if (count := config.trials or 0) >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: draws {count} trials")
-    return draw_points(config, directory=directory)
+    points = draw_points(config, directory=directory)
+    return _check_trials(config, points, processes=processes, onlooker=onlooker)
 
 
 def count_first(config: Config, trials: int) -> int:
@@ -189,19 +182,6 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
 
 
-def check_room(directory: Path, trials: int) -> None:
-    """Refuse, before trials are checked for hours, a plan that is certainly too large for the disk."""
-    # The directory need not exist yet, so ask about the disk of the nearest directory above it that does.
-    parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
-    least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
-    if free < least:
-        sizes = f"takes {least / 1e3:.0f} kB or more, and {free / 1e3:.0f} kB are free"
-        raise ConfigError(
-            f"{directory}: a plan of {trials} trials {sizes}",
-            hint="free space on that disk, or choose another one with --output",
-        )
-
-
 def prepare(
     config: Config,
     directory: Path,
@@ -217,11 +197,8 @@ def prepare(
     """
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
-    check_room(directory, config.trials or 0)
     onlooker.update_plan(0, config.trials or 0)
-    points = _draw_points(config, sweep_directory, onlooker)
-    check_room(directory, len(points.values))
-    plan = _check_trials(config, points, processes=processes, onlooker=onlooker)
+    plan = draw_plan(config, directory=sweep_directory, processes=processes, onlooker=onlooker)
     # This comes after the plan is drawn, because the configuration as it was given names the place of its list.
     plan = replace(plan, config=make_self_contained(config))
     try:

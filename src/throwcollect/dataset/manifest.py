@@ -30,7 +30,6 @@ from throwcollect.dataset.directory import (
     THROWS,
     TRIALS,
 )
-from throwcollect.dataset.findings import Finding
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, read_text, unreadable
 from throwcollect.sweep.digest import is_digest
@@ -53,6 +52,26 @@ class FileEntry:
     path: str
     bytes: int
     sha256: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong with a file in the dataset's directory.
+
+    Its place there is a trial, a byte or a field; it is empty if the problem is with the file as a whole.
+    """
+
+    file: str
+    place: str
+    problem: str
+
+    @classmethod
+    def of(cls, file: str, error: DatasetError) -> Finding:
+        """Make a finding of an error in the file of this name in the dataset's directory."""
+        return cls(file, error.place, error.details)
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.file, self.place, self.problem) if part)
 
 
 def entry_of(path: str, data: bytes) -> FileEntry:
@@ -130,15 +149,6 @@ def is_begun(directory: Path) -> bool:
         return True
     try:
         return (directory / CONFIG).is_file() and ((directory / JOURNAL).is_file() or bool(read_manifest(directory)))
-    except DatasetError:
-        return False
-
-
-def was_changed(directory: Path, name: str) -> bool:
-    """Whether there is a manifest, and a file of the dataset is not as the manifest says."""
-    try:
-        entries = [entry for entry in read_manifest(directory) if entry.path == name]
-        return any(entry != entry_of_file(directory / name, name) for entry in entries)
     except DatasetError:
         return False
 

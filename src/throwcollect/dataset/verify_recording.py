@@ -15,8 +15,8 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.manifest import Finding
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import McapContents, WholeEpisode, open_mcap, scan
 from throwcollect.dataset.shard import rewrite

@@ -25,8 +25,7 @@ from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import Judge, find_left, recover_shard, remove_unfinished
-from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
-from throwcollect.dataset.shard_layout import ShardLayout
+from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording, ShardLayout
 from throwcollect.dataset.summary_files import write_description
 from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, place_columns
 from throwcollect.episode.channels import Channels

@@ -230,25 +230,10 @@ def test_opening_a_dataset_names_the_damaged_file_and_the_remedy(
     assert caught.value.hint == f"throwcollect resume {dataset}"
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "problem"),
-    [
-        ("outcome", None, "outcome is None in some row"),
-        ("outcome", "flown", "outcome is 'flown' in some row"),
-        ("shard", "../quick_00001.mcap", r"shard is '\.\./quick_00001\.mcap' in some row"),
-        ("shard", "quick\0.mcap", r"shard is 'quick\\x00\.mcap' in some row"),
-        ("shard", None, "only a part of the place"),
-        ("chunk_offset", None, "only a part of the place"),
-        ("digest", None, "only a part of the place"),
-        ("samples", None, "only a part of the place"),
-        ("samples", -1, "without samples"),
-    ],
-)
-def test_a_table_of_throws_with_impossible_values_is_refused(
-    dataset: Path, column: str, value: object, problem: str
-) -> None:
-    change_table(dataset / "throws.parquet", column, 4, value)
-    with pytest.raises(DatasetError, match=rf"throws\.parquet: .*{problem}") as caught:
+@pytest.mark.parametrize("shard", ["../quick_00001.mcap", "quick\0.mcap"])
+def test_a_table_of_throws_cannot_name_other_files(dataset: Path, shard: str) -> None:
+    change_table(dataset / "throws.parquet", "shard", 4, shard)
+    with pytest.raises(DatasetError, match=r"throws\.parquet: shard is '.*' in some row") as caught:
         Dataset.open(dataset)
     assert caught.value.hint == f"throwcollect resume {dataset}"
 
