@@ -280,7 +280,7 @@ class Throw:
                 with open_mcap(self._episode.path) as contents:
                     return self._episode.start_ns, self._episode.read_rows(contents, joints)
             episode = self.read_episode()
-            return episode.header.start_ns, episode.rows(joints)
+            return episode.header.start_ns, episode.table.rows(joints)
 
     def _read(self, fields: Iterable[str]) -> list[NDArray[Any]]:
         """Copy times, stamps, and some fields of the samples."""
