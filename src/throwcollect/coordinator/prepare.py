@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from throwcollect.config.key import key_of_field
-from throwcollect.config.robot_config import DescribedRobotConfig, RobotConfig
+from throwcollect.config.robot_config import RobotConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
@@ -35,12 +35,8 @@ _TRIALS_A_PIECE = 100
 _MOST_PIECES = 10_000
 """Most pieces of a plan: handing over many more takes a minute, in which no trial is checked and Ctrl-C does
 nothing."""
-_ANNOUNCED_TRIALS = 20_000
-"""From this number of trials on, the user is told at once what happens, as it takes seconds to check the first ones."""
 _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
-_DEEPEST_SOLE_M = 0.01
-"""A robot that stands deeper in the ground is misplaced; less can come from the shape of its sole."""
 
 
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: Onlooker = SILENT) -> Plan:
@@ -54,10 +50,8 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
         directory: Where a relative `sweep.file` is looked for: the directory of the configuration's file.
         processes: How many processes may check the trials of a large plan. If more than one, they import the program
             that calls this, as processes of `multiprocessing` do.
-        onlooker: Is told how many trials of a large plan have been checked, and warned of a robot that is misplaced.
+        onlooker: Is told how many trials of a large plan have been checked, and warned of limits that may be wrong.
     """
-    if (count := config.trials or 0) >= _ANNOUNCED_TRIALS:
-        onlooker.say(f"plan: draws {count} trials")
     points = draw_points(config, directory=directory)
     return _check_trials(config, points, processes=processes, onlooker=onlooker)
 
@@ -69,8 +63,6 @@ def count_first(config: Config, trials: int) -> int:
 
 def _check_trials(config: Config, points: Points, *, processes: int, onlooker: Onlooker) -> Plan:
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
-    if sentence := find_sunken_robot(config):
-        onlooker.warn(sentence)
     for sentence in find_placeholders(robot_of(config)):
         onlooker.warn(f"warning: {sentence}")
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
@@ -80,8 +72,6 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     refuse_many_files(config, len(points.values))
     count = count_first(config, len(points.values))
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
-    if count >= _ANNOUNCED_TRIALS:
-        onlooker.say(f"plan: checks {count} trials")
     # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
     pieces = [points[first:stop] for first, stop in pairwise([*firsts, count])]
@@ -101,23 +91,6 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
         check_some_left(reasons)
     refused = {number: reason for number, reason in enumerate(reasons) if reason is not None}
     return Plan(config, replace(make_trials(config, points), refused=refused))
-
-
-def find_sunken_robot(config: Config) -> str | None:
-    """Say by how much a robot stands in the ground at the start, if its base is not where it is by default.
-
-    Such trials are not refused: the robot's base is fixed, and the ground stops none of its links.
-    """
-    height_m = config.robot.base_height_m
-    if isinstance(config.robot, DescribedRobotConfig) or height_m == RobotConfig().base_height_m:
-        return None
-    link, below_m = Feasibility(config).find_lowest(config)
-    if height_m + below_m > -_DEEPEST_SOLE_M:
-        return None
-    return (
-        f"warning: robot.base_height_m: {height_m:g}: {link} is {-below_m - height_m:.2f} m below the ground at the "
-        f"start; the robot stands on it at {-below_m:.3f}"
-    )
 
 
 def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:

@@ -99,21 +99,6 @@ class Clearance:
                 )
         return None
 
-    def find_lowest(self, configuration: NDArray[np.float64]) -> tuple[str, float]:
-        """Find the lowest link of a posture by boxes around its shapes: its name, and its height above the base [m].
-
-        The posture is in the order of the model [rad], shape ``(n_joints,)``.
-        """
-        pinocchio.updateGeometryPlacements(self._model, self._data, self.geometry, self._distances, configuration)
-        heights = []
-        for shape, placement in zip(self.geometry.geometryObjects, self._distances.oMg, strict=True):
-            shape.geometry.computeLocalAABB()
-            box, upright = shape.geometry.aabb_local, placement.rotation[2]
-            half = (np.array(box.max_) - np.array(box.min_)) / 2
-            heights.append(float(placement.translation[2] + (upright * box.center() - np.abs(upright) * half).sum()))
-        lowest = int(np.argmin(heights))
-        return self._links[lowest], heights[lowest]
-
     def _add_tool(self, tool: Tool) -> None:
         frame = self._model.getFrameId(self._robot.hand, pinocchio.BODY)
         hand = self._model.frames[frame]

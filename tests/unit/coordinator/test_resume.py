@@ -13,8 +13,7 @@ from tests.unit.dataset.kills import KilledAt
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
-from throwcollect.coordinator.resume import has_all_trials, prepare_or_resume, resume
-from throwcollect.dataset.manifest import entry_of_file, is_begun, manifest_text
+from throwcollect.coordinator.resume import prepare_or_resume, resume
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError, PlanError
 
@@ -51,12 +50,6 @@ def test_resuming_an_undamaged_dataset_changes_no_file(directory: Path, prepared
     plan = resume(config_with(), directory, sweep_directory=directory)
     assert len(plan.trials) == 4
     assert contents(directory) == prepared
-
-
-def test_resume_accepts_changed_keys_under_run(directory: Path, prepared: dict[str, bytes]) -> None:
-    resume(config_with(run={"simulations": 7}), directory, sweep_directory=directory)
-    assert load(directory / "config.yaml").run.simulations == 7
-    assert contents(directory)["plan.parquet"] == prepared["plan.parquet"]
 
 
 def test_resume_accepts_swept_keys_in_another_order(directory: Path, prepared: dict[str, bytes]) -> None:
@@ -133,18 +126,6 @@ def test_a_dataset_with_damaged_plan_and_configuration_is_refused(directory: Pat
         resume(config_with(), directory, sweep_directory=directory)
 
 
-def test_only_files_that_datasets_alone_have_make_a_directory_a_dataset(directory: Path, tmp_path: Path) -> None:
-    assert is_begun(directory)
-    other = tmp_path / "other"
-    other.mkdir()
-    assert not is_begun(other)
-    (other / "config.yaml").write_bytes((directory / "config.yaml").read_bytes())
-    (other / "datapackage.json").write_text('{"name": "of another program", "resources": []}')
-    assert not is_begun(other)
-    (other / "datapackage.json").write_text(manifest_text("small", [entry_of_file(other / "config.yaml")]))
-    assert is_begun(other)
-
-
 def test_a_collection_of_which_only_recordings_and_journal_are_left_beside_the_configuration_goes_on(
     directory: Path, prepared: dict[str, bytes]
 ) -> None:
@@ -179,16 +160,6 @@ def test_a_kill_at_any_moment_of_planning_leaves_a_dataset_that_can_go_on(listed
         else:
             assert not (directory / "trials.parquet").exists()
     assert call > 10
-
-
-def test_a_dataset_without_metadata_is_not_finished(directory: Path) -> None:
-    assert not has_all_trials(directory, resume(config_with(), directory, sweep_directory=directory))
-
-
-def test_a_finished_dataset_is_unfinished_once_it_gets_more_trials(directory: Path) -> None:
-    (directory / "metadata.yaml").write_text("whole")
-    resume(config_with(trials=5), directory, sweep_directory=directory)
-    assert not (directory / "metadata.yaml").exists()
 
 
 def test_a_growing_plan_can_be_resumed_with_higher_but_not_lower_numbers(tmp_path: Path) -> None:

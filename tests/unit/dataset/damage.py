@@ -15,10 +15,6 @@ from throwcollect.dataset.mcap_reader import McapContents, McapRecord, WholeEpis
 SHARD = "quick_00001.mcap"
 
 
-FIRST = 3
-"""The first trial of `SHARD`."""
-
-
 def find_stored(path: Path, trial: int) -> WholeEpisode:
     offset = pq.read_table(path.parent / "throws.parquet")["chunk_offset"].to_pylist()[trial]
     with open_mcap(path) as contents:

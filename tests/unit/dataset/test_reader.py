@@ -145,12 +145,6 @@ def test_a_dataset_can_be_read_by_many_threads(loaded: Dataset) -> None:
     assert found == expected * 10
 
 
-def test_a_pickled_selection_is_the_same_as_the_original(loaded: Dataset) -> None:
-    copy = pickle.loads(pickle.dumps(loaded.select([2, 5])))  # noqa: S301
-    assert copy.throws.equals(loaded.throws.take([2, 5]))
-    assert last_position(copy, 1) == last_position(loaded, 5)
-
-
 def test_a_pickled_throw_holds_no_samples_and_reads_them_again(loaded: Dataset) -> None:
     throw = loaded[5]
     position = throw.ball.position

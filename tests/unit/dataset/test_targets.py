@@ -165,7 +165,7 @@ def test_a_changed_target_is_found(targeted: Path, tmp_path: Path, forge: Callab
     assert any(each.startswith(finding) for each in found), found
 
 
-@pytest.mark.parametrize("damaged", ["plan.parquet", "trials.parquet", "throws.parquet", "metadata.yaml"])
+@pytest.mark.parametrize("damaged", ["plan.parquet", "trials.parquet"])
 def test_a_mended_dataset_has_the_targets_and_the_list(targeted: Path, tmp_path: Path, damaged: str) -> None:
     directory = Path(shutil.copytree(targeted, tmp_path / "data"))
     (directory / damaged).write_bytes(b"PAR1")

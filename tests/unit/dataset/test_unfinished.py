@@ -94,9 +94,3 @@ def test_a_shard_that_finishes_while_the_dataset_is_loaded_is_included(
         with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 3 of 7 trials"):
             dataset = throwcollect.load(tmp_path / "dataset")
         assert all(len(throw.ball) for throw in dataset)
-
-
-def test_an_unfinished_dataset_without_episodes_has_no_throws(collection: Any, tmp_path: Path) -> None:
-    create(tmp_path / "dataset", collection.plan)
-    with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 0 of 7 trials"):
-        assert len(throwcollect.load(tmp_path / "dataset")) == 0

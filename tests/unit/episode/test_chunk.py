@@ -42,10 +42,6 @@ def targets(make_set_points: Any) -> dict[str, Any]:
     return {name: make_set_points(name, 50) for name in ("arm_right_controller", "torso_controller")}
 
 
-def as_chunk(contents: bytes) -> Chunk:
-    return Chunk.of(contents, zstandard.compress(contents), start_ns=10**10, end_ns=10**10 + 49 * 4_000_000)
-
-
 def messages_of(contents: bytes) -> list[tuple[int, Message]]:
     """Offset and fields of each record, as the mcap library reads them."""
     found, offset = [], 0
