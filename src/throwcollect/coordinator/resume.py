@@ -68,18 +68,7 @@ def resume(
             through.
     """
     with hold_lock(directory):
-        if (directory / SOURCES).exists():
-            raise DatasetError(
-                "was derived from other datasets, so nothing is collected into it",
-                path=directory,
-                hint="derive it again if it is damaged",
-            )
-        if config.task.policy is not None and config.task.policy.use == SESSION:
-            raise DatasetError(
-                "was recorded in a session, so nothing of it can be simulated again",
-                path=directory,
-                hint=f"{command('sim', 'CONFIG', '--record', directory)} records more into it",
-            )
+        _refuse_uncollected(directory, config)
         given = make_self_contained(config)
         stored = _read_stored_config(directory)
         if stored is not None:
@@ -114,6 +103,22 @@ def resume(
         if replanned:
             plan.write(directory / PLAN)
         return plan
+
+
+def _refuse_uncollected(directory: Path, config: Config) -> None:
+    """Refuse a dataset of which no trial was collected."""
+    if (directory / SOURCES).exists():
+        raise DatasetError(
+            "was derived from other datasets, so nothing is collected into it",
+            path=directory,
+            hint="derive it again if it is damaged",
+        )
+    if config.task.policy is not None and config.task.policy.use == SESSION:
+        raise DatasetError(
+            "was recorded in a session, so nothing of it can be simulated again",
+            path=directory,
+            hint=f"{command('sim', 'CONFIG', '--record', directory)} records more into it",
+        )
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
