@@ -142,7 +142,6 @@ HARMLESS = {
     "engines/bullet/scenery.py": {"@"},  # what is compared there
     "engines/mesh.py": {"np.linalg.svd", "@"},  # whether a mesh is flat; whole numbers of cells
     "engines/mujoco/scenery.py": {"@"},  # what is compared there
-    "robots/clear_postures.py": {"np.linalg.norm", "@"},  # bounds, compared with room to spare
     "robots/derived.py": {"np.linalg.norm"},  # what is odd about a robot
     "robots/joint_model.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.manifest import Finding
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem, RequestError, ThrowcollectError
 from throwcollect.extras import MissingExtraError
 

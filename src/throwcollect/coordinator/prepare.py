@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from throwcollect.config.key import key_of_field
-from throwcollect.config.robot_config import DescribedRobotConfig, RobotConfig
+from throwcollect.config.robot_config import RobotConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
@@ -36,14 +35,8 @@ _TRIALS_A_PIECE = 100
 _MOST_PIECES = 10_000
 """Most pieces of a plan: handing over many more takes a minute, in which no trial is checked and Ctrl-C does
 nothing."""
-_ANNOUNCED_TRIALS = 20_000
-"""From this number of trials on, the user is told at once what happens, as it takes seconds to check the first ones."""
 _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
-_DEEPEST_SOLE_M = 0.01
-"""A robot that stands deeper in the ground is misplaced; less can come from the shape of its sole."""
-_LEAST_BYTES = 40
-"""Bytes that each trial takes in the file of a plan: its digest and its seed, which nothing compresses."""
 
 
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: Onlooker = SILENT) -> Plan:
@@ -57,16 +50,10 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
         directory: Where a relative `sweep.file` is looked for: the directory of the configuration's file.
         processes: How many processes may check the trials of a large plan. If more than one, they import the program
             that calls this, as processes of `multiprocessing` do.
-        onlooker: Is told how many trials of a large plan have been checked, and warned of a robot that is misplaced.
+        onlooker: Is told how many trials of a large plan have been checked, and warned of limits that may be wrong.
     """
-    points = _draw_points(config, directory, onlooker)
+    points = draw_points(config, directory=directory)
     return _check_trials(config, points, processes=processes, onlooker=onlooker)
-
-
-def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
-    if (count := config.trials or 0) >= _ANNOUNCED_TRIALS:
-        onlooker.say(f"plan: draws {count} trials")
-    return draw_points(config, directory=directory)
 
 
 def count_first(config: Config, trials: int) -> int:
@@ -76,8 +63,6 @@ def count_first(config: Config, trials: int) -> int:
 
 def _check_trials(config: Config, points: Points, *, processes: int, onlooker: Onlooker) -> Plan:
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
-    if sentence := find_sunken_robot(config):
-        onlooker.warn(sentence)
     for sentence in find_placeholders(robot_of(config)):
         onlooker.warn(f"warning: {sentence}")
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
@@ -87,8 +72,6 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     refuse_many_files(config, len(points.values))
     count = count_first(config, len(points.values))
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
-    if count >= _ANNOUNCED_TRIALS:
-        onlooker.say(f"plan: checks {count} trials")
     # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
     pieces = [points[first:stop] for first, stop in pairwise([*firsts, count])]
@@ -108,23 +91,6 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
         check_some_left(reasons)
     refused = {number: reason for number, reason in enumerate(reasons) if reason is not None}
     return Plan(config, replace(make_trials(config, points), refused=refused))
-
-
-def find_sunken_robot(config: Config) -> str | None:
-    """Say by how much a robot stands in the ground at the start, if its base is not where it is by default.
-
-    Such trials are not refused: the robot's base is fixed, and the ground stops none of its links.
-    """
-    height_m = config.robot.base_height_m
-    if isinstance(config.robot, DescribedRobotConfig) or height_m == RobotConfig().base_height_m:
-        return None
-    link, below_m = Feasibility(config).find_lowest(config)
-    if height_m + below_m > -_DEEPEST_SOLE_M:
-        return None
-    return (
-        f"warning: robot.base_height_m: {height_m:g}: {link} is {-below_m - height_m:.2f} m below the ground at the "
-        f"start; the robot stands on it at {-below_m:.3f}"
-    )
 
 
 def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:
@@ -189,19 +155,6 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
 
 
-def check_room(directory: Path, trials: int) -> None:
-    """Refuse, before trials are checked for hours, a plan that is certainly too large for the disk."""
-    # The directory need not exist yet, so ask about the disk of the nearest directory above it that does.
-    parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
-    least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
-    if free < least:
-        sizes = f"takes {least / 1e3:.0f} kB or more, and {free / 1e3:.0f} kB are free"
-        raise ConfigError(
-            f"{directory}: a plan of {trials} trials {sizes}",
-            hint="free space on that disk, or choose another one with --output",
-        )
-
-
 def prepare(
     config: Config,
     directory: Path,
@@ -217,11 +170,8 @@ def prepare(
     """
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
-    check_room(directory, config.trials or 0)
     onlooker.update_plan(0, config.trials or 0)
-    points = _draw_points(config, sweep_directory, onlooker)
-    check_room(directory, len(points.values))
-    plan = _check_trials(config, points, processes=processes, onlooker=onlooker)
+    plan = draw_plan(config, directory=sweep_directory, processes=processes, onlooker=onlooker)
     # This comes after the plan is drawn, because the configuration as it was given names the place of its list.
     plan = replace(plan, config=make_self_contained(config))
     try:

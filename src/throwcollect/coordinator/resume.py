@@ -16,24 +16,18 @@ from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
-from throwcollect.coordinator.prepare import (
-    check_room,
-    draw_plan,
-    make_self_contained,
-    prepare,
-    read_listed_points,
-)
+from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
 from throwcollect.dataset.carried_robot import carry_robot, config_text, find_files, write_config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS, config_path
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import entry_of, entry_of_file, is_begun
+from throwcollect.dataset.manifest import is_begun
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import ThrowsTable, find_row, read_throws, read_throws_table
-from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
+from throwcollect.dataset.verify import find_damage, read_list
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
@@ -41,7 +35,7 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Pro
 from throwcollect.files import check_regular, remove, write_file
 from throwcollect.robots.description import is_available
 from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.point_file import encode_points, read_points
+from throwcollect.sweep.point_file import encode_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST, REFUSED, Result
 from throwcollect.wording import command
@@ -74,18 +68,7 @@ def resume(
             through.
     """
     with hold_lock(directory):
-        if (directory / SOURCES).exists():
-            raise DatasetError(
-                "was derived from other datasets, so nothing is collected into it",
-                path=directory,
-                hint="derive it again if it is damaged",
-            )
-        if config.task.policy is not None and config.task.policy.use == SESSION:
-            raise DatasetError(
-                "was recorded in a session, so nothing of it can be simulated again",
-                path=directory,
-                hint=f"{command('sim', 'CONFIG', '--record', directory)} records more into it",
-            )
+        _refuse_uncollected(directory, config)
         given = make_self_contained(config)
         stored = _read_stored_config(directory)
         if stored is not None:
@@ -105,12 +88,37 @@ def resume(
         if not ended:
             before_writing()
         remove_unfinished(directory)
+        if ended:
+            return plan
         if listed is not None:
             write_file(directory / TRIALS, encode_points(listed))
         if changes:
             remove(directory / METADATA)
-        _write(plan, directory, stored, ended=ended)
+        replanned = old is None or plan.trials is not old.trials
+        if replanned:
+            # Were this process killed here, the plan must not lie beside another configuration. If it is empty, it is
+            # made again, and the directory still holds a dataset.
+            write_file(directory / PLAN, b"")
+        write_config(directory, plan.config)
+        if replanned:
+            plan.write(directory / PLAN)
         return plan
+
+
+def _refuse_uncollected(directory: Path, config: Config) -> None:
+    """Refuse a dataset of which no trial was collected."""
+    if (directory / SOURCES).exists():
+        raise DatasetError(
+            "was derived from other datasets, so nothing is collected into it",
+            path=directory,
+            hint="derive it again if it is damaged",
+        )
+    if config.task.policy is not None and config.task.policy.use == SESSION:
+        raise DatasetError(
+            "was recorded in a session, so nothing of it can be simulated again",
+            path=directory,
+            hint=f"{command('sim', 'CONFIG', '--record', directory)} records more into it",
+        )
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
@@ -135,59 +143,18 @@ def _make_plan(
         The plan, and the list of its trials, if that has to be written.
     """
     config = make_self_contained(given)
-    own_list = given.sweep.file is not None and sweep_directory.samefile(directory)
-    if (
-        old is not None
-        and old.config.without_run() == config.without_run()
-        and (given.sweep.file is None or own_list or _has_list(directory, given, sweep_directory))
-    ):
-        # The digest of the plan also depends on the order of keys, which may have been changed in the file.
-        lost_list = own_list and (TRIALS in damaged or not _has_own_list(directory, old))
-        return replace(old, config=old.config.run_as(config)), old.trials.points if lost_list else None
-    check_room(directory, given.trials or 0)
+    if old is not None and old.config.without_run() == config.without_run():
+        own_list, there = given.sweep.file is not None and sweep_directory.samefile(directory), None
+        if given.sweep.file is not None and TRIALS not in damaged:
+            with suppress(DatasetError):
+                there = read_list(directory, old)
+        wanted = (there or old.trials.points) if own_list else read_listed_points(given, directory=sweep_directory)
+        if own_list or there == wanted:
+            # The digest of the plan also depends on the order of keys, which may have been changed in the file.
+            return replace(old, config=old.config.run_as(config)), None if there == wanted else wanted
     drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
     plan = _extend(directory, old, replace(drawn, config=config))
     return plan, read_listed_points(given, directory=sweep_directory)
-
-
-def _has_own_list(directory: Path, plan: Plan) -> bool:
-    """Whether the list of trials in a dataset is that of its plan."""
-    try:
-        read_list(directory, plan)
-    except DatasetError:
-        return False
-    return True
-
-
-def _has_list(directory: Path, config: Config, elsewhere: Path) -> bool:
-    """Whether a dataset has the list of trials that a configuration names, which may have more rows by now."""
-    try:
-        return read_points(directory / TRIALS, config) == read_listed_points(config, directory=elsewhere)
-    except ConfigError:
-        return False
-
-
-def _write(plan: Plan, directory: Path, stored: Config | None, *, ended: bool) -> None:
-    """Write configuration and plan if they differ from the stored ones, or the plan is damaged."""
-    # A finished dataset stays as it is, without the keys that say how it is run.
-    kept = plan.config.without_run() if ended else plan.config
-    replanned = not _has_contents(directory / PLAN, plan.encode())
-    if stored != kept:
-        if replanned:
-            # Were this process killed here, the plan must not lie beside another configuration. If it is empty, it is
-            # made again, and the directory still holds a dataset.
-            write_file(directory / PLAN, b"")
-        write_config(directory, kept)
-    if replanned:
-        plan.write(directory / PLAN)
-
-
-def _has_contents(path: Path, contents: bytes) -> bool:
-    """Whether a file is there and holds these bytes."""
-    try:
-        return entry_of_file(path) == entry_of(path.name, contents)
-    except DatasetError:
-        return False
 
 
 def _find_damaged(directory: Path, onlooker: Onlooker) -> frozenset[str]:
@@ -234,7 +201,7 @@ def _read_stored_config(directory: Path) -> Config | None:
 def _read_stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan | None:
     """Read the plan; None if it is missing or damaged, and the configuration is there, from which it is drawn again."""
     try:
-        plan = Plan.read(directory / PLAN, stored or config)
+        return Plan.read(directory / PLAN, stored or config)
     except ForeignPlanError:
         raise
     except DatasetError:
@@ -242,7 +209,6 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
         if stored is None:
             raise
         return None
-    return None if find_wrong_trials(plan) else plan
 
 
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:

@@ -6,7 +6,6 @@ Fields and their order are those of ``rosbag2_storage/yaml.hpp`` (ROS 2 Jazzy an
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -178,17 +177,11 @@ def _name_nearby(directory: Path) -> str | None:
 
 def to_yaml(data: Mapping[str, Any]) -> str:
     """Encode a mapping of plain values as YAML in block style, with the keys in their order."""
-    return _write_yaml(json.dumps(data))
-
-
-@lru_cache(maxsize=8)
-def _write_yaml(text: str) -> str:
-    """Write a JSON text as YAML; the last texts are remembered, because checking a file writes its metadata again."""
     yaml = YAML()
     # By default, long values would be broken at 80 characters.
     yaml.width = 4096
+    # A value that occurs twice, such as an infinite duration, would be an alias, which `from_yaml` refuses.
+    yaml.representer.ignore_aliases = lambda *_: True
     stream = io.StringIO()
-    # A value that occurs twice, such as an infinite duration, is two objects after `loads`. One object would be written
-    # as an alias, which `from_yaml` refuses.
-    yaml.dump(json.loads(text), stream)
+    yaml.dump(data, stream)
     return stream.getvalue()

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.files import check_regular, open_regular, suggest_path
+from throwcollect.files import check_regular, suggest_path
 
 if TYPE_CHECKING:
     from throwcollect.sweep.plan import Plan
@@ -32,8 +32,6 @@ MANIFEST = "datapackage.json"
 SHARD_SUFFIX = ".mcap"
 LIBRARY = "throwcollect"
 """What a recording names as the library that wrote it."""
-_LIBRARY_WITHIN_BYTES = 100
-"""The name stands at the beginning of a recording."""
 JOURNAL = "logs/journal.jsonl"
 ATTEMPT = ".attempt-"
 """Part of the name of the directory of each attempt at a slice, and of no dataset."""
@@ -71,9 +69,8 @@ def path_of_part(path: Path) -> Path:
 
 
 def has_files(directory: Path) -> bool:
-    """Whether any file that only a dataset has is in a directory; bags of others have metadata, exports have tables."""
-    own = (MANIFEST, PLAN)
-    return any(path.name in own or _is_recording(path) for path in directory.glob("*"))
+    """Whether a file that only a dataset has is in a directory; bags of others have metadata, exports have tables."""
+    return (directory / PLAN).exists() or (directory / MANIFEST).exists()
 
 
 def describe_other(directory: Path) -> str:
@@ -81,16 +78,6 @@ def describe_other(directory: Path) -> str:
     if (directory / METADATA).is_file():
         return "is a rosbag2 bag, but not of throwcollect"
     return f"holds no dataset{suggest_path(directory)}"
-
-
-def _is_recording(path: Path) -> bool:
-    if SHARD_SUFFIX not in path.suffixes:
-        return False
-    try:
-        with open(open_regular(path), "rb") as file:
-            return LIBRARY.encode() in file.read(_LIBRARY_WITHIN_BYTES)
-    except OSError:
-        return False
 
 
 def is_attempt(directory: Path) -> bool:

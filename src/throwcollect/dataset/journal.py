@@ -12,7 +12,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -94,10 +93,9 @@ class JournalLine:
 def read_journal(path: Path) -> Iterator[JournalLine]:
     """Read the events of a journal, in order; a missing file has none, and damaged lines are left out."""
     for entry in _read_lines(path):
-        time_s, outcome = _read_number(entry.get("time")), entry.get("outcome")
-        if entry.get("event") in get_args(Event) and time_s is not None:
-            wall_s = _read_number(entry.get("wall_s"))
-            yield JournalLine(entry["event"], time_s, wall_s, outcome if isinstance(outcome, str) else None)
+        time_s, wall_s, outcome = (entry.get(name) for name in ("time", "wall_s", "outcome"))
+        if entry.get("event") in get_args(Event) and isinstance(time_s, int | float):
+            yield JournalLine(entry["event"], time_s, wall_s, outcome)
 
 
 def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:
@@ -108,14 +106,6 @@ def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:
         return
     with open(descriptor, "rb") as file:
         yield from (_parse(line) for line in file if mark in line)
-
-
-def _read_number(value: object) -> float | None:
-    """Return the value if it is a finite number, else None, as a journal may come from anybody."""
-    with suppress(OverflowError):
-        if isinstance(value, int | float) and isfinite(value):
-            return value
-    return None
 
 
 def read_commits(
@@ -155,8 +145,7 @@ def read_commits(
 
 def _parse(line: bytes) -> dict[str, Any]:
     """Read the fields of a line; none if it was cut off or damaged."""
-    # Brackets that are nested too deeply raise a RecursionError.
-    with suppress(ValueError, RecursionError):
+    with suppress(ValueError):
         entry = json.loads(line)
         if isinstance(entry, dict):
             return entry

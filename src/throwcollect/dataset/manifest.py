@@ -12,7 +12,6 @@ import json
 import os
 import re
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,6 @@ from throwcollect.dataset.directory import (
     THROWS,
     TRIALS,
 )
-from throwcollect.dataset.findings import Finding
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, read_text, unreadable
 from throwcollect.sweep.digest import is_digest
@@ -54,6 +52,26 @@ class FileEntry:
     path: str
     bytes: int
     sha256: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong with a file in the dataset's directory.
+
+    Its place there is a trial, a byte or a field; it is empty if the problem is with the file as a whole.
+    """
+
+    file: str
+    place: str
+    problem: str
+
+    @classmethod
+    def of(cls, file: str, error: DatasetError) -> Finding:
+        """Make a finding of an error in the file of this name in the dataset's directory."""
+        return cls(file, error.place, error.details)
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.file, self.place, self.problem) if part)
 
 
 def entry_of(path: str, data: bytes) -> FileEntry:
@@ -81,48 +99,6 @@ def size_of_file(path: Path) -> int:
             return os.fstat(file.fileno()).st_size
     except OSError as error:
         raise unreadable(path, error) from error
-
-
-class RunningHash:
-    """SHA-256 of a file while it is written, computed in a thread of its own, so that the writer need not wait."""
-
-    def __init__(self) -> None:
-        self._hash = hashlib.sha256()
-        self._held: list[bytes] = []
-        self._held_bytes = 0
-        self._pool: ThreadPoolExecutor | None = None
-        self._running: Future[None] | None = None
-
-    def update(self, data: bytes) -> None:
-        """Take in the next bytes of the file."""
-        self._held.append(data)
-        self._held_bytes += len(data)
-        # Handing over to a thread takes some 20 µs, so it is done with the bytes of many episodes at once.
-        if self._held_bytes >= _BLOCK:
-            self._hand_over()
-
-    def hexdigest(self) -> str:
-        """Return the hash of everything, in hexadecimal."""
-        if self._running is not None:
-            self._running.result()
-        self._add(self._held)
-        self._held = []
-        if self._pool is not None:
-            self._pool.shutdown()
-        return self._hash.hexdigest()
-
-    def _hand_over(self) -> None:
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(1)
-        # Blocks are hashed in order; while one is hashed, at most one other is held in memory.
-        if self._running is not None:
-            self._running.result()
-        self._running = self._pool.submit(self._add, self._held)
-        self._held, self._held_bytes = [], 0
-
-    def _add(self, parts: Iterable[bytes]) -> None:
-        for part in parts:
-            self._hash.update(part)
 
 
 def list_promised_names(directory: Path) -> list[str]:
@@ -173,15 +149,6 @@ def is_begun(directory: Path) -> bool:
         return True
     try:
         return (directory / CONFIG).is_file() and ((directory / JOURNAL).is_file() or bool(read_manifest(directory)))
-    except DatasetError:
-        return False
-
-
-def was_changed(directory: Path, name: str) -> bool:
-    """Whether there is a manifest, and a file of the dataset is not as the manifest says."""
-    try:
-        entries = [entry for entry in read_manifest(directory) if entry.path == name]
-        return any(entry != entry_of_file(directory / name, name) for entry in entries)
     except DatasetError:
         return False
 

@@ -80,6 +80,11 @@ class RecordGroup:
         return int(index.chunk_length + index.message_index_length) + self.metadata_length
 
     @property
+    def end(self) -> int:
+        """Where the run ends in a file [bytes]."""
+        return self.offset + self.length
+
+    @property
     def start_ns(self) -> int:
         """Time of the first message of its chunk [ns]."""
         return int(self.chunk_index.message_start_time)

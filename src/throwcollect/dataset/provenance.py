@@ -25,8 +25,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from throwcollect.dataset.directory import CARD, PROVENANCE
-from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.manifest import entry_of_file
+from throwcollect.dataset.manifest import Finding, entry_of_file
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text, write_file
 from throwcollect.version import __version__

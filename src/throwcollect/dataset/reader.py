@@ -329,8 +329,7 @@ def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
         final = directory / name
         # The unfinished file comes first: when it vanishes in this moment, the final one is there.
         episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)
-        # An episode whose records are damaged can be saved, and not read in place.
-        for found in (each for each in episodes.values() if each.run is not None):
+        for found in episodes.values():
             yield table.row(plan.trial(found.trial), found.result, found.place)
 
 

@@ -27,7 +27,7 @@ from throwcollect.dataset.directory import (
 )
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import RecordGroup
-from throwcollect.dataset.mcap_reader import map_file, scan_file
+from throwcollect.dataset.mcap_reader import open_mcap, scan_file
 from throwcollect.dataset.shard import FinishedShard, OpenShard, rewrite
 from throwcollect.dataset.throws_table import Row, place_columns
 from throwcollect.episode.channels import Channels
@@ -46,42 +46,37 @@ _MANY_EPISODES = 1000
 
 @dataclass(frozen=True)
 class RecoveredEpisode:
-    """An episode on disk that is as a new simulation of its trial would record it, so the trial need not run again.
+    """A whole episode on disk, so that its trial need not run again.
 
-    It lies at `place` now, in columns of the table. `run` has its records without their bytes; None if they are not
-    byte for byte what the writer writes, so that the episode has to be written anew.
+    It lies at `place` now, in columns of the table. `run` has its records without their bytes.
     """
 
     trial: int
     result: Result
     place: Row
-    run: RecordGroup | None
+    run: RecordGroup
 
 
 @dataclass(frozen=True)
 class LeftOfShard:
-    """The episodes that are left of a shard, by trial.
+    """What is left of a shard: a file, and the episodes in it that stay, by trial.
 
     Attributes:
-        final: Episodes in its final file.
-        begun: Episodes in its unfinished file; not looked for if the final file stays.
+        path: The final or the unfinished file of the shard, whichever has more episodes.
+        episodes: The episodes.
         finished: The final file, if it has an episode of every trial and is, byte for byte, what the writer makes of
             these; else None, and the shard is filled further.
     """
 
-    final: Mapping[int, RecoveredEpisode]
-    begun: Mapping[int, RecoveredEpisode]
+    path: Path
+    episodes: Mapping[int, RecoveredEpisode]
     finished: FinishedShard | None
 
     def without(self, dropped: Collection[int]) -> LeftOfShard:
         """Leave out the episodes of some trials, which are of no use any more."""
         if not dropped:
             return self
-        final, begun = (
-            {trial: found for trial, found in episodes.items() if trial not in dropped}
-            for episodes in (self.final, self.begun)
-        )
-        return LeftOfShard(final, begun, None)
+        return LeftOfShard(self.path, {n: found for n, found in self.episodes.items() if n not in dropped}, None)
 
 
 def remove_unfinished(directory: Path) -> None:
@@ -115,54 +110,30 @@ def _look_with(channels: Channels, judge: Judge) -> Callable[[tuple[Path, Plan]]
         if final and final.keys() == set(plan.trials.numbers_to_run):
             finished = _check_finished(path, channels, final)
             if finished is not None:
-                return LeftOfShard(final, {}, finished)
-        begun = find_episodes(path_of_part(path), plan, channels, judge=judge)
-        return LeftOfShard(final, begun, None)
+                return LeftOfShard(path, final, finished)
+        unfinished = path_of_part(path)
+        begun = find_episodes(unfinished, plan, channels, judge=judge)
+        # A process that is killed leaves all episodes in one of the two.
+        return LeftOfShard(path, final, None) if len(final) > len(begun) else LeftOfShard(unfinished, begun, None)
 
     return look
 
 
-def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]:
-    """Take in what is left of a shard, which no longer waits for these episodes when this returns.
-
-    Returns:
-        The episodes, in order of trials.
-    """
+def recover_shard(shard: OpenShard, left: LeftOfShard) -> None:
+    """Take in what is left of a shard, which no longer waits for these episodes when this returns."""
     remove(shard.path.with_name(f"{shard.path.name}.new"))
-    final, begun = left.final, left.begun
-    if left.finished is not None:
+    if left.finished is None and left.path == shard.path and left.episodes:
+        # `adopt` cuts off what follows the last episode, so a final file can become the unfinished one as it is.
+        try:
+            os.replace(shard.path, shard.part)
+        except OSError as error:
+            raise unwritable(shard.part, error) from error
+    elif left.finished is None:
+        remove(shard.path)
+    if left.finished is not None or not left.episodes:
         remove(shard.part)
-        return [final[trial] for trial in sorted(final)]
-    # `adopt` cuts off what follows the last episode, so a final file can become the unfinished one as it is. A file in
-    # which an episode has to be written anew becomes the final one, from which all are copied.
-    if final and not begun and None not in (each.run for each in final.values()):
-        _rename(shard.path, shard.part)
-        final, begun = {}, final
-    elif begun and not final and None in (each.run for each in begun.values()):
-        _rename(shard.part, shard.path)
-        final, begun = begun, {}
-    # Both files have episodes if an earlier process was killed before it had removed one of them.
-    runs = {trial: each.run for trial, each in begun.items() if each.run is not None}
-    if runs:
-        shard.adopt(runs)
     else:
-        remove(shard.part)
-    only_final = {each.place["chunk_offset"]: each for trial, each in final.items() if trial not in runs}
-    if only_final:
-        for found in scan_file(shard.path):
-            if found.offset in only_final:
-                shard.append(found.episode)
-    # The final file goes last: if this process is killed before, the next one finds these episodes in it again.
-    remove(shard.path)
-    episodes = {**{trial: begun[trial] for trial in runs}, **{each.trial: each for each in only_final.values()}}
-    return [episodes[trial] for trial in sorted(episodes)]
-
-
-def _rename(path: Path, target: Path) -> None:
-    try:
-        os.replace(path, target)
-    except OSError as error:
-        raise unwritable(target, error) from error
+        shard.adopt({trial: each.run for trial, each in left.episodes.items()})
 
 
 def find_episodes(
@@ -178,10 +149,9 @@ def find_episodes(
     """
     episodes: dict[int, RecoveredEpisode] = {}
     trials_to_run = frozenset(plan.trials.numbers_to_run)
-    for found in scan_file(path):
-        episode = found.episode
+    for episode, run in scan_file(path):
         trial = episode.header.trial
-        if trial not in trials_to_run or (trial in episodes and episodes[trial].run is not None):
+        if trial not in trials_to_run or trial in episodes:
             continue
         try:
             result = judge(plan.config_of(plan.trial(trial)), episode)
@@ -189,18 +159,14 @@ def find_episodes(
             continue
         recorded = channels is None or channels.numbers == tuple(episode.table.columns)
         if recorded and episode.header.start_ns == plan.config.trial_start_ns(trial):
-            place = place_columns(path.name, found.offset, episode)
-            run = found.run
-            if run is not None or trial not in episodes:
-                episodes[trial] = RecoveredEpisode(trial, result, place, run)
+            place = place_columns(path.name, run.offset, episode)
+            episodes[trial] = RecoveredEpisode(trial, result, place, run)
     return episodes
 
 
 def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, RecoveredEpisode]) -> FinishedShard | None:
     """Describe a finished file; None if it is not, byte for byte, what the writer makes of its episodes."""
-    runs = {trial: each.run for trial, each in episodes.items() if each.run is not None}
-    if len(runs) < len(episodes):
-        return None
-    with map_file(path) as contents:
+    runs = {trial: each.run for trial, each in episodes.items()}
+    with open_mcap(path) as contents:
         finished, difference = rewrite(contents, channels, runs, name=path.name)
     return finished if difference is None else None

@@ -7,6 +7,7 @@ file ``<name>_00000.mcap``, and the other vanishes.
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -15,8 +16,8 @@ from functools import partial
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.directory import path_of_part
-from throwcollect.dataset.manifest import FileEntry, RunningHash
+from throwcollect.dataset.directory import path_of_part, shard_name
+from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.mcap_file import McapFile, RecordGroup, episode_run
 from throwcollect.dataset.mcap_reader import McapContents
 from throwcollect.dataset.throws_table import Row
@@ -24,6 +25,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
+from throwcollect.sweep.plan import Plan
 
 Recording = tuple[FileSummary, FileEntry]
 """What bag's metadata and manifest say of an MCAP file."""
@@ -46,7 +48,7 @@ def write_runs(
     write: Callable[[bytes], None], channels: Channels, runs: Iterable[tuple[int, RecordGroup]], *, name: str
 ) -> FinishedShard:
     """Write the finished file of some episodes, at least one, each with its trial; it depends on nothing but them."""
-    sha256, file, offsets = RunningHash(), None, {}
+    sha256, file, offsets = hashlib.sha256(), None, {}
 
     def put(data: bytes) -> None:
         write(data)
@@ -113,7 +115,7 @@ class OpenShard:
 
     def adopt(self, runs: Mapping[int, RecordGroup]) -> None:
         """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off."""
-        size = max(run.offset + run.length for run in runs.values())
+        size = max(run.end for run in runs.values())
         try:
             self._descriptor = open_regular(self.part, os.O_RDWR)
             self._cut(self._descriptor, size)
@@ -193,3 +195,47 @@ class OpenShard:
     def _cut(descriptor: int, size: int) -> None:
         os.ftruncate(descriptor, size)
         os.lseek(descriptor, size, os.SEEK_SET)
+
+
+@dataclass
+class ShardLayout:
+    """The shards of a dataset by their numbers, before and after they are begun."""
+
+    directory: Path
+    plan: Plan
+
+    def number_of(self, trial: int) -> int:
+        """Find the number of the shard of a trial."""
+        return trial // self._trials_per_shard
+
+    def numbers_of(self, trials: range) -> range:
+        """Find the numbers of the shards of consecutive trials."""
+        return range(self.number_of(trials.start), self.number_of(trials.stop - 1) + 1)
+
+    def members(self, number: int) -> range:
+        """Find the numbers of the trials of a shard."""
+        size, numbers = self._trials_per_shard, self.plan.trials.numbers
+        return range(max(number * size, numbers.start), min((number + 1) * size, numbers.stop))
+
+    def to_run(self, number: int) -> Iterator[int]:
+        """Find the numbers of the trials of a shard that are not refused."""
+        return (each for each in self.members(number) if each not in self.plan.trials.refused)
+
+    def path(self, number: int) -> Path:
+        """Make the path of a shard once it is finished."""
+        return self.directory / shard_name(self.plan.config.name, number)
+
+    def has_file(self, number: int) -> bool:
+        """Whether a shard was begun."""
+        path = self.path(number)
+        return path.exists() or path_of_part(path).exists()
+
+    def part(self, number: int) -> tuple[Path, Plan]:
+        """Describe a shard for `find_left`, without a look into its files."""
+        members, first = self.members(number), self.plan.trials.first
+        trials = self.plan.trials[members.start - first : members.stop - first]
+        return self.path(number), Plan(self.plan.config, trials)
+
+    @property
+    def _trials_per_shard(self) -> int:
+        return self.plan.config.record.trials_per_shard

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of
-from throwcollect.dataset.mcap_reader import EpisodePlace
+from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
 from throwcollect.dataset.motion import Body, Joints
 from throwcollect.dataset.throws_table import Row, body_state
 from throwcollect.dataset.trajectories import (
@@ -274,9 +274,13 @@ class Throw:
     @cached_property
     def _rows(self) -> tuple[int, Rows]:
         """Start of the episode [ns], and its samples in place (`MessageTable.rows`)."""
+        joints = robot_of(self._config).joints
         with self.locating_damage():
+            if isinstance(self._episode, EpisodePlace):
+                with open_mcap(self._episode.path) as contents:
+                    return self._episode.start_ns, self._episode.read_rows(contents, joints)
             episode = self.read_episode()
-            return episode.header.start_ns, episode.rows(robot_of(self._config).joints)
+            return episode.header.start_ns, episode.table.rows(joints)
 
     def _read(self, fields: Iterable[str]) -> list[NDArray[Any]]:
         """Copy times, stamps, and some fields of the samples."""

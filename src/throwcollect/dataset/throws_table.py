@@ -8,26 +8,24 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
-from throwcollect.config.task_config import TARGET_PREFIX, is_target
 from throwcollect.config.values import column_of
 from throwcollect.dataset.directory import SOURCES, THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.members import explain_failure
-from throwcollect.sweep.arrow_column import find_range, find_trial, make_table, read_validity
+from throwcollect.sweep.arrow_column import find_trial, make_table
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.measures import ObjectState
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
+from throwcollect.tasks.result import REFUSED, Result
 from throwcollect.tasks.result_columns import body_columns, join_body
-from throwcollect.tasks.task import Task, task_of
+from throwcollect.tasks.task import task_of
 from throwcollect.units import ascii_unit, unit_of_name
 
 Row = dict[str, Any]
@@ -60,26 +58,6 @@ def body_state(row: Row, name: str) -> ObjectState | None:
     return None if None in values else join_body(values)
 
 
-def _check_task(task: Task[Any], columns: Sequence[str]) -> None:
-    """Make sure that a task, which may be of another package, can have its results in a table of these columns."""
-    name, outcomes = task.config.task.name, {each.value for each in task.outcomes}
-    needed = (task.config.task.success, LIMIT_VIOLATED, TRACKING_FAILED, LOST)
-    if missing := [each for each in needed if each not in outcomes]:
-        raise ConfigError(f"task.name: outcomes of the task {name} lack {', '.join(missing)}")
-    if twice := [column for column, count in Counter(columns).items() if count > 1]:
-        raise ConfigError(
-            f"task.name: two columns of the table of throws of the task {name} have the same name: {', '.join(twice)}",
-            hint="rename the fields of its results; a swept key has underscores in place of dots",
-        )
-    # Whoever reads the table takes columns of these names for targets that the trials were given.
-    if targets := [each.name for each in task.columns.columns if is_target(each.name)]:
-        raise ConfigError(
-            f"task.name: results of the task {name} have columns that begin with {TARGET_PREFIX}, as only targets of "
-            f"trials may: {', '.join(targets)}",
-            hint="rename the fields of its results",
-        )
-
-
 class ThrowsTable:
     """The schema of one collection's table; turns results into rows, and rows into results.
 
@@ -89,7 +67,7 @@ class ThrowsTable:
     The parameters are the swept keys, and the targets columns of targets, in their order.
 
     Raises:
-        ConfigError: If the task lacks an outcome that it needs, or a column of its results has the name of another.
+        ConfigError: If two columns have the same name.
         MemberError: If the task comes from another package, and fails to declare its results.
     """
 
@@ -115,7 +93,12 @@ class ThrowsTable:
                 make_field("digest", pa.string(), "SHA-256 of the episode: of its header and its message records."),
             ]
         )
-        _check_task(task, self.columns.names)
+        if twice := [column for column, count in Counter(self.columns.names).items() if count > 1]:
+            raise ConfigError(
+                f"task.name: two columns of the table of throws of the task {task.config.task.name} have the same "
+                f"name: {', '.join(twice)}",
+                hint="rename the fields of its results; a swept key has underscores in place of dots",
+            )
 
     @cached_property
     def schema(self) -> pa.Schema:
@@ -190,25 +173,7 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
             raise DatasetError("its rows are not trials of the plan in order", path=path)
     elif numbers != list(planned):
         raise DatasetError(f"its rows are not the {len(plan.trials)} trials of the plan in order", path=path)
-    if problem := _explain_unusable(table, plan):
-        raise DatasetError(problem, path=path)
+    # Names of recordings become paths.
+    if unknown := set(table["shard"].to_pylist()) - {None, *list_shards(plan)}:
+        raise DatasetError(f"shard is {min(unknown)!r} in some row, which no row of this plan can have", path=path)
     return table
-
-
-def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
-    """Say what makes a table unusable, as it may come from anybody; None if it is usable, even with wrong numbers."""
-    known = {
-        "outcome": {REFUSED, *(each.value for each in task_of(plan.config).outcomes)},
-        "shard": {None, *list_shards(plan)},
-    }
-    for name, values in known.items():
-        if unknown := set(table[name].to_pylist()) - values:
-            return f"{name} is {min(map(repr, unknown))} in some row, which no row of this plan can have"
-    places = ("shard", "chunk_offset", "samples", "digest")
-    shard, *rest = (read_validity(table[name].combine_chunks()) for name in places)
-    if not all(np.array_equal(each, shard) for each in rest):
-        return "some row has only a part of the place of an episode"
-    samples = find_range(table["samples"])
-    if samples is not None and samples[0] < 1:
-        return "some row has an episode without samples"
-    return None

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
-from throwcollect.episode.message_table import MessageTable, list_body_fields, read_column
+from throwcollect.episode.message_table import list_body_fields, read_column
 from throwcollect.episode.topics import STAMP, read_stamps, rotate
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.units import NS_PER_S, name_sliding
@@ -250,9 +250,7 @@ def _fill(
             for place in group:
                 span = slice(filled, filled := filled + place.samples)
                 try:
-                    chunk = contents.chunk(place.offset)
-                    place.check_start(chunk)
-                    rows = MessageTable(chunk.decompress(), place.samples).rows(known)
+                    rows = place.read_rows(contents, known)
                 except DatasetError as error:
                     raise error.locate(path, f"byte {place.offset}") from error
                 for target, name in whole:
@@ -261,7 +259,7 @@ def _fill(
                     every = read_column(rows, fields[name])
                     # With the default mode, NumPy would write to a buffer first; all indexes are valid.
                     np.take(every, indexes, axis=1, out=columns[name][span], mode="clip")
-                del rows, chunk  # the next ones then take their place in the caches
+                del rows  # the next ones then take their place in the caches
     if sources[STAMPS]:
         stamps = copied[STAMPS]
         stamps[:] = read_stamps(stamps.view(STAMP), "stamp")

@@ -31,12 +31,11 @@ from throwcollect.dataset.directory import (
     config_path,
     shard_of,
 )
-from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.manifest import find_changed_files, list_promised_names, read_manifest
+from throwcollect.dataset.manifest import Finding, find_changed_files, list_promised_names, read_manifest
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.provenance import find_changes
 from throwcollect.dataset.summary_files import combine_digests, metadata_text
-from throwcollect.dataset.throws_table import ThrowsTable, read_throws
+from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify_recording import RecordingReport, check_recording
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import read_text
@@ -150,8 +149,7 @@ def _read_tables(directory: Path) -> _Tables:
             problem = f"has digest {plan.trial(trial).digest}, its values and seed give {digest}"
             tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
         file = THROWS
-        tables.throws = throws = read_throws(directory, plan)
-        tables.findings += _find_unit_problems(throws.schema, ThrowsTable.of(plan).schema)
+        tables.throws = read_throws(directory, plan)
     except ForeignPlanError:
         problem = f"is not the configuration that {PLAN} was made for; one of the two was changed"
         tables.findings.append(Finding(CONFIG, "", problem))
@@ -163,14 +161,6 @@ def _read_tables(directory: Path) -> _Tables:
     except DatasetError as error:
         tables.findings.append(Finding.of(file, error))
     return tables
-
-
-def _find_unit_problems(schema: pa.Schema, expected: pa.Schema) -> Iterator[Finding]:
-    """Find units of columns that are not theirs; exports take them over, while descriptions are for people alone."""
-    for column in schema:
-        stated, unit = ((each.metadata or {}).get(b"unit") for each in (column, expected.field(column.name)))
-        if stated != unit:
-            yield Finding(THROWS, column.name, f"has the unit {stated!r}, should be {unit!r}")
 
 
 @contextmanager

@@ -15,10 +15,10 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.manifest import Finding
 from throwcollect.dataset.mcap_file import RecordGroup
-from throwcollect.dataset.mcap_reader import McapContents, StoredEpisode, map_file, scan
+from throwcollect.dataset.mcap_reader import McapContents, WholeEpisode, open_mcap, scan
 from throwcollect.dataset.shard import rewrite
 from throwcollect.dataset.throws_table import Row, ThrowsTable, place_columns
 from throwcollect.episode.channels import Channels
@@ -78,7 +78,7 @@ def check_recording(path: Path, plan: Plan, rows: Mapping[int, Row], *, robot: b
     if any(row["shard"] is not None for row in rows.values()):
         check.report.has_file = True
         try:
-            with map_file(path) as contents:
+            with open_mcap(path) as contents:
                 check.check_contents(contents)
         except DatasetError as error:
             check.report.findings.append(Finding.of(path.name, error))
@@ -119,29 +119,26 @@ class _RecordingCheck:
             number = stored.episode.header.trial
             row = waiting.pop(first + number, None)
             if row is None:
-                self._add(f"byte {stored.offset}", f"an episode that {THROWS} does not place here: trial {number}")
+                self._add(f"byte {stored.run.offset}", f"an episode that {THROWS} does not place here: trial {number}")
                 continue
             place = f"trial {row['trial']}"
-            if (run := stored.run) is None:
-                self._add(place, "the message indexes or the metadata do not fit the chunk")
-            else:
-                runs[number] = run
+            runs[number] = stored.run
             self.report.digests[row["trial"]] = stored.episode.digest
             for problem in self._find_problems(stored, row, channels):
                 self._add(place, problem)
         for row in waiting.values():
             self._add(f"trial {row['trial']}", _explain_missing(contents, row))
-        if not waiting and len(runs) == len(self.report.digests):
+        if not waiting:
             finished, place_of_difference = rewrite(contents, channels, runs, name=self._name)
             if place_of_difference is not None:
                 self._add(f"byte {place_of_difference}", "from here on, it is not what is written for its episodes")
             if finished.recording is not None:
                 self.report.summary, _ = finished.recording
 
-    def _find_problems(self, stored: StoredEpisode, row: Row, channels: Channels) -> Iterator[str]:
+    def _find_problems(self, stored: WholeEpisode, row: Row, channels: Channels) -> Iterator[str]:
         """Find what is wrong with an episode, given the row of its trial, a sentence each."""
         episode, trial = stored.episode, self._plan.trial(row["trial"])
-        place = place_columns(self._name, stored.offset, episode)
+        place = place_columns(self._name, stored.run.offset, episode)
         try:
             config = self._plan.config_of(trial)
             if (found := tuple(episode.table.columns)) != channels.numbers:
@@ -185,7 +182,7 @@ def _are_same(value: Any, other: Any) -> bool:
 def _explain_missing(contents: McapContents, row: Row) -> str:
     """Say why a file has no whole episode of a trial, whose place is in its row."""
     try:
-        contents.episode(contents.record(row["chunk_offset"])).check_whole()
+        contents.whole_episode(row["chunk_offset"])
     except DatasetError as error:
         return f"has no whole episode: {error.details}"
     return f"has no whole episode: at byte {row['chunk_offset']} is another one"

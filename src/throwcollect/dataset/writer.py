@@ -24,16 +24,8 @@ from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import (
-    Judge,
-    LeftOfShard,
-    RecoveredEpisode,
-    find_left,
-    recover_shard,
-    remove_unfinished,
-)
-from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
-from throwcollect.dataset.shard_layout import ShardLayout
+from throwcollect.dataset.recovery import Judge, find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording, ShardLayout
 from throwcollect.dataset.summary_files import write_description
 from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, place_columns
 from throwcollect.episode.channels import Channels
@@ -129,13 +121,15 @@ class DatasetWriter:
         parts = {each: self._layout.part(each) for each in sorted(self._unfinished) if self._layout.has_file(each)}
         all_left = find_left([*parts.values()], self._channels, judge=judge, processes=processes)
         for number, found in zip(parts, all_left, strict=True):
-            there = {**found.final, **found.begun}
-            left = found.without({trial for trial in sorted(there) if not keep(trial, there[trial].result)})
-            episodes = self._take_left(number, left)
-            count += len(episodes)
+            dropped = {trial for trial, each in sorted(found.episodes.items()) if not keep(trial, each.result)}
+            left, shard = found.without(dropped), self._get_shard(number)
+            recover_shard(shard, left)
+            for trial, each in left.episodes.items():
+                shard.rows[trial] = self._make_row(trial, each.result, {**each.place, "shard": shard.path.name})
+            count += len(left.episodes)
             if left.finished is not None:
                 self._close_shard(number, left.finished)
-            elif episodes or not self._get_shard(number).missing:
+            elif left.episodes or not shard.missing:
                 self._finish_shard_if_complete(number)
             else:
                 del self._shards[number]
@@ -248,15 +242,6 @@ class DatasetWriter:
             shard.close()
         self._held.close()
         self._journal = None
-
-    def _take_left(self, number: int, left: LeftOfShard) -> list[RecoveredEpisode]:
-        """Take in what is left of an unfinished shard; returns its episodes in order of trials."""
-        shard = self._get_shard(number)
-        episodes = recover_shard(shard, left)
-        for each in episodes:
-            place = {**each.place, "shard": shard.path.name}
-            shard.rows[each.trial] = self._make_row(each.trial, each.result, place)
-        return episodes
 
     def _get_shard(self, number: int) -> OpenShard:
         """Return an unfinished shard, which takes memory only once it has been asked for."""

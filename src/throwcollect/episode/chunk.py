@@ -79,17 +79,6 @@ def count_indexed(index: bytes) -> int:
     return (len(index) - _MESSAGE_INDEX_HEADER.size) // _INDEX_ENTRY_BYTES
 
 
-def _cut_message_index(records: memoryview) -> tuple[int, bytes]:
-    """Take the Message Index record at the beginning of some records: its channel, and its bytes."""
-    start = bytes(records[: _MESSAGE_INDEX_HEADER.size])
-    if len(start) == _MESSAGE_INDEX_HEADER.size:
-        _, length, channel, size = _MESSAGE_INDEX_HEADER.unpack(start)
-        end = _MESSAGE_INDEX_HEADER.size + size
-        if length == 6 + size and size % _INDEX_ENTRY_BYTES == 0 and end <= len(records):
-            return channel, bytes(records[:end])
-    raise DatasetError("chunk: a message index behind it cannot be read")
-
-
 @dataclass(frozen=True)
 class Chunk:
     """A compressed MCAP chunk, which is decompressed when its contents are needed.
@@ -170,9 +159,9 @@ class Chunk:
         chunk, rest = cls.parse(records[:size]), records[size:]
         indexes: dict[int, bytes] = {}
         while rest:
-            channel, index = _cut_message_index(rest)
-            indexes[channel] = index
-            rest = rest[len(index) :]
+            _, _, channel, size = _MESSAGE_INDEX_HEADER.unpack_from(rest)
+            end = _MESSAGE_INDEX_HEADER.size + size
+            indexes[channel], rest = bytes(rest[:end]), rest[end:]
         return replace(chunk, records_sha256=records_sha256, indexes=indexes)
 
     @classmethod

@@ -14,29 +14,26 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from rclzenoh.interfaces import get_message
+from rclzenoh.interfaces import deserialize, get_message, serialize
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.episode.topics import Rows
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import Signer
 
+_TYPE = "std_msgs/msg/UInt8MultiArray"
 _PARTS = ("header", "result", "conditions", "hash", "chunk", "signature")
 _HEADER = TypeAdapter(EpisodeHeader)
 _LONGEST_NAME = 256
 """Most characters of a recorded name that a message shows."""
-_COUNT = struct.Struct("<I")
 
 
 @dataclass(eq=False)
@@ -65,27 +62,14 @@ class Episode:
     @cached_property
     def table(self) -> MessageTable:
         """The message records of the chunk as a table."""
-        table = MessageTable(self.chunk.contents, self.header.samples)
-        table.check_rows()
-        return table
+        return MessageTable(self.chunk.contents, self.header.samples)
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
         """Read the samples; `joints` must have been recorded, in this order."""
-        self._check_joints(self.table.joints if joints is None else joints)
-        return self.table.samples
-
-    def rows(self, joints: Sequence[str]) -> Rows:
-        """View the samples in place, see `MessageTable.rows`; `joints` must have been recorded, in this order."""
-        try:
-            return self.table.rows(tuple(joints))
-        except DatasetError:
-            self._check_joints(joints)
-            raise
-
-    def _check_joints(self, joints: Sequence[str]) -> None:
-        if tuple(joints) != self.table.joints:
+        if joints is not None and tuple(joints) != self.table.joints:
             found = ", ".join(self.table.joints)[:_LONGEST_NAME]
             raise DatasetError(f"chunk: joint states of {found}", expected=", ".join(joints))
+        return self.table.samples
 
     @cached_property
     def message_indexes(self) -> Mapping[int, bytes]:
@@ -114,14 +98,6 @@ def header_from_json(text: bytes | str) -> EpisodeHeader:
         raise DatasetError(f"episode header: {place}: {first['msg']}; {error.error_count()} problems in all") from error
 
 
-@cache
-def _make_layout() -> MessageLayout:
-    dimension = get_message("std_msgs/msg/MultiArrayDimension")
-    layout = get_message("std_msgs/msg/MultiArrayLayout")(dim=[dimension(label=part) for part in _PARTS])
-    message = get_message("std_msgs/msg/UInt8MultiArray")(layout=layout)
-    return MessageLayout(message, [f"layout.dim.{n}.{key}" for n in range(len(_PARTS)) for key in ("size", "stride")])
-
-
 class TrialRefusal(NamedTuple):
     """A refusal of a simulation to do a trial."""
 
@@ -141,36 +117,25 @@ def pack(handed: Episode | TrialRefusal, signer: Signer) -> bytes:
             bytes.fromhex(handed.chunk.records_sha256),
             b"".join((handed.chunk.record(), *handed.message_indexes.values())),
         ]
-    signature = signer.sign(*parts).encode()
-    return b"".join((_encode_prefix([*map(len, parts), len(signature)]), *parts, signature))
-
-
-def _encode_prefix(sizes: list[int]) -> bytes:
-    """Encode everything before the data: the layout, and at the end the size of the data."""
-    prefix = bytearray(_make_layout().template)
-    np.frombuffer(prefix, _make_layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
-    # A stranger's message may have sizes whose sum does not fit; such a message is refused later, by its length.
-    _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
-    return bytes(prefix)
+    parts.append(signer.sign(*parts).encode())
+    dimension, layout = get_message("std_msgs/msg/MultiArrayDimension"), get_message("std_msgs/msg/MultiArrayLayout")
+    named = zip(_PARTS, map(len, parts), strict=True)
+    dimensions = [dimension(label=name, size=size, stride=size) for name, size in named]
+    return serialize(get_message(_TYPE)(layout=layout(dim=dimensions), data=np.frombuffer(b"".join(parts), np.uint8)))
 
 
 def unpack(message: bytes, signer: Signer) -> Episode | TrialRefusal:
     """Read the message that `pack` writes, without decompressing chunks."""
-    layout = _make_layout()
-    length = len(layout.template)
-    if len(message) < length:
-        raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
-    sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
-    # Names of the parts, strides and the size of the data follow from the sizes, so one comparison checks them all.
-    if message[:length] != _encode_prefix(sizes):
-        raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
-    # Some RMWs hand over messages with padding behind them.
-    if len(message) < length + sum(sizes):
-        raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{sum(sizes)} as announced")
-    whole = memoryview(message)
-    ends = list(itertools.accumulate(sizes, initial=length))
-    *parts, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
-    if not signer.has_signed(bytes(signature).decode(errors="replace"), whole[length : ends[-2]]):
+    try:
+        array = deserialize(message, get_message(_TYPE))
+    except ValueError as error:
+        raise DatasetError(f"episode: {error}") from error
+    data, sizes = memoryview(array.data), [part.size for part in array.layout.dim]
+    if tuple(part.label for part in array.layout.dim) != _PARTS or sum(sizes) != len(data):
+        raise DatasetError(f"episode: not an array of the parts {', '.join(_PARTS)}")
+    ends = list(itertools.accumulate(sizes, initial=0))
+    *parts, signature = (data[start:end] for start, end in itertools.pairwise(ends))
+    if not signer.has_signed(bytes(signature).decode(errors="replace"), data[: ends[-2]]):
         raise DatasetError("episode: is not signed with the key of this run")
     header, result, conditions, records_hash, chunk = parts
     try:

@@ -47,10 +47,6 @@ _HEADERS = np.dtype(
     }
 )
 """`MESSAGE_HEADER`, of many records at once."""
-_ALIKE_BYTES = 11
-"""Size of opcode, length and channel, which are the same in all records of a channel."""
-
-
 _JOINT_FIELDS = {
     "stamps_ns": "header.stamp.sec",
     "position": "position",
@@ -101,7 +97,7 @@ def read_column(rows: Rows, name: str) -> NDArray[Any]:
 class MessageTable:
     """The records of a chunk seen as a table, without a copy; every row has the same channels at the same places.
 
-    Only the layout of the first row is checked, unless `check_rows` is called. Views of a bytearray are writable.
+    Only the layout of the first row is checked. Views of a bytearray are writable.
 
     Attributes:
         contents: The records.
@@ -127,14 +123,6 @@ class MessageTable:
             if opcode != Opcode.MESSAGE or not fits or channel in self.columns:
                 raise DatasetError(f"chunk: not one message per channel and sample at byte {start}")
             self.columns[channel] = slice(start, offset)
-
-    def check_rows(self) -> None:
-        """Check that all rows have the layout of the first one."""
-        # Opcode, length and channel are the first bytes of a record: if they repeat in each row, so does the layout.
-        for channel, column in self.columns.items():
-            alike = self._table[:, column.start : column.start + _ALIKE_BYTES]
-            if alike.tobytes() != alike[0].tobytes() * len(self):
-                raise DatasetError(f"chunk: the records of channel {channel} are not alike")
 
     @cached_property
     def joints(self) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ import numpy as np
 
 from throwcollect.arguments import check_bounds
 from throwcollect.config.values import column_of, with_values
-from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.manifest import Finding
 from throwcollect.dataset.provenance import find_versions, read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import ThrowsTable

@@ -14,7 +14,6 @@ from throwcollect.engines.body import LinkShape
 from throwcollect.engines.engine import SceneBody
 from throwcollect.errors import ConfigError
 from throwcollect.pinocchio_library import pinocchio
-from throwcollect.robots.clear_postures import ClearPostures, find_reaches
 from throwcollect.robots.joint_model import joint_model, mount_of, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool
@@ -24,8 +23,6 @@ MARGIN_M = 0.002
 the torso's axis, could cut by this much into a body as curved as the head."""
 _TOUCHING_M = 1e-3
 """Bodies that touch may reach into each other by this much."""
-_SHORT_CHAIN = 2
-"""Links with at most this many joints between them are always close to each other."""
 
 
 @dataclass(frozen=True)
@@ -81,29 +78,14 @@ class Clearance:
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
         self._broadphase = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(model, geometry, self._distances)
-        # Links with few joints between them are never clear by much. If one object looked at these links and at all
-        # others, a posture would show little about the postures near it.
-        reaches = find_reaches(model, geometry)
-        short = (reaches > 0).sum(axis=1) <= _SHORT_CHAIN
-        self._clear = [
-            ClearPostures(model, geometry, reaches, np.flatnonzero(pairs), margin_m=MARGIN_M)
-            for pairs in (~short, short)
-            if pairs.any()
-        ]
 
     def first_approach(self, configurations: NDArray[np.float64]) -> Approach | None:
         """Find the first posture in which two links are closer than `MARGIN_M`, and the closest links in it, if any.
 
-        Most postures need no computation, because a posture near them was clear by more than the way between the two.
-
         Args:
             configurations: In the order of the model [rad], shape ``(n, n_joints)``.
         """
-        unknown = [known.find_unknown(configurations) for known in self._clear]
-        for index in np.flatnonzero(np.any(unknown, axis=0)).tolist():
-            if self._is_clear(configurations[index:], [rows[index:] for rows in unknown]):
-                continue
-            posture = configurations[index]
+        for index, posture in enumerate(configurations):
             # The tree tells quickly whether any links are too close, but the message has to say which links.
             if pinocchio.computeCollisions(self._model, self._data, self._broadphase, posture, True):
                 pinocchio.computeDistances(self._model, self._data, self.geometry, self._distances, posture)
@@ -116,30 +98,6 @@ class Clearance:
                     distance_m=distances[closest],
                 )
         return None
-
-    def find_lowest(self, configuration: NDArray[np.float64]) -> tuple[str, float]:
-        """Find the lowest link of a posture by boxes around its shapes: its name, and its height above the base [m].
-
-        The posture is in the order of the model [rad], shape ``(n_joints,)``.
-        """
-        pinocchio.updateGeometryPlacements(self._model, self._data, self.geometry, self._distances, configuration)
-        heights = []
-        for shape, placement in zip(self.geometry.geometryObjects, self._distances.oMg, strict=True):
-            shape.geometry.computeLocalAABB()
-            box, upright = shape.geometry.aabb_local, placement.rotation[2]
-            half = (np.array(box.max_) - np.array(box.min_)) / 2
-            heights.append(float(placement.translation[2] + (upright * box.center() - np.abs(upright) * half).sum()))
-        lowest = int(np.argmin(heights))
-        return self._links[lowest], heights[lowest]
-
-    def _is_clear(self, configurations: NDArray[np.float64], unknown: list[NDArray[np.bool_]]) -> bool:
-        """Say whether the first posture is clear, and remove from `unknown` the postures that it shows to be clear."""
-        for known, rows in zip(self._clear, unknown, strict=True):
-            if rows[0]:
-                rows[:] &= known.look_at_first(configurations)
-            if rows[0]:
-                return False
-        return True
 
     def _add_tool(self, tool: Tool) -> None:
         frame = self._model.getFrameId(self._robot.hand, pinocchio.BODY)

@@ -116,11 +116,6 @@ class Feasibility:
             return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
         return self._explain_loss(config, posture)
 
-    def find_lowest(self, config: Config) -> tuple[str, float]:
-        """Find the lowest link of the robot in the start posture: its name, and its height above the base [m]."""
-        posture = np.array(list(start_posture(config).values()))
-        return self._clearance.find_lowest(self._model_order(posture))
-
     def _find_violation(self, config: Config, times: NDArray[np.float64], motion: Motion) -> str | None:
         """Find the first kind of limit that a motion violates, and the worst violation of it."""
         joints, locked = self._robot.joints, find_locked_joints(config)

@@ -40,11 +40,6 @@ def import_robot(section: DescribedRobotConfig) -> DescribedRobotConfig:
         ConfigError: If a file cannot be read, or something in it or in the section is wrong.
     """
     path = find_urdf(section.urdf)
-    if (path.parent / SECTION).is_file():
-        # Such a directory may come from another user. In a workspace of ROS, which has no such file, links are usual.
-        here = path.parent.resolve()
-        if out := [each for each in path.parent.iterdir() if not each.resolve().is_relative_to(here)]:
-            raise make_error("urdf", f"{out[0]}: a link that leads out of the directory of the robot")
     directory = _find_cache(section, path)
     if not _is_current(directory):
         shutil.rmtree(directory, ignore_errors=True)

@@ -10,7 +10,6 @@ import pytest
 from tests.e2e.collection import CONFIG, FAST, call_here, write_config
 
 from throwcollect.cluster import slurm
-from throwcollect.coordinator import prepare
 
 SLICED = CONFIG + "record: {{trials_per_shard: 1}}\n"
 
@@ -18,24 +17,6 @@ SLICED = CONFIG + "record: {{trials_per_shard: 1}}\n"
 def call_without_and_with_json(*arguments: str | Path) -> tuple[str, CompletedProcess[str]]:
     """Call a command twice; returns its standard error without `--json`, and all that it prints with it."""
     return call_here(*arguments).stderr, call_here(*arguments, "--json")
-
-
-def test_plan_with_json_prints_only_the_document_even_for_a_large_plan(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(prepare, "_ANNOUNCED_TRIALS", 1)
-    said, printed = call_without_and_with_json("plan", write_config(tmp_path, trials=2, sim=FAST))
-    assert "plan: checks 2 trials" in said
-    assert printed.stderr == ""
-    assert len(json.loads(printed.stdout)) == 2
-
-
-def test_plan_with_json_still_warns_of_a_robot_below_the_ground(tmp_path: Path) -> None:
-    sunken = CONFIG + "robot: {{base_height_m: 0.5}}\n"
-    said, printed = call_without_and_with_json("plan", write_config(tmp_path, trials=2, text=sunken, sim=FAST))
-    assert "below the ground" in said
-    assert printed.stderr in said
-    assert "below the ground" in printed.stderr
 
 
 def test_submit_and_resume_with_json_print_only_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,15 +23,6 @@ def test_a_failed_trial_is_leased_again_before_new_ones() -> None:
     assert leases.lease("c") == 0
 
 
-def test_released_trials_are_leased_again_and_count_as_no_failure() -> None:
-    leases = Leases(range(5), retries=0)
-    assert [leases.lease("a") for _ in range(3)] == [0, 1, 2]
-    leases.release("a")
-    assert leases.find_held("a") == (0,)
-    assert leases.fail("a", 0, "killed") == ["a: killed"]
-    assert [leases.lease("a", others="ab"), leases.lease("b", others="ab"), leases.lease("b")] == [1, 2, 3]
-
-
 def test_a_trial_that_is_given_up_lists_all_its_failures() -> None:
     leases = Leases([7], retries=1)
     leases.lease("a")
@@ -39,26 +30,6 @@ def test_a_trial_that_is_given_up_lists_all_its_failures() -> None:
     leases.lease("b")
     assert leases.fail("b", 7, "timeout") == ["a: exit 137", "b: timeout"]
     assert leases.finished
-
-
-def test_a_trial_may_be_completed_by_the_simulation_that_held_it_before() -> None:
-    leases = Leases([0], retries=3)
-    leases.lease("a")
-    leases.fail("a", 0, "timeout")
-    leases.lease("b")
-    leases.complete("a", 0)
-    assert (leases.ended, leases.leased, leases.find_held("b")) == (1, 0, ())
-    assert not leases.is_open(0)
-
-
-def test_a_trial_may_be_completed_while_it_waits_again_or_before_it_was_leased() -> None:
-    leases = Leases([0, 1], retries=3)
-    leases.lease("a")
-    leases.fail("a", 0, "timeout")
-    for trial in (0, 1):
-        leases.complete("a", trial)
-    assert leases.finished
-    assert (leases.waiting, leases.lease("b")) == (0, None)
 
 
 def test_only_trials_of_the_plan_that_have_not_ended_are_open() -> None:
@@ -92,15 +63,6 @@ def test_a_trial_without_retries_left_waits_until_it_is_known_whether_its_simula
         assert leases.settle("a", alive=fate) == (None if fate else (0, ["a: out of sight"]))
     assert leases.finished
     assert leases.settle("a", alive=False) is None
-
-
-def test_a_trial_that_was_completed_after_all_is_not_given_up() -> None:
-    leases = Leases([0], retries=0)
-    leases.lease("a")
-    leases.fail("a", 0, "out of sight", alive=None)
-    leases.complete("a", 0)
-    assert leases.settle("a", alive=False) is None
-    assert leases.ended == 1
 
 
 def test_a_simulation_that_comes_back_is_excused_only_for_its_last_failure() -> None:
@@ -161,18 +123,6 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
             act(simulation, "complete")
             act(simulation, "restart")
     assert sorted(ended) == list(range(6))
-
-
-def test_trials_may_be_added_while_others_run() -> None:
-    leases = Leases([0, 1], retries=1)
-    assert [leases.lease("a"), leases.lease("b"), leases.lease("c")] == [0, 1, None]
-    for simulation, trial in (("a", 0), ("b", 1)):
-        leases.complete(simulation, trial)
-    assert leases.finished
-    leases.add([4, 2])
-    assert not leases.finished
-    assert leases.total == 4
-    assert [leases.lease("a"), leases.lease("b"), leases.lease("c")] == [2, 4, None]
 
 
 BOTH = ("hole", "well")

@@ -10,19 +10,21 @@ import pyarrow.parquet as pq
 from mcap.opcode import Opcode
 
 from throwcollect.dataset.mcap_file import MAGIC
-from throwcollect.dataset.mcap_reader import McapContents, McapRecord, StoredEpisode, open_mcap
+from throwcollect.dataset.mcap_reader import McapContents, McapRecord, WholeEpisode, open_mcap
 
 SHARD = "quick_00001.mcap"
 
 
-FIRST = 3
-"""The first trial of `SHARD`."""
-
-
-def find_stored(path: Path, trial: int) -> StoredEpisode:
+def find_stored(path: Path, trial: int) -> WholeEpisode:
     offset = pq.read_table(path.parent / "throws.parquet")["chunk_offset"].to_pylist()[trial]
     with open_mcap(path) as contents:
-        return contents.episode(contents.record(offset))
+        return contents.whole_episode(offset)
+
+
+def find_facts(path: Path, trial: int, text: bytes) -> int:
+    """Where a text of the metadata of an episode begins in its file."""
+    run = find_stored(path, trial).run
+    return path.read_bytes().index(text, run.end - run.metadata_length)
 
 
 def records_of(contents: McapContents) -> Iterator[McapRecord]:
@@ -35,10 +37,10 @@ def records_of(contents: McapContents) -> Iterator[McapRecord]:
         offset = record.end
 
 
-def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> McapRecord:
+def record_of(path: Path, opcode: Opcode) -> McapRecord:
+    """The first record of a kind."""
     with open_mcap(path) as contents:
-        found = [record for record in records_of(contents) if record.opcode == opcode and holding in record.data]
-    return found[-1] if last else found[0]
+        return next(each for each in records_of(contents) if each.opcode == opcode)
 
 
 def flip(path: Path, offset: int, bit: int = 1) -> None:

@@ -1,20 +1,9 @@
-"""Damages files as disks, programs and people do; run as a module, it does so a given number of times.
-
-``python -m tests.unit.dataset.mutations 20000`` damages the files of a small dataset that many times, within 4 GB of
-memory and 60 s each, and prints every exception that is not an error of throwcollect.
-"""
+"""Damages files as disks, programs and people do."""
 
 from __future__ import annotations
 
 import random
-import resource
-import shutil
-import signal
 import struct
-import sys
-import tempfile
-import traceback
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,7 +18,6 @@ from throwcollect.dataset.manifest import entry_of_file, list_promised_names, ma
 from throwcollect.dataset.mcap_reader import scan_file
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.errors import ThrowcollectError
 
 KINDS = ("flip", "delete", "repeat", "insert", "cut", "length 32", "length 64", "copy", "zero")
 LENGTHS = (0, 1, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1)
@@ -110,50 +98,3 @@ def outcomes(directory: Path, name: str) -> list[Callable[[], Any]]:
         lambda: finish(directory),
     ]
     return [lambda: list(scan_file(directory / name)), *calls] if name.endswith(".mcap") else calls
-
-
-def draw_mutations(source: random.Random) -> list[Mutation]:
-    count = source.choice((1, 1, 1, 2, 4))
-    return [
-        Mutation(source.choice(KINDS), source.random(), int(2 ** source.uniform(0, 12)), source.getrandbits(32))
-        for _ in range(count)
-    ]
-
-
-def _hang(*_: object) -> None:
-    raise TimeoutError("took more than a minute")
-
-
-def main(count: int, seed: int) -> int:
-    """Damage files `count` times; returns how often an exception was not an error of throwcollect."""
-    from tests.unit.dataset.conftest import Collection
-
-    warnings.simplefilter("error")
-    signal.signal(signal.SIGALRM, _hang)
-    bad = 0
-    with tempfile.TemporaryDirectory() as scratch:
-        original = Collection(SETTINGS).collect(Path(scratch) / "original")
-        resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
-        names = sorted(path.name for path in original.iterdir() if path.name not in ("README.md", "provenance.json"))
-        for number in range(seed, seed + count):
-            source = random.Random(number)
-            name, mutations = source.choice(names), draw_mutations(source)
-            directory = Path(shutil.copytree(original, Path(scratch) / "damaged"))
-            (directory / name).write_bytes(mutate((original / name).read_bytes(), mutations))
-            for call in outcomes(directory, name):
-                signal.alarm(60)
-                try:
-                    call()
-                except ThrowcollectError as error:
-                    str(error)
-                except Exception:  # noqa: BLE001 - any other exception is what this looks for
-                    bad += 1
-                    print(f"{number}: {name}: {mutations}", traceback.format_exc(), sep="\n", flush=True)
-                signal.alarm(0)
-            shutil.rmtree(directory)
-    print(f"{count} damages, {bad} bad ends, {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024} MB")
-    return bad
-
-
-if __name__ == "__main__":
-    sys.exit(bool(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0)))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import pickle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import throwcollect
@@ -67,12 +65,3 @@ def test_a_joint_is_found_by_its_name(loaded: Dataset) -> None:
     assert "arm_right_4" not in joints
     with pytest.raises(KeyError, match=r"no joint 'arm_right_4'; there are .*arm_right_4_joint"):
         joints["arm_right_4"]
-
-
-def test_a_pickled_dataset_still_has_its_throws(loaded: Dataset) -> None:
-    assert pickle.loads(pickle.dumps(loaded))[0].trial == 0  # noqa: S301
-
-
-def test_a_number_of_numpy_is_a_position_in_a_dataset(loaded: Dataset) -> None:
-    assert loaded[np.int64(-1)].trial == 6
-    assert isinstance(loaded.to_pandas().mean(numeric_only=True), pd.Series)

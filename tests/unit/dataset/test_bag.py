@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import re
 import shlex
-import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -13,10 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Chunk
-from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -124,42 +119,6 @@ def test_latched_topics_are_repeated_at_the_start_of_each_file(full: Path) -> No
         assert list(summary.chunk_indexes[0].message_index_offsets) == [1, 2]
 
 
-def test_seeking_by_time_and_topic_finds_exactly_those_messages(full: Path) -> None:
-    with (full / "quick_00000.mcap").open("rb") as file:
-        reader = make_reader(file, validate_crcs=True)
-        found = list(reader.iter_messages(["/ball/odometry"], starting_at=32_000_000_000, ending_before=32_100_000_000))
-    assert [message.log_time for _, _, message in found] == list(range(32_000_000_000, 32_100_000_000, 4_000_000))
-    assert [message.sequence for _, _, message in found] == list(range(25))
-
-
-def test_chunk_indexes_list_one_chunk_an_episode_and_point_at_its_message_indexes(
-    full: Path, make_collection: Any
-) -> None:
-    collection = make_collection({"trials": 4})
-    stamps = [collection.episode(trial).samples().stamps_ns for trial in range(4)]
-    spans = [(each[0], each[-1]) for each in stamps]
-    for path, expected in zip(sorted(full.glob("*.mcap")), (spans[:3], spans[3:]), strict=True):
-        data = path.read_bytes()
-        summary = make_reader(io.BytesIO(data)).get_summary()
-        assert summary is not None
-        assert summary.statistics is not None
-        # However long an episode is, it is one chunk; the first chunk has the latched messages.
-        first, *episodes = summary.chunk_indexes
-        assert (first.message_start_time, first.message_end_time) == (expected[0][0], expected[0][0])
-        assert [(each.message_start_time, each.message_end_time) for each in episodes] == expected
-        stored = sum(isinstance(each, Chunk) for each in StreamReader(io.BytesIO(data), emit_chunks=True).records)
-        assert stored == summary.statistics.chunk_count == 1 + len(expected)
-        for chunk in summary.chunk_indexes:
-            assert data[chunk.chunk_start_offset] == Opcode.CHUNK
-            end = chunk.chunk_start_offset + chunk.chunk_length
-            assert min(chunk.message_index_offsets.values()) == end
-            for channel, offset in chunk.message_index_offsets.items():
-                opcode, length, found = struct.unpack_from("<BQH", data, offset)
-                assert (opcode, found) == (Opcode.MESSAGE_INDEX, channel)
-                end = max(end, offset + 9 + length)
-            assert end == chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
-
-
 def test_recordings_follow_the_conventions_of_the_mcap_plugin_of_rosbag2(full: Path) -> None:
     for path in full.glob("*.mcap"):
         with path.open("rb") as file:
@@ -181,55 +140,6 @@ def test_recordings_follow_the_conventions_of_the_mcap_plugin_of_rosbag2(full: P
         assert copy["relative_file_paths"] == [path.name]
         assert summary.statistics is not None
         assert copy["message_count"] == summary.statistics.message_count
-
-
-def test_metadata_has_the_fields_of_version_9_in_the_order_of_rosbag2(full: Path) -> None:
-    """As `rosbag2_storage/yaml.hpp` encodes BagMetadata."""
-    document = YAML(typ="safe").load((full / "metadata.yaml").read_text())
-    assert list(document) == ["rosbag2_bagfile_information"]
-    bag = document["rosbag2_bagfile_information"]
-    assert list(bag) == [
-        "version",
-        "storage_identifier",
-        "duration",
-        "starting_time",
-        "message_count",
-        "topics_with_message_count",
-        "compression_format",
-        "compression_mode",
-        "relative_file_paths",
-        "files",
-        "custom_data",
-        "ros_distro",
-    ]
-    assert (bag["version"], bag["storage_identifier"]) == (9, "mcap")
-    assert (bag["compression_format"], bag["compression_mode"]) == ("", "")
-    for each in bag["topics_with_message_count"]:
-        assert list(each["topic_metadata"]) == [
-            "name",
-            "type",
-            "serialization_format",
-            "offered_qos_profiles",
-            "type_description_hash",
-        ]
-        assert list(each["topic_metadata"]["offered_qos_profiles"][0]) == [
-            "history",
-            "depth",
-            "reliability",
-            "durability",
-            "deadline",
-            "lifespan",
-            "liveliness",
-            "liveliness_lease_duration",
-            "avoid_ros_namespace_conventions",
-        ]
-    assert list(bag["files"][0]) == ["path", "starting_time", "duration", "message_count"]
-    assert (
-        [each["path"] for each in bag["files"]]
-        == bag["relative_file_paths"]
-        == ["quick_00000.mcap", "quick_00001.mcap"]
-    )
-    assert all(isinstance(value, str) for value in bag["custom_data"].values())
 
 
 def test_rosbags_reads_counts_times_and_qos_as_the_metadata_says(full: Path) -> None:

@@ -14,7 +14,6 @@ from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, write
 
 from throwcollect import fit, verify_dataset
 from throwcollect.config.loader import load
-from throwcollect.dataset.carried_robot import pack_robot, unpack_robot
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials, merge
@@ -152,11 +151,6 @@ def test_other_motions_are_found_although_the_manifest_has_them(carrying: Path, 
     # What this process has read is found by its digest, so another one is asked for.
     with pytest.raises(ConfigError, match=r"its motions are not those of task\.trajectory\.sha256"):
         motions_of(other.model_copy(update={"sha256": "0" * 64}), robot_of(config))
-
-
-def test_motions_pass_as_a_text_to_another_machine(carrying: Path, tmp_path: Path) -> None:
-    unpack_robot(pack_robot(Dataset.open(carrying).config), tmp_path)
-    assert (tmp_path / "motions.parquet").read_bytes() == (carrying / "motions.parquet").read_bytes()
 
 
 def test_no_model_is_fitted_to_motions_of_a_file(carrying: Path) -> None:

@@ -31,7 +31,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("reader", READERS)
 def test_readers_of_a_damaged_episode_name_the_dataset_and_the_trial(reader: str, dataset: Path) -> None:
-    flip(dataset / SHARD, find_stored(dataset / SHARD, 4).offset + 2000)
+    flip(dataset / SHARD, find_stored(dataset / SHARD, 4).run.offset + 2000)
     with pytest.raises(DatasetError, match=rf"^{dataset}: trial 4: chunk: ") as found:
         READERS[reader](dataset)
     assert found.value.hint == f"throwcollect dataset verify {dataset}"

@@ -13,7 +13,6 @@ from tests.unit.dataset.conftest import Collection
 
 import throwcollect
 from throwcollect.config.loader import load
-from throwcollect.dataset import provenance
 from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE, Provenance, read_provenance
 from throwcollect.dataset.reader import Dataset
@@ -83,10 +82,3 @@ def test_provenance_names_revision_image_and_robot_description(monkeypatch: pyte
     assert read.image is None
     monkeypatch.setenv(IMAGE_VARIABLE, "sha256:12ab")
     assert Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="").image == "sha256:12ab"
-
-
-def test_provenance_has_no_revision_outside_of_a_clone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "site-packages" / "throwcollect" / "dataset" / "x.py"))
-    # The revision of this clone is cached: call the function without its cache.
-    monkeypatch.setattr(provenance, "_read_revision", provenance._read_revision.__wrapped__)
-    assert Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="").revision is None

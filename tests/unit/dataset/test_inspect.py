@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from throwcollect.cli.dataset.info import describe, show_info
-from throwcollect.dataset.creation import create
+from throwcollect.cli.dataset.info import show_info
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.episode.episode_message import header_to_json
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
@@ -55,26 +54,6 @@ def test_the_landing_area_of_info_is_that_of_throws_that_landed(collection: Any,
     assert found.landing["x_m"][1] == max(each.position[0] for each in others)
 
 
-def test_info_of_a_dataset_in_which_no_ball_landed_has_no_landing_whatever_the_reason(
-    collection: Any, tmp_path: Path
-) -> None:
-    """A trial without an episode differs from an episode without a landing, whose other columns are filled."""
-
-    def fail(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
-        # The ball of some stays in the spoon; that of the others leaves it and still flies when time is over.
-        contact = header.contacts[0] if header.trial % 2 else replace(header.contacts[0], end_ns=None)
-        flying = len(samples) - 25
-        return samples[:flying], replace(header, end_reason="timeout", contacts=(contact,), samples=flying)
-
-    collection.refuse(5, "too fast")
-    found = info(collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[4], change=fail))
-    assert found.outcomes == {"not_released": 3, "timeout": 2, "lost": 1, "refused": 1}
-    assert (found.episodes, found.shards, found.landing) == (5, 3, None)
-    assert "landing   no ball landed" in describe(found).splitlines()
-    lost = info(collection.collect(tmp_path / "lost", [0, 1, 2, 3, 4, 6], lost=range(7)))
-    assert (lost.episodes, lost.shards, lost.landing, lost.outcomes) == (0, 0, None, {"lost": 6, "refused": 1})
-
-
 def test_the_digest_of_a_dataset_is_that_of_all_episodes_in_order(collection: Any, dataset: Path) -> None:
     expected = hashlib.sha256()
     for trial in range(7):
@@ -96,14 +75,6 @@ def test_a_digest_that_differs_from_the_metadata_is_an_error(dataset: Path) -> N
     path.write_text(path.read_text().replace(info(dataset).digest, "0" * 64))
     with pytest.raises(DatasetError, match="digest"):
         digest(dataset)
-
-
-def test_info_distinguishes_an_unfinished_dataset_from_no_dataset(collection: Any, tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="holds no dataset"):
-        info(tmp_path)
-    create(tmp_path / "dataset", collection.plan)
-    with pytest.raises(DatasetError, match="the dataset is not finished"):
-        info(tmp_path / "dataset")
 
 
 def test_info_prints_the_summary_before_it_reports_a_missing_recording(

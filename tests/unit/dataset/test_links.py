@@ -27,7 +27,7 @@ UNFINISHED = (
     "metadata.yaml.new",
     "quick_00000.mcap.new",
 )
-REPLACED = ("plan.parquet", "throws.parquet", "metadata.yaml", "README.md", "provenance.json", "config.yaml")
+REPLACED = ("plan.parquet", "throws.parquet", "README.md", "config.yaml")
 REFUSED = ("quick_00000.mcap", BEGUN, "logs", "logs/journal.jsonl")
 
 

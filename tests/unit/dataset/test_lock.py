@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import fcntl
 import subprocess
 import sys
 from collections.abc import Callable
@@ -73,16 +71,6 @@ def test_two_collections_cannot_be_prepared_in_one_directory(tmp_path: Path) -> 
     assert list((tmp_path / "dataset").iterdir()) == []
 
 
-def test_a_link_to_a_locked_directory_is_locked_too(begun: Path, tmp_path: Path) -> None:
-    (tmp_path / "link").symlink_to(begun)
-    with (
-        hold_lock(begun, alone=False),
-        pytest.raises(DatasetError, match="link: another process"),
-        hold_lock(tmp_path / "link"),
-    ):
-        pass
-
-
 def test_a_lock_waits_for_a_killed_process_to_end(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("throwcollect.dataset.lock.PATIENCE_S", 60.0)
     code = "import fcntl, os, sys, time; fcntl.flock(os.open(sys.argv[1], 0), 1); print(flush=True); time.sleep(60)"
@@ -94,37 +82,12 @@ def test_a_lock_waits_for_a_killed_process_to_end(begun: Path, monkeypatch: pyte
             pass
 
 
-def test_a_released_lock_leaves_no_file(tmp_path: Path) -> None:
-    with hold_lock(tmp_path):
-        pass
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_missing_directory_cannot_be_locked(tmp_path: Path) -> None:
-    with (
-        pytest.raises(DatasetError, match=r"gone: cannot be read: No such file"),
-        hold_lock(tmp_path / "gone", alone=False),
-    ):
-        pass
-
-
 @pytest.mark.parametrize("alone", [True, False])
 def test_is_locked_is_true_only_while_a_lock_is_held(begun: Path, alone: bool) -> None:
     assert not is_locked(begun)
     with hold_lock(begun, alone=alone):
         assert is_locked(begun)
     assert not is_locked(begun)
-
-
-def test_a_directory_counts_as_unlocked_on_a_file_system_without_locks(
-    begun: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_: int) -> None:
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    assert not is_locked(begun)
-    assert not is_locked(begun / "gone")
 
 
 def test_a_collection_begins_while_another_process_briefly_checks_the_lock(

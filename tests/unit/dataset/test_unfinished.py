@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 import throwcollect
-from throwcollect import progress_log
 from throwcollect.dataset import reader, recovery
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import info
@@ -51,18 +50,6 @@ def test_an_unfinished_dataset_has_rows_of_the_trials_that_have_ended(
         _ = dataset.digest
 
 
-def test_loading_a_large_unfinished_dataset_tells_its_progress(
-    collection: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(progress_log, "_EVERY_S", 0.0)
-    with (
-        pytest.warns(throwcollect.UnfinishedDatasetWarning),
-        caplog.at_level("INFO", logger=progress_log.LOGGER),
-    ):
-        throwcollect.load(begin(collection, tmp_path / "dataset", [0, 1, 2]))
-    assert caplog.messages == ["1 of 3 recordings looked through", "2 of 3 recordings looked through"]
-
-
 def test_a_dataset_that_is_being_collected_advises_wait_and_not_resume(collection: Any, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     create(directory, collection.plan)
@@ -90,14 +77,6 @@ def test_an_incomplete_last_episode_of_an_unfinished_dataset_is_left_out(collect
         assert [throw.trial for throw in throwcollect.load(directory)] == [0]
 
 
-def test_episodes_of_finished_and_unfinished_files_of_a_shard_are_all_found(collection: Any, tmp_path: Path) -> None:
-    directory = begin(collection, tmp_path / "dataset", [3])
-    other = begin(collection, tmp_path / "other", [4])
-    (other / "quick_00001.mcap.part").rename(directory / "quick_00001.mcap")
-    with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 2 of 7 trials"):
-        assert [throw.trial for throw in throwcollect.load(directory).recorded] == [3, 4]
-
-
 def test_a_shard_that_finishes_while_the_dataset_is_loaded_is_included(
     collection: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,14 +94,3 @@ def test_a_shard_that_finishes_while_the_dataset_is_loaded_is_included(
         with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 3 of 7 trials"):
             dataset = throwcollect.load(tmp_path / "dataset")
         assert all(len(throw.ball) for throw in dataset)
-
-
-def test_an_unfinished_dataset_without_episodes_has_no_throws(collection: Any, tmp_path: Path) -> None:
-    create(tmp_path / "dataset", collection.plan)
-    with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 0 of 7 trials"):
-        assert len(throwcollect.load(tmp_path / "dataset")) == 0
-
-
-def test_a_directory_without_a_plan_is_no_dataset(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="holds no dataset"):
-        throwcollect.load(tmp_path)

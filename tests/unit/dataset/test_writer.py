@@ -12,7 +12,6 @@ import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import create_and_open
 
-from throwcollect.config.loader import load
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
@@ -56,18 +55,6 @@ def test_keys_under_run_do_not_change_the_files(make_collection: Any, tmp_path: 
     one = files_of(make_collection({"run": {"simulations": 1}}).collect(tmp_path / "one"))
     other = files_of(make_collection({"run": {"simulations": 9, "retries": 0}}).collect(tmp_path / "other"))
     assert {name for name in one if one[name] != other[name]} <= MAY_DIFFER
-
-
-def test_a_shard_has_a_temporary_name_until_its_last_trial_is_in(collection: Any, tmp_path: Path) -> None:
-    directory = tmp_path / "dataset"
-    writer = create_and_open(directory, collection.plan)
-    collection.fill(writer, [1, 2])
-    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap.part"]
-    collection.fill(writer, [0])
-    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap"]
-    collection.fill(writer, [5])
-    assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap", "quick_00001.mcap.part"]
-    writer.close()
 
 
 def test_a_shard_without_any_episode_leaves_no_file(collection: Any, tmp_path: Path) -> None:
@@ -146,29 +133,11 @@ def test_rows_hold_the_results_of_throws_and_columns_have_descriptions(collectio
     assert all(field.metadata[b"description"].endswith(b".") for field in table.schema)
 
 
-def test_the_configuration_in_the_dataset_loads_back_equal(collection: Any, dataset: Path) -> None:
-    assert load(dataset / "config.yaml") == collection.config
-
-
 def test_a_dataset_cannot_be_created_in_a_directory_with_files(collection: Any, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(ConfigError, match=r"holds notes\.txt"):
         create(tmp_path, collection.plan)
     assert files_of(tmp_path) == {"notes.txt": b"mine"}
-
-
-def test_a_dataset_cannot_be_created_below_a_file(collection: Any, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ConfigError, match="cannot be used as directory of a dataset"):
-        create(tmp_path / "file" / "dataset", collection.plan)
-
-
-def test_a_dataset_cannot_be_created_at_a_link_that_leads_nowhere(collection: Any, tmp_path: Path) -> None:
-    link = tmp_path / "link"
-    link.symlink_to("nowhere")
-    with pytest.raises(ConfigError, match="link: cannot be used as directory of a dataset"):
-        create(link, collection.plan)
-    assert list(tmp_path.iterdir()) == [link]
 
 
 def test_a_dataset_that_cannot_be_written_leaves_no_directory(collection: Any, tmp_path: Path) -> None:
@@ -195,17 +164,6 @@ def test_an_episode_that_does_not_fit_on_the_disk_leaves_the_shard_as_it_was(
     assert part.read_bytes() == before
     # When there is space again, the failure has no effect.
     collection.fill(writer, range(1, 7))
-    writer.finish(wall_s=1.0)
-    assert recordings_of(tmp_path / "dataset") == recordings_of(collected)
-
-
-def test_collecting_can_go_on_after_the_first_episode_did_not_fit_on_the_disk(
-    collection: Any, collected: Path, tmp_path: Path
-) -> None:
-    writer = create_and_open(tmp_path / "dataset", collection.plan)
-    with file_size_limit(5000), pytest.raises(DatasetError, match="cannot be written: File too large"):
-        collection.fill(writer, [0])
-    collection.fill(writer, range(7))
     writer.finish(wall_s=1.0)
     assert recordings_of(tmp_path / "dataset") == recordings_of(collected)
 
@@ -247,18 +205,6 @@ def test_the_writer_refuses_second_refused_and_unknown_episodes(collection: Any,
     writer.close()
 
 
-def test_the_writer_refuses_a_damaged_episode(collection: Any, tmp_path: Path) -> None:
-    writer = create_and_open(tmp_path / "dataset", collection.plan)
-    whole = collection.episode(0)
-    chunk = whole.chunk
-    damaged = Episode(whole.header, replace(chunk, crc=chunk.crc ^ 1, indexes={}))
-    with pytest.raises(DatasetError, match="CRC differs"):
-        writer.append(damaged, collection.result(whole))
-    assert not list((tmp_path / "dataset").glob("*.part"))
-    writer.append(whole, collection.result(whole))
-    writer.close()
-
-
 def test_a_dataset_with_missing_trials_is_not_finished(collection: Any, tmp_path: Path) -> None:
     writer = create_and_open(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0, 1, 3, 4, 5, 6])
@@ -266,27 +212,3 @@ def test_a_dataset_with_missing_trials_is_not_finished(collection: Any, tmp_path
         writer.finish(wall_s=1.0)
     assert not (tmp_path / "dataset" / "metadata.yaml").exists()
     writer.close()
-
-
-def test_a_dataset_that_was_created_can_be_filled_by_another_writer(collection: Any, tmp_path: Path) -> None:
-    create(tmp_path / "dataset", collection.plan)
-    writer = DatasetWriter.open(tmp_path / "dataset")
-    assert writer.plan == collection.plan
-    collection.fill(writer, range(7))
-    writer.finish(wall_s=1.0)
-    assert verify(tmp_path / "dataset") == []
-
-
-def test_a_writer_cannot_open_a_directory_without_a_dataset(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"holds no config\.yaml"):
-        DatasetWriter.open(tmp_path)
-
-
-def test_a_dataset_of_more_files_than_can_be_read_is_not_created(
-    make_collection: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("throwcollect.dataset.creation.MOST_FILES", 2)
-    collection = make_collection({"trials": 5, "record": {"trials_per_shard": 2}})
-    with pytest.raises(ConfigError, match="5 trials would be in 3 files"):
-        create(tmp_path / "dataset", collection.plan)
-    assert not (tmp_path / "dataset").exists()

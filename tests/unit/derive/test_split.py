@@ -99,9 +99,6 @@ def test_cells_can_be_defined_by_any_expression(some: Path) -> None:
     ("fractions", "message"),
     [
         ("train=0.8,test=0.1", "should add up to 1, add up to 0.9"),
-        ("train=1", "should name two parts or more"),
-        ("train=0.5,train=0.5", "names a part twice"),
-        ("train=1,test=0", "should be above 0"),
         ("train=0.5,../test=0.5", "'../test' should be up to 64 lower-case letters"),
         ("train=0.5,test", "should be a part and its share, such as train=0.8, got 'test'"),
         ("train=0.999999,test=0.000001", "test would get none of the 12 trials"),
@@ -120,21 +117,12 @@ def test_a_split_by_wrong_fractions_is_refused_with_a_reason(
     [
         ("landing_x_m", "should be an expression and the width of cells, such as landing_x_m=0.05, got 'landing_x_m'"),
         ("landing_x_m=0", "the width of cells should be above 0"),
-        (f"landing_x_m=0.{'0' * 400}1", "the width of cells should be above 0"),
-        (f"landing_x_m={'1' * 400}", "should be an expression and the width of cells, such as landing_x_m=0.05"),
-        (f"landing_x_m={'1' * 5000}", "should be an expression and the width of cells, such as landing_x_m=0.05"),
-        ("landing_x=0.1", ".* no column landing_x; did you mean .landing_x_m"),
         ("outcome=1", "'outcome' is no number, but string"),
     ],
 )
 def test_a_split_by_wrong_cells_is_refused_with_a_reason(some: Path, tmp_path: Path, axis: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^cells: {message}"):
         split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])
-
-
-def test_a_split_without_axes_of_cells_is_refused(some: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"^cells: the list is empty\n  expected: .* landing_x_m=0\.05"):
-        split(some, tmp_path / "parts", fractions=HALVES, cells=[])
 
 
 def test_shares_can_be_given_as_a_mapping(some: Path) -> None:

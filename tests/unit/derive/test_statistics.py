@@ -1,5 +1,4 @@
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from tests.unit.dataset.conftest import Collection
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.statistics import statistics
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.errors import DatasetError
 from throwcollect.robots.talos import TALOS
 
 
@@ -33,17 +31,6 @@ def test_statistics_of_signals_cover_the_samples_of_all_episodes(collected: Path
             assert signal.std == pytest.approx(column.std(), rel=1e-9, abs=1e-12)
     # A program that normalises recognises a constant signal by a deviation of exactly 0.
     assert found.signals["position_rad"]["leg_left_4_joint"].std == 0
-
-
-def test_statistics_name_the_trial_of_a_damaged_episode(collected: Path, tmp_path: Path) -> None:
-    directory = Path(shutil.copytree(collected, tmp_path / "damaged"))
-    row = Dataset.open(directory).throws.slice(3, 1).to_pylist()[0]
-    shard = directory / row["shard"]
-    data = bytearray(shard.read_bytes())
-    data[row["chunk_offset"] + 200] ^= 1
-    shard.write_bytes(data)
-    with pytest.raises(DatasetError, match=r"damaged: trial 3: chunk: "):
-        statistics(directory)
 
 
 def test_statistics_of_columns_leave_out_empty_cells(collection: Collection, tmp_path: Path) -> None:

@@ -222,36 +222,6 @@ def test_the_clearance_check_agrees_with_the_distances_of_all_pairs():
     assert found > 10
 
 
-class Unknowing:
-    """Knows no posture to be clear, so that all links are checked in every posture."""
-
-    def find_unknown(self, postures):
-        return np.ones(len(postures), bool)
-
-    look_at_first = find_unknown
-
-
-def test_skipping_postures_near_clear_ones_misses_no_approach():
-    """2,400 postures, many of which collide: the result is that of a check of all links in every posture."""
-    model = joint_model(TALOS)
-    quick, thorough = (Clearance(TALOS, model, tool_of(Config())) for _ in range(2))
-    thorough._clear = [Unknowing()]
-    draw, limits = np.random.default_rng(5), joint_limits(TALOS)
-    rest = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])
-    columns = [JOINTS.index(joint) for joint in ("torso_1_joint", *(f"arm_right_{n}_joint" for n in range(1, 8)))]
-    order = [JOINTS.index(name) for name in list(model.names)[1:]]
-    approaches = []
-    for number in range(80):
-        # The same few joints again and again, as in a sweep, or all of them at random.
-        moved = columns if number % 4 == 0 else [columns[1], columns[2], columns[4]]
-        goal = draw.uniform(limits.lower[moved], limits.upper[moved])
-        motion = np.tile(rest, (30, 1))
-        motion[:, moved] += np.linspace(0, draw.uniform(0.1, 0.7), 30)[:, None] * (goal - rest[moved])
-        approaches.append(thorough.first_approach(motion[:, order]))
-        assert quick.first_approach(motion[:, order]) == approaches[-1]
-    assert 0.3 < np.mean([approach is None for approach in approaches]) < 0.9
-
-
 def test_dynamics_of_only_the_free_joints_give_the_same_refusals():
     feasibility, whole = Feasibility(Config()), Feasibility(Config())
     whole._dynamics_of_free_joints = lambda _: whole._dynamics

@@ -28,40 +28,23 @@ CONFIG = Config.model_validate({"robot": {"locked": "none"}})
 
 REFUSED = {
     "anymal_c_simple_description/urdf/anymal": "a joint has the name of a link: LF_HAA",
-    "b1_description/urdf/b1-z1": "a joint has the name of a link: gripperStator",
     "baxter_description/urdf/baxter": r"l_gripper_r_finger_joint \(mimics l_gripper_l_finger_joint\)",
     "centauro_description/urdf/centauro": "link pelvis: .* has no usable convex hull: .*Too many neighbors",
     "double_pendulum_description/urdf/double_pendulum_continuous": r"joint1 \(continuous\), joint2 \(continuous\)",
-    "human_description/robots/human": "link left_upperleg_virtual, which left_hip_Z moves, has no mass",
     "icub_description/robots/icub": "r_hip_1.* has principal moments of inertia of 0, 0 and 0 kg m², which no body",
-    "kinova_description/robots/kinova": r"no controller of .*j2s6s200_joint_1 \(continuous\)",
     "panda_description/urdf/panda": r"panda_finger_joint1 \(prismatic\), panda_finger_joint2 \(mimics",
-    "pr2_description/urdf/pr2": r"torso_lift_joint \(prismatic\), r_forearm_roll_joint \(continuous\)",
     "romeo_description/urdf/romeo": "joints of controllers should be revolute; LFinger12 mimics LHand",
-    "romeo_description/urdf/romeo_small": "RShoulderYawLink.* which no body can have",
-    "so_arm_description/urdf/so100": "a joint has the name of a link: gripper",
-    "tiago_description/robots/tiago": r"wheel_left_joint \(continuous\), torso_lift_joint \(prismatic\)",
-    "tiago_pro_description/robots/tiago_pro": r"wheel_front_right_joint \(continuous\)",
     "ur_description/urdf/ur3": "has no links",
-    "z1_description/urdf/z1": "a joint has the name of a link: gripperStator",
 }
 """What is wrong with those robots of example-robot-data that are refused."""
 
 EQUAL = [
-    "a1_description/urdf/a1",
     "alexander_description/urdf/alexander_v1.lowerBodyOnly",
     "allegro_hand_description/urdf/allegro_left_hand",
-    "asr_twodof_description/urdf/TwoDofs",
-    "b1_description/urdf/b1",
-    "bolt_description/robots/bolt",
     "double_pendulum_description/urdf/double_pendulum",
-    "finger_edu_description/robots/finger_edu",
-    "go1_description/urdf/go1",
     "hextilt_description/urdf/hextilt_flying_arm_5",
     "hyq_description/robots/hyq_no_sensors",
-    "iris_description/robots/iris",
     "simple_humanoid_description/urdf/simple_humanoid",
-    "solo_description/robots/solo",
     "talos_data/robots/talos_left_arm",
     "ur_description/urdf/ur5_robot",
 ]
@@ -149,9 +132,7 @@ def loaded() -> tuple[Engine, Scene]:
         ({"inertia": np.zeros((3, 3))}, "principal moments of inertia of"),
         ({"shapes": 1}, "1 of its 2 collision shapes"),
         ({"box": ((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))}, "collision shapes of another extent"),
-        ({"box": ((-9.0, -9.0, -9.0), (9.0, 9.0, 9.0))}, "collision shapes of another extent"),
         ({"axis": np.array([0.0, 0.0, 1.0])}, "another joint axis"),
-        ({"axis": None}, "another joint axis"),
         ({"range": (-1.0, 1.0)}, "other limits of its joint"),
     ],
 )

@@ -41,11 +41,8 @@ def test_the_unchanged_description_is_accepted(tmp_path: Path) -> None:
     ("kind", "old", "new", "said"),
     [
         ("urdf", '<mass value="2"/>', '<mass value="x"/>', "value of <mass> should be a finite number, is 'x'"),
-        ("urdf", 'xyz="-0.5 0 0"', 'xyz="-0.5 0"', "xyz of <origin> should be 3 finite numbers, is '-0.5 0'"),
         ("srdf", 'value="0.0"', 'value="nan"', "group_state rest: the angle of shoulder_joint is not finite"),
         ("urdf", 'name="forearm_link"', 'name="upper_arm_link"', "link upper_arm_link is there twice"),
-        ("urdf", '<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "joint shoulder_joint: its axis 0 0 0 has no direction"),
-        ("urdf", '<parent link="base_link"/>', "", "joint shoulder_joint: <joint> without <parent>"),
         ("urdf", "</robot>", "<xacro:if/></robot>", "not well-formed XML: unbound prefix"),
     ],
 )
@@ -76,10 +73,7 @@ def change_upper_arm(directory: Path, inertial: str, shape: str = "") -> Robot:
     ("inertial", "said"),
     [
         ("", "upper_arm_link, which shoulder_joint moves, has no mass"),
-        ("<inertial><mass value='2'/></inertial>", "link upper_arm_link: <inertial> without <inertia>"),
-        (f"<inertial>{INERTIA.format(-0.1, 0.02, 0.02)}</inertial>", "of -0.1, 0.02 and 0.02 kg m², which no body"),
         (f"<inertial>{INERTIA.format(0.01, 0.01, 0.03)}</inertial>", "of 0.01, 0.01 and 0.03 kg m², which no body"),
-        (f"<inertial>{INERTIA.format(0, 0, 0)}</inertial>", "of 0, 0 and 0 kg m², which no body"),
     ],
 )
 def test_a_moving_link_without_a_possible_inertia_is_refused(inertial: str, said: str, tmp_path: Path) -> None:
@@ -87,30 +81,15 @@ def test_a_moving_link_without_a_possible_inertia_is_refused(inertial: str, said
         joint_model(change_upper_arm(tmp_path, inertial))
 
 
-def test_a_flat_body_has_the_largest_moment_that_there_can_be(tmp_path: Path) -> None:
-    joint_model(change_upper_arm(tmp_path, f"<inertial>{INERTIA.format(0.01, 0.02, 0.03)}</inertial>"))
-
-
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
         ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="continuous"', "elbow_joint is continuous"),
-        ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="hinge"', "unknown type 'hinge'"),
         ('name="hand_joint" type="fixed"', 'name="hand_joint" type="continuous"', r"hand_joint \(continuous\)"),
         (
             'name="elbow_joint" type="revolute">',
             'name="elbow_joint" type="revolute"><mimic joint="x"/>',
             "elbow_joint mimics x",
-        ),
-        (
-            'name="hand_joint" type="fixed">',
-            'name="hand_joint" type="continuous"><mimic joint="elbow_joint"/>',
-            r"no controller of the arm: hand_joint \(mimics elbow_joint\)",
-        ),
-        (
-            'name="hand_joint" type="fixed">',
-            'name="hand_joint" type="fixed"><mimic joint="elbow_joint" multiplier="x"/>',
-            "joint hand_joint: multiplier of <mimic> should be a finite number, is 'x'",
         ),
     ],
 )
@@ -138,25 +117,11 @@ def add_mesh(directory: Path, url: str, scale: str = "1 1 1") -> Robot:
 
 
 @pytest.mark.parametrize(
-    "url", ["file://{}/arm.stl", "package://arm.stl", "package:///arm.stl", "arm.stl", "{}/arm.stl"]
-)
-def test_a_mesh_is_found_by_every_kind_of_url_and_read_as_text(url: str, tmp_path: Path) -> None:
-    write_text_stl(tmp_path / "arm.stl", HULL)
-    arm = add_mesh(tmp_path, url.format(tmp_path))
-    clearance = Clearance(arm, joint_model(arm), tool_of(Config()))
-    assert arm.description.model.meshes[0].triangles.tolist() == HULL.astype(np.float32).tolist()
-    assert "upper_arm_link_0" in [shape.name for shape in clearance.geometry.geometryObjects]
-
-
-@pytest.mark.parametrize(
     ("url", "said"),
     [
         ("arm.ply", r"link upper_arm_link: .*arm.ply: collision meshes of this format cannot be read"),
         ("none.stl", r"link upper_arm_link: .*none.stl: .*No such file"),
-        ("http://x/arm.stl", "link upper_arm_link: 'http://x/arm.stl': unknown kind of URL"),
         ("flat.stl", "link upper_arm_link: .*flat.stl: the mesh is flat"),
-        ("broken.dae", "link upper_arm_link: .*broken.dae: cannot be read as a mesh"),
-        ("", "link upper_arm_link: a mesh should have a filename"),
     ],
 )
 def test_a_mesh_that_cannot_be_used_is_refused_with_its_link(
@@ -164,7 +129,6 @@ def test_a_mesh_that_cannot_be_used_is_refused_with_its_link(
 ) -> None:
     write_text_stl(tmp_path / "flat.stl", HULL * (1, 1, 0))
     (tmp_path / "arm.ply").write_text("ply")
-    (tmp_path / "broken.dae").write_text("<COLLADA/>")
     arm = add_mesh(tmp_path, url)
     with pytest.raises(ConfigError, match=said):
         Clearance(arm, joint_model(arm), tool_of(Config()))

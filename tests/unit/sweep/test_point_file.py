@@ -102,11 +102,6 @@ def test_problems_of_a_csv_file_name_their_lines(csv, content, messages):
     assert problems(csv(content)) == messages
 
 
-def test_problems_of_a_long_file_are_not_listed_in_full(csv):
-    assert len(problems(csv(HEADER + "1,x\n" + "x,y\n" * 1000))) == 20
-    assert len(problems(csv(HEADER + "9,9\n" * 1000))) == 20
-
-
 @pytest.mark.parametrize(
     ("columns", "messages"),
     [
@@ -173,10 +168,6 @@ def test_targets_survive_the_way_through_a_parquet_file(csv, tmp_path):
             "task.duration_s,target_x_m\n1,1.4\n",
             ["list.csv:1: target_y_m: is missing beside target_x_m"],
         ),
-        (
-            "task.duration_s,target_x_cm,target_x_m,target_y_m\n1,1,1,1\n",
-            ["list.csv:1: target_x_cm: the task throw has no such target; did you mean 'target_x_m'?"],
-        ),
         ("target_x_m,target_y_m\n1,1\n", ["list.csv: has no column of a key, only targets"]),
         (
             TARGETED + "1,-0.2,1.4\n1,-0.2,\n1,,1.4\n",
@@ -184,18 +175,6 @@ def test_targets_survive_the_way_through_a_parquet_file(csv, tmp_path):
                 "list.csv:3: target_x_m: is missing beside target_y_m",
                 "list.csv:4: target_y_m: is missing beside target_x_m",
             ],
-        ),
-        (
-            TARGETED + "1,nan,1.4\n1,far,inf\n",
-            [
-                "list.csv:2: target_y_m: should be a number, got 'nan'",
-                "list.csv:3: target_y_m: should be a number, got 'far'",
-                "list.csv:3: target_x_m: should be a number, got 'inf'",
-            ],
-        ),
-        (
-            TARGETED + "1,-0.2,1.4\n1,1e308,1.4\n",
-            ["list.csv:3: target_y_m: should be a number from -1e+06 to 1e+06, got 1e+308"],
         ),
     ],
 )

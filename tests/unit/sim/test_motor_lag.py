@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from throwcollect.robots.motor_lag import lag_behind
+from throwcollect.sim.motors import lag_behind
 
 
 def test_a_motor_has_gone_63_percent_of_a_step_after_its_time_constant() -> None:
