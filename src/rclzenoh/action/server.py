@@ -17,8 +17,6 @@ from rclzenoh.task import Future, submit
 from rclzenoh.time import S_TO_NS
 
 _RESULT_TIMEOUT_S = 900
-_RESULT_QOS = QoSProfile(depth=1000)
-"""Clients ask once for each goal, and would wait for ever for an answer to a request that was dropped."""
 
 
 class GoalResponse(Enum):
@@ -128,9 +126,7 @@ class ActionServer:
         self._services = [
             node.create_service(protocol.SendGoalService, f"{prefix}/send_goal", self._on_goal),
             node.create_service(CancelGoal, f"{prefix}/cancel_goal", self._on_cancel),
-            node.create_service(
-                protocol.GetResultService, f"{prefix}/get_result", self._on_result, qos_profile=_RESULT_QOS
-            ),
+            node.create_service(protocol.GetResultService, f"{prefix}/get_result", self._on_result),
         ]
         self._feedback = node.create_publisher(protocol.FeedbackMessage, f"{prefix}/feedback", QoSProfile(depth=10))
         self._status = node.create_publisher(GoalStatusArray, f"{prefix}/status", qos_profile_action_status_default)
