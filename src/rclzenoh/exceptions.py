@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 
 class RclzenohError(Exception):
     """Root of all errors raised on purpose: one line that says what is wrong, and maybe what would have been right."""
@@ -19,15 +17,6 @@ class RclzenohError(Exception):
 
 class ConfigurationError(RclzenohError):
     """A session cannot be opened because its configuration is wrong."""
-
-
-class UnreadableKeyError(ConfigurationError):
-    """A file of the key that a session shows to its router cannot be read."""
-
-    def __init__(self, path: Path, reason: str) -> None:
-        self.path = path
-        self.reason = reason
-        super().__init__(f"the key of the session cannot be read: {path}: {reason}")
 
 
 class NoRouterError(RclzenohError):
