@@ -19,7 +19,7 @@ from throwcollect.ros import Node, graph_changes
 from throwcollect.ros.msg import String
 from throwcollect.ros.nodes.coordinator.showing import PROGRESS_QOS, PROGRESS_TOPIC, Showing
 from throwcollect.ros.nodes.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
-from throwcollect.ros.self_check import begin_to_serve
+from throwcollect.ros.serving import begin_to_serve
 from throwcollect.run_key import Signer
 from throwcollect.side_by_side import count_cores
 from throwcollect.trial.lease import Lease
