@@ -18,13 +18,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rclzenoh.interfaces.catalog import Field, structure
-from rclzenoh.interfaces.message import DTYPES, Message, is_numbers, message_class
+from rclzenoh.interfaces.message import CODES, DTYPES, Message, is_numbers, message_class
 
 _M = TypeVar("_M", bound=Message)
 _HEADER = b"\x00\x01\x00\x00"
 """Encapsulation header of little-endian plain CDR."""
-_CODES = {**{name: dtype.char for name, dtype in DTYPES.items()}, "int64": "q", "uint64": "Q"}
-"""Format character of `struct` for each primitive."""
 _PADDING = tuple(bytes(count) for count in range(8))
 
 
@@ -196,7 +194,7 @@ class _Writer:
             self._line(depth, f"out += {text}", f"{operand} = body[at : at + {length} - 1].decode(); at += {length}")
             self._lose_position()
         else:
-            self._scalar(_CODES[field.type], DTYPES[field.type].itemsize, depth, operand)
+            self._scalar(CODES[field.type], DTYPES[field.type].itemsize, depth, operand)
 
     def _numbers(self, field: Field, operand: str, depth: int) -> None:
         dtype = DTYPES[field.type]
