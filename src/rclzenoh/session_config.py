@@ -82,9 +82,7 @@ def environment_config() -> zenoh.Config:
     for override in filter(str.strip, os.environ.get(OVERRIDE_VARIABLE, "").split(";")):
         key, separator, value = override.partition("=")
         if not separator:
-            raise ConfigurationError(
-                f"{OVERRIDE_VARIABLE}: {override.strip()!r} has no '='", expected="key/path=json5;key/path=json5"
-            )
+            raise ConfigurationError(f"{OVERRIDE_VARIABLE}: {override.strip()!r}: expected key/path=json5")
         _insert(config, key.strip(), value.strip(), OVERRIDE_VARIABLE)
     _check_key(config)
     return config

@@ -64,10 +64,10 @@ def zenoh_errors() -> Iterator[None]:
     try:
         yield
     except ConfigurationError as error:
-        raise ConfigError(error.message, expected=error.expected) from error
+        raise ConfigError(str(error)) from error
     except NoRouterError as error:
         raise UnreachableError(
-            error.message,
+            str(error),
             evidence=error.reason,
             hint="start a router: python -m throwcollect.ros.router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "
             f"or name another one in {OVERRIDE_VARIABLE}",
