@@ -150,7 +150,8 @@ def _numbers(element: str, value: Any, current: Any) -> Any:
         value = base64.b64decode(value, validate=True)
     elif element in _FLOATS and isinstance(value, list):
         value = [math.nan if each is None else each for each in value]
-    if not isinstance(value, (list, np.ndarray, *((bytes, bytearray) if element in _OCTETS else ()))):
+    is_octets = element in _OCTETS and isinstance(value, bytes | bytearray)
+    if not is_octets and not isinstance(value, list | np.ndarray):
         raise TypeError
     # Fields with numbers are `array.array` or lists on rclpy, and on the embedded backend NumPy arrays, which check.
     if isinstance(current, array.array):
