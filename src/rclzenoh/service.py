@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import inspect
-import threading
 import time
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import zenoh
@@ -121,8 +121,7 @@ class Client(Receiver):
         self.srv_type = srv_type
         self.qos_profile = qos_profile
         self._pending: dict[int, tuple[Future, Callable[[Any], Any]]] = {}
-        self._sequence = 0
-        self._lock = threading.Lock()
+        self._numbers = count(1)
         self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
         # As in rmw_zenoh_cpp, every complete queryable of this key is asked, and Zenoh must not merge or drop replies.
         self._querier: Any = self._endpoint.session.declare_querier(
@@ -158,10 +157,7 @@ class Client(Receiver):
         """
         if not isinstance(request, self.srv_type.Request):
             raise TypeError(f"{self.service_name}: expected {self.srv_type.TYPE}.Request, got {type(request).__name__}")
-        payload, future = serialize(request), Future()
-        with self._lock:
-            self._sequence += 1
-            sequence = self._sequence
+        payload, future, sequence = serialize(request), Future(), next(self._numbers)
         # Another thread may destroy the client meanwhile.
         if (querier := self._querier) is None:
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")

@@ -135,8 +135,6 @@ class ActionServer:
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
         """Publish feedback of a goal."""
-        if not isinstance(feedback, self.action_type.Feedback):
-            raise TypeError(f"expected {self.action_type.TYPE}.Feedback, got {type(feedback).__name__}")
         self._feedback.publish(self.action_type.Impl.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
 
     def schedule(self, handle: ServerGoalHandle) -> None:
@@ -145,8 +143,6 @@ class ActionServer:
 
     def _set_result(self, handle: ServerGoalHandle, result: Message) -> None:
         """Set the result of a goal that has ended, and answer those who wait for it."""
-        if not isinstance(result, self.action_type.Result):
-            raise TypeError(f"expected {self.action_type.TYPE}.Result, got {type(result).__name__}")
         response = self.action_type.Impl.GetResultService.Response(status=handle.status, result=result)
         handle.result_future.set_result(response)
 
