@@ -120,10 +120,8 @@ def encode(profile: QoSProfile) -> str:
 def decode(text: str) -> QoSProfile | None:
     """Profile from the last chunk of a liveliness token, with the middleware's defaults; None if it is malformed."""
     groups = [group.split(",") for group in text.split(":")]
-    if len(groups) < len(_SIZES) or any(len(group) < size for group, size in zip(groups, _SIZES, strict=False)):
-        return None
-    (reliability, *_), (durability, *_), (history, depth, *_), deadline, lifespan, (liveliness, *lease) = groups[:6]
     try:
+        (reliability, *_), (durability, *_), (history, depth, *_), deadline, lifespan, (liveliness, *lease), *_ = groups
         return QoSProfile(
             depth=int(depth or _MIDDLEWARE_DEPTH),
             history=HistoryPolicy(int(history or 1)),
@@ -138,12 +136,8 @@ def decode(text: str) -> QoSProfile | None:
         return None
 
 
-_SIZES = (1, 1, 2, 2, 2, 3)
-"""Least number of values in each group."""
-
-
 def _read_duration(chunk: list[str]) -> Duration:
-    seconds, nanoseconds = chunk[:2]
+    seconds, nanoseconds, *_ = chunk
     if not seconds and not nanoseconds:
         return Infinite
     total = int(seconds or 0) * S_TO_NS + int(nanoseconds or 0)
