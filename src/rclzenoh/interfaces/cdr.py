@@ -5,7 +5,7 @@ in which each primitive is aligned to its size, counted from the body's first by
 
 The functions are fast because nested structures are inlined, neighbouring primitives go through one `struct` call with
 the padding in its format, arrays are copied as they lie in memory, and lists of strings (joint names as a rule) are
-remembered. Functions that rosbags generates from the same definitions take 4 to 14 times as long.
+remembered. Functions that rosbags generates from the same definitions take up to 14 times as long.
 """
 
 from __future__ import annotations
