@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import atexit
 import inspect
-import signal
-import threading
 import time
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from itertools import count
-from types import FrameType
 from typing import TypeVar
 
 import zenoh
@@ -159,24 +156,13 @@ def get_default_context() -> Context:
 
 
 def init(*, context: Context | None = None, domain_id: int | None = None, config: zenoh.Config | None = None) -> None:
-    """Initialise a context as `Context.init` does; for the default one, a SIGTERM ends all spinning from now on."""
+    """Initialise a context as `Context.init` does, the default one if none is given."""
     (context or get_default_context()).init(domain_id=domain_id, config=config)
-    # Python allows setting handlers of signals only in the main thread. A handler that the program has set stays.
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    if context is None and in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
-        signal.signal(signal.SIGTERM, _on_sigterm)
 
 
 def shutdown(*, context: Context | None = None) -> None:
-    """Shut a context down, the default one if none is given, and stop handling SIGTERM."""
+    """Shut a context down, the default one if none is given."""
     (context or get_default_context()).shutdown()
-    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is _on_sigterm:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-def _on_sigterm(_signal: int, _frame: FrameType | None) -> None:
-    for context in list(_open):
-        context.request_shutdown()
 
 
 @atexit.register

@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 
 class RclzenohError(Exception):
-    """Root of all errors raised on purpose: one line that says what is wrong, and maybe what would have been right."""
-
-    def __init__(self, message: str, *, expected: str | None = None) -> None:
-        self.message = message
-        self.expected = expected
-        super().__init__(message)
-
-    def __str__(self) -> str:
-        return f"{self.message}\n  expected: {self.expected}" if self.expected else self.message
+    """Root of all errors raised on purpose."""
 
 
 class ConfigurationError(RclzenohError):
     """A session cannot be opened because its configuration is wrong."""
 
 
-class UnreadableKeyError(ConfigurationError):
-    """A file of the key that a session shows to its router cannot be read."""
-
-    def __init__(self, path: Path, reason: str) -> None:
-        self.path = path
-        self.reason = reason
-        super().__init__(f"the key of the session cannot be read: {path}: {reason}")
-
-
 class NoRouterError(RclzenohError):
     """There is no router at the endpoints, which are JSON; the reason is what Zenoh says."""
 
     def __init__(self, endpoints: str, seconds: float, reason: str) -> None:
-        self.endpoints = endpoints
         self.reason = reason
         super().__init__(f"no Zenoh session within {seconds:g} s; connecting to {endpoints}")
 

@@ -3,15 +3,13 @@
 A context is sent only the tokens of what it has asked about. If each were sent all tokens, their number would grow with
 the square of the nodes, and the router of a large run would be busy for a minute before anything else happens.
 
-Tokens are parsed when somebody asks about the graph, in the asking thread. Asking about a name again while nothing
-changed costs two dictionary lookups.
+Asking about a name again costs two dictionary lookups.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -20,8 +18,6 @@ import zenoh
 from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token, token_keys
 from rclzenoh.time import deadline_after
 
-_MOST_UNREAD = 10_000
-"""With this many unread changes, they are read even if nobody asks about the graph."""
 _MOST_NAMES = 16
 """A context that asks about more names of one kind than this is sent all tokens of that kind."""
 _POLL_S = 0.1
@@ -37,9 +33,7 @@ class Graph:
         # This is not the lock of `_changed`, which threads of Zenoh need while another thread waits for tokens.
         self._asking = threading.Lock()
         self._followed: dict[tuple[EntityKind, str | None], Any] = {}
-        # A thread may take the lock of a Condition twice, as `_on_change` does when it reads changes.
         self._changed = threading.Condition()
-        self._unread: deque[tuple[bool, str]] = deque()
         # By kind and name, and then by key expression.
         self._tokens: dict[tuple[EntityKind, str], dict[str, Token]] = {}
         # By namespace and name of the node, and then by key expression.
@@ -69,24 +63,16 @@ class Graph:
             self._followed[kind, name] = subscriber
 
     def _on_change(self, sample: zenoh.Sample) -> None:
+        key = str(sample.key_expr)
+        token, appeared = parse_token(key), sample.kind == zenoh.SampleKind.PUT
         with self._changed:
-            self._unread.append((sample.kind == zenoh.SampleKind.PUT, str(sample.key_expr)))
             self.changes += 1
-            if len(self._unread) > _MOST_UNREAD:
-                self._read()
-            self._changed.notify_all()
-
-    def _read(self) -> None:
-        with self._changed:
-            while self._unread:
-                appeared, key = self._unread.popleft()
-                token = parse_token(key)
-                if token is None:
-                    continue
+            if token is not None:
                 # A token may be announced more than once: after a lost connection to the router, or because two
                 # subscribers follow it, that of its kind and that of its name.
                 _note(self._tokens, (token.kind, token.name), key, token if appeared else None)
                 _note(self._of_nodes, (token.namespace, token.node), key, token if appeared else None)
+            self._changed.notify_all()
 
     def tokens(
         self, *kinds: EntityKind, name: str | None = None, node: tuple[str, str] | None = None
@@ -94,7 +80,6 @@ class Graph:
         """All nodes and endpoints of some kinds, or those of one name, or of one node by its namespace and name."""
         for kind in kinds:
             self._follow(kind, name)
-        self._read()
         # What is iterated over is copied, because threads of Zenoh may change it meanwhile.
         if node is not None:
             found = [self._of_nodes.get(node, {})]
@@ -123,17 +108,17 @@ class Graph:
             alive: Whether waiting still makes sense.
         """
         deadline = deadline_after(timeout_s)
-        while not condition():
+        while True:
+            seen = self.changes
+            if condition():
+                return True
             # The thread waits for short times only, because nothing notifies it when the context is shut down.
             left = deadline - time.monotonic()
             if left <= 0 or not alive():
                 return False
             with self._changed:
-                # If a change has come since the condition was checked, it is checked again at once, without waiting for
-                # another change.
-                if not self._unread:
+                if self.changes == seen:
                     self._changed.wait(min(left, _POLL_S))
-        return True
 
 
 def _note(tokens: dict[Any, dict[str, Token]], place: tuple[Any, str], key: str, token: Token | None) -> None:

@@ -15,8 +15,6 @@ PREFIX = "@ros2_lv"
 """First chunk of all tokens."""
 
 _NODE_CHUNKS, _ENDPOINT_CHUNKS = 9, 13
-_MOST_DIGITS = 20
-"""Number of digits of the largest 64-bit number."""
 
 
 class EntityKind(str, Enum):
@@ -99,10 +97,10 @@ def parse_token(key: str) -> Token | None:
         is_node = EntityKind(kind) is EntityKind.NODE
         name, dds, type_hash, qos = [""] * 4 if is_node else chunks[_NODE_CHUNKS:_ENDPOINT_CHUNKS]
         return Token(
-            domain=read_natural(domain),
+            domain=int(domain),
             session=session,
-            node_id=read_natural(node_id),
-            entity_id=read_natural(entity_id),
+            node_id=int(node_id),
+            entity_id=int(entity_id),
             kind=EntityKind(kind),
             namespace=namespace.replace("%", "/"),
             node=node,
@@ -114,14 +112,6 @@ def parse_token(key: str) -> Token | None:
         )
     except ValueError:
         return None
-
-
-def read_natural(text: str) -> int:
-    """Read a number from 0 on, as it stands in tokens."""
-    # `int` alone would accept signs, blanks and underscores, too.
-    if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
-        raise ValueError(f"{text!r:.40} is no number")
-    return int(text)
 
 
 def dds_type(name: str) -> str:

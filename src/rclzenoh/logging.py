@@ -24,8 +24,6 @@ class LoggingSeverity(IntEnum):
 
 
 _writing = threading.Lock()
-_MOST_SEEN = 1000
-"""Largest number of texts that a logger remembers in order not to repeat them."""
 
 
 class Logger:
@@ -54,9 +52,6 @@ class Logger:
             now, last = time.monotonic(), self._seen.get(text)
             if last is not None and now - last < throttle_duration_sec:
                 return False
-            if len(self._seen) >= _MOST_SEEN:
-                # A text may contain data from other nodes and so differ each time; this limits the memory.
-                self._seen.clear()
             self._seen[text] = now
         # The caller is the first frame outside of this module; frames of `info` and similar methods are skipped.
         caller = sys._getframe(1)

@@ -72,7 +72,7 @@ class Receiver(ABC):
 
     Args:
         mailbox: Mailbox of the node.
-        queue_length: Largest number of waiting items; if there are more, the oldest is refused. None keeps all.
+        queue_length: Largest number of waiting items; if there are more, the oldest is dropped. None keeps all.
     """
 
     def __init__(self, mailbox: Mailbox, queue_length: int | None) -> None:
@@ -82,18 +82,14 @@ class Receiver(ABC):
 
     def deliver(self, item: Any) -> None:
         """Take an item, in any thread."""
-        surplus = None
         with self.mailbox.lock:
             if len(self._items) == self._queue_length:
                 # The oldest item makes room. This receiver is in the mailbox once for each item, and takes the entry of
                 # the oldest item for the new one.
-                surplus = self._items.popleft()
+                self._items.popleft()
             else:
                 self.mailbox.queue.put(self)
             self._items.append(item)
-        if surplus is not None:
-            # This happens after the lock is released, because refusing sends an answer.
-            self.refuse(surplus, f"more than {self._queue_length} requests are waiting")
 
     def run(self) -> bool:
         """Handle the oldest item; returns whether there was one."""
@@ -108,12 +104,8 @@ class Receiver(ABC):
     def handle(self, item: Any) -> None:
         """Handle one item, in the thread that spins."""
 
-    def refuse(self, item: Any, reason: str) -> None:  # noqa: B027 - most have nobody to tell
-        """Turn away an item that will not be handled, in any thread."""
-
-    def discard_all(self) -> None:
-        """Turn away all items that wait."""
+    def take_all(self) -> list[Any]:
+        """Take out all items that wait."""
         with self.mailbox.lock:
-            items, self._items = self._items, deque()
-        for item in items:
-            self.refuse(item, "the service is offered no longer")
+            items, self._items = list(self._items), deque()
+        return items

@@ -9,21 +9,20 @@ from rclzenoh.exceptions import NameValidationException
 _PART = r"[A-Za-z_][A-Za-z0-9_]*"
 _NODE = re.compile(_PART)
 _ABSOLUTE = re.compile(rf"(/{_PART})+")
+_EXPECTED = "expected letters, digits and underscores, not beginning with a digit"
 
 
 def check_node_name(name: str) -> None:
     """Refuse a name without namespace that no node can have."""
     if not _NODE.fullmatch(name):
-        raise NameValidationException(
-            f"invalid node name {name!r}", expected="letters, digits and underscores, not beginning with a digit"
-        )
+        raise NameValidationException(f"invalid node name {name!r}: {_EXPECTED}")
 
 
 def absolute_namespace(namespace: str) -> str:
     """Namespace with its leading slash, whether it was given absolute, relative or empty."""
     absolute = "/" + namespace.removeprefix("/")
     if absolute != "/" and not _ABSOLUTE.fullmatch(absolute):
-        raise NameValidationException(f"invalid namespace {namespace!r}", expected="names separated by single slashes")
+        raise NameValidationException(f"invalid namespace {namespace!r}: {_EXPECTED}, between single slashes")
     return absolute
 
 
@@ -41,8 +40,5 @@ def resolve(name: str, namespace: str, node: str) -> str:
     else:
         absolute = join(namespace, name)
     if not _ABSOLUTE.fullmatch(absolute):
-        raise NameValidationException(
-            f"invalid topic or service name {name!r}",
-            expected="letters, digits and underscores between single slashes, optionally after a leading '/' or '~/'",
-        )
+        raise NameValidationException(f"invalid topic or service name {name!r}: {_EXPECTED}, between single slashes")
     return absolute

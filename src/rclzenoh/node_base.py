@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any
 
 from rclzenoh.context import Context, get_default_context
 from rclzenoh.exceptions import NotInitializedException
@@ -11,13 +11,6 @@ from rclzenoh.logging import Logger
 from rclzenoh.mailbox import Mailbox
 from rclzenoh.names import absolute_namespace, check_node_name, join, resolve
 from rclzenoh.time import ROSClock, Timer
-
-
-class NodeKeeper(Protocol):
-    """The executor that a node is in, as a protocol, because the module `executors` imports this one."""
-
-    def remove_node(self, node: NodeBase) -> None:
-        """Stop taking care of a node's callbacks."""
 
 
 class NodeBase:
@@ -34,7 +27,7 @@ class NodeBase:
             raise NotInitializedException(f"cannot create node {node_name!r}: init() has not been called")
         check_node_name(node_name)
         self._name, self._namespace = node_name, absolute_namespace(namespace)
-        self.executor: NodeKeeper | None = None
+        self.executor: Any = None
         self.mailbox = Mailbox()
         self.timers: list[Timer] = []
         self._clock = ROSClock()

@@ -107,8 +107,7 @@ class NodeParameters:
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Descriptor of a parameter."""
         if name not in self._descriptors:
-            known = ", ".join(sorted(self._descriptors))
-            raise ParameterNotDeclaredException(f"parameter {name!r} is not declared", expected=f"one of {known}")
+            raise ParameterNotDeclaredException(f"parameter {name!r} is not declared")
         return self._descriptors[name]
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
@@ -239,7 +238,7 @@ def offer_parameters(node: NodeEndpoints, parameters: NodeParameters) -> None:
         try:
             return [read(name) for name in names]
         except ParameterException as error:
-            node.get_logger().warning(f"parameter service: {error.message}")
+            node.get_logger().warning(f"parameter service: {error}")
             return []
 
     def find_type(name: str) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from rclzenoh.keys import read_natural
 from rclzenoh.time import S_TO_NS, Duration, Infinite
 
 
@@ -121,33 +120,27 @@ def encode(profile: QoSProfile) -> str:
 def decode(text: str) -> QoSProfile | None:
     """Profile from the last chunk of a liveliness token, with the middleware's defaults; None if it is malformed."""
     groups = [group.split(",") for group in text.split(":")]
-    if len(groups) < len(_SIZES) or any(len(group) < size for group, size in zip(groups, _SIZES, strict=False)):
-        return None
-    (reliability, *_), (durability, *_), (history, depth, *_), deadline, lifespan, (liveliness, *lease) = groups[:6]
     try:
+        (reliability, *_), (durability, *_), (history, depth, *_), deadline, lifespan, (liveliness, *lease), *_ = groups
         return QoSProfile(
-            depth=read_natural(depth or str(_MIDDLEWARE_DEPTH)),
-            history=HistoryPolicy(read_natural(history or "1")),
-            reliability=ReliabilityPolicy(read_natural(reliability or "1")),
-            durability=DurabilityPolicy(read_natural(durability or "2")),
+            depth=int(depth or _MIDDLEWARE_DEPTH),
+            history=HistoryPolicy(int(history or 1)),
+            reliability=ReliabilityPolicy(int(reliability or 1)),
+            durability=DurabilityPolicy(int(durability or 2)),
             lifespan=_read_duration(lifespan),
             deadline=_read_duration(deadline),
-            liveliness=LivelinessPolicy(read_natural(liveliness or "1")),
+            liveliness=LivelinessPolicy(int(liveliness or 1)),
             liveliness_lease_duration=_read_duration(lease),
         )
     except ValueError:
         return None
 
 
-_SIZES = (1, 1, 2, 2, 2, 3)
-"""Least number of values in each group."""
-
-
 def _read_duration(chunk: list[str]) -> Duration:
-    seconds, nanoseconds = chunk[:2]
+    seconds, nanoseconds, *_ = chunk
     if not seconds and not nanoseconds:
         return Infinite
-    total = read_natural(seconds or "0") * S_TO_NS + read_natural(nanoseconds or "0")
+    total = int(seconds or 0) * S_TO_NS + int(nanoseconds or 0)
     return Duration(nanoseconds=min(total, Infinite.nanoseconds))
 
 

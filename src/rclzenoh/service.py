@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import inspect
-import threading
 import time
-from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
+from itertools import count
 from typing import Any
 
 import zenoh
@@ -25,9 +23,6 @@ from rclzenoh.task import Future, start
 _PATIENT_SERVICE = "/_action/get_result"
 _ENDLESS_S = 1e9
 """Timeout of requests that may last as long as an action."""
-_LOST_S = 10.0
-"""A request that has no answer after this time keeps no other back. It may have been lost with a link to the router,
-which Zenoh reports only when the request times out, ten minutes later."""
 
 Callback = Callable[[Any, Any], Any]
 
@@ -41,7 +36,8 @@ class Service(Receiver):
     def __init__(
         self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, callback: Callback, qos_profile: QoSProfile
     ) -> None:
-        super().__init__(node.mailbox, qos_profile.queue_length)
+        # The queue has no limit, whatever is announced: clients would wait for ever for an answer to a dropped request.
+        super().__init__(node.mailbox, None)
         self.srv_type = srv_type
         self.qos_profile = qos_profile
         self.callback = callback
@@ -72,9 +68,6 @@ class Service(Receiver):
         self._open.add(item)
         start(self.mailbox, self._serve(item, attachment, request))
 
-    def refuse(self, item: zenoh.Query, reason: str) -> None:  # noqa: D102 - see `Receiver`
-        _refuse(item, f"{self.service_name}: {reason}")
-
     async def _serve(self, query: zenoh.Query, received: Attachment, request: Message) -> None:
         try:
             response = self.callback(request, self.srv_type.Response())
@@ -104,9 +97,8 @@ class Service(Receiver):
         # This is set first, because the thread that spins may be about to answer a request.
         self._is_destroyed = True
         self._endpoint.close()
-        self.discard_all()
-        for query in list(self._open):
-            query.drop()  # type: ignore[no-untyped-call]
+        for query in [*self.take_all(), *self._open]:
+            query.drop()
         self._open.clear()
 
 
@@ -124,20 +116,12 @@ class Client(Receiver):
     """Calls a service. Made by `Node.create_client`."""
 
     def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, qos_profile: QoSProfile) -> None:
-        # The queue has no limit: there is at most one response per request, and a dropped one would be waited for in
-        # vain.
+        # There is at most one response per request, and a dropped one would be waited for in vain.
         super().__init__(node.mailbox, None)
         self.srv_type = srv_type
         self.qos_profile = qos_profile
         self._pending: dict[int, tuple[Future, Callable[[Any], Any]]] = {}
-        # A service keeps as many requests as its quality of service says, and drops the oldest of more. So the client
-        # lets no more be under way; but a request for the result of a goal is answered only when the goal ends.
-        self._most_under_way = None if srv_name.endswith(_PATIENT_SERVICE) else qos_profile.queue_length
-        self._under_way: dict[int, float] = {}
-        """Monotonic time [s] at which each request that has no answer yet was sent, oldest first."""
-        self._unsent: deque[tuple[Any, int, bytes]] = deque()
-        self._sequence = 0
-        self._lock = threading.Lock()
+        self._numbers = count(1)
         self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
         # As in rmw_zenoh_cpp, every complete queryable of this key is asked, and Zenoh must not merge or drop replies.
         self._querier: Any = self._endpoint.session.declare_querier(
@@ -173,21 +157,12 @@ class Client(Receiver):
         """
         if not isinstance(request, self.srv_type.Request):
             raise TypeError(f"{self.service_name}: expected {self.srv_type.TYPE}.Request, got {type(request).__name__}")
-        payload, future = serialize(request), Future()
-        with self._lock:
-            self._sequence += 1
-            sequence = self._sequence
+        payload, future, sequence = serialize(request), Future(), next(self._numbers)
         # Another thread may destroy the client meanwhile.
         if (querier := self._querier) is None:
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")
         # The future is noted before the request is sent, because the thread that spins may get the response at once.
         self._pending[sequence] = future, convert
-        self._unsent.append((querier, sequence, payload))
-        self._send_waiting()
-        return future
-
-    def _send(self, querier: Any, sequence: int, payload: bytes) -> None:
-        """Send a request."""
         # Zenoh drops the handler after the last reply, which puts the number into the queue after all replies.
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
         attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
@@ -196,32 +171,12 @@ class Client(Receiver):
         except zenoh.ZError as error:
             del self._pending[sequence]
             raise self._endpoint.invalid(error) from error
-
-    def _send_waiting(self) -> None:
-        """Send the requests that wait, in their order, as far as the service keeps them."""
-        while True:
-            with self._lock:
-                if not self._unsent:
-                    return
-                now = time.monotonic()
-                if len(self._under_way) == self._most_under_way:
-                    oldest = next(iter(self._under_way))
-                    if now < self._under_way[oldest] + _LOST_S:
-                        return
-                    del self._under_way[oldest]
-                querier, sequence, payload = self._unsent.popleft()
-                self._under_way[sequence] = now
-            self._send(querier, sequence, payload)
+        return future
 
     def handle(self, item: zenoh.Reply | int) -> None:
         """Decode a response and complete its future; a number means that its request gets no further response."""
         if isinstance(item, int):
             self._pending.pop(item, None)
-            with self._lock:
-                self._under_way.pop(item, None)
-            # Once the session is closed, nobody is left to answer.
-            with suppress(InvalidHandle):
-                self._send_waiting()
             return
         sample = item.ok
         if sample is None:
@@ -247,5 +202,4 @@ class Client(Receiver):
         self._querier = None
         self._endpoint.close()
         self._pending.clear()
-        self._unsent.clear()
-        self.discard_all()
+        self.take_all()

@@ -16,7 +16,7 @@ from typing import Literal
 
 import zenoh
 
-from rclzenoh.exceptions import ConfigurationError, UnreadableKeyError
+from rclzenoh.exceptions import ConfigurationError
 
 DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
@@ -31,12 +31,7 @@ OPEN = "tcp/"
 """Beginning of the endpoints whose router lets anybody in."""
 PROTECTED = "tls/"
 """Beginning of the endpoints whose router lets nobody in without a key."""
-LISTENS_OF_RMW = ("tcp/localhost:0",)
-"""Endpoints at which a session of rmw_zenoh_cpp listens, even as a client, unless its environment sets others."""
-
 _TLS = "transport/link/tls"
-_DEFAULT_MODE = "peer"
-"""Mode of the sessions whose configuration names none."""
 _SETTINGS = {
     "scouting/multicast/enabled": False,
     # With shared memory, no session would open where /dev/shm is missing or full; rmw_zenoh_cpp has none, either.
@@ -87,9 +82,7 @@ def environment_config() -> zenoh.Config:
     for override in filter(str.strip, os.environ.get(OVERRIDE_VARIABLE, "").split(";")):
         key, separator, value = override.partition("=")
         if not separator:
-            raise ConfigurationError(
-                f"{OVERRIDE_VARIABLE}: {override.strip()!r} has no '='", expected="key/path=json5;key/path=json5"
-            )
+            raise ConfigurationError(f"{OVERRIDE_VARIABLE}: {override.strip()!r}: expected key/path=json5")
         _insert(config, key.strip(), value.strip(), OVERRIDE_VARIABLE)
     _check_key(config)
     return config
@@ -99,22 +92,20 @@ def connect_endpoint() -> str | None:
     """Endpoint of the router that the environment names; None if it names none."""
     if not (os.environ.get(OVERRIDE_VARIABLE) or os.environ.get(CONFIG_FILE_VARIABLE)):
         return None
-    endpoints = _read_endpoints(environment_config(), "connect")
-    return endpoints[0] if endpoints else None
+    return next(iter(_read_endpoints(environment_config(), "connect") or ()), None)
 
 
-def is_protected(listens: Sequence[str] = ()) -> bool:
+def is_protected() -> bool:
     """Whether the environment leads to a router that lets nobody in without a key, and opens no other way in.
 
-    Args:
-        listens: Endpoints at which a client listens if the environment sets none; our own clients listen nowhere.
+    Sessions listen by default, on rmw_zenoh_cpp even clients, so the environment has to set where: `client_override`
+    does. Lists for single modes of sessions count as not set.
     """
     config = environment_config()
-    routers = _read_endpoints(config, "connect")
-    # A session without a router may find anybody, and be found by anybody, so it is not protected.
-    # If there is a configuration file, it replaces all defaults of sessions, so `listens` does not apply.
-    listening = _read_endpoints(config, "listen", () if os.environ.get(CONFIG_FILE_VARIABLE) else listens)
-    return bool(routers) and all(each.startswith(PROTECTED) for each in (*routers, *listening))
+    connect, listen = (_read_endpoints(config, side) for side in ("connect", "listen"))
+    if not connect or listen is None:
+        return False
+    return all(each.startswith(PROTECTED) for each in (*connect, *listen))
 
 
 def client_override(endpoint: str, key: Key | None = None) -> str:
@@ -166,22 +157,13 @@ def _check_key(config: zenoh.Config) -> None:
             try:
                 Path(path).read_bytes()
             except OSError as error:
-                raise UnreadableKeyError(Path(path), error.strerror or str(error)) from error
+                raise ConfigurationError(f"the key of the run cannot be read: {path}: {error.strerror}") from error
 
 
-def _read_endpoints(
-    config: zenoh.Config, side: Literal["connect", "listen"], of_clients: Sequence[str] = ()
-) -> Sequence[str]:
-    """Endpoints that a session of this configuration connects to or listens on.
-
-    Zenoh accepts one list, or one for each mode. By default, clients listen nowhere, and other modes at endpoints that
-    let anybody in. If the configuration has no list for clients, this returns ``of_clients``.
-    """
-    endpoints: list[str] | dict[str, list[str]] = json.loads(config.get_json(f"{side}/endpoints"))
-    if isinstance(endpoints, list):
-        return endpoints
-    mode = json.loads(config.get_json("mode")) or _DEFAULT_MODE
-    return endpoints.get(mode, of_clients if mode == "client" else ())
+def _read_endpoints(config: zenoh.Config, side: str) -> Sequence[str] | None:
+    """Endpoints that sessions of any mode connect to or listen on; None if there is no such list."""
+    endpoints = json.loads(config.get_json(f"{side}/endpoints"))
+    return endpoints if isinstance(endpoints, list) else None
 
 
 def _apply(config: zenoh.Config, settings: Mapping[str, object], where: str) -> None:

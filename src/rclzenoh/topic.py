@@ -174,7 +174,7 @@ class Subscription(Receiver):
     def destroy(self) -> None:
         """Withdraw the subscription; see `Node.destroy_subscription`."""
         self._endpoint.close()
-        self.discard_all()
+        self.take_all()
 
 
 def _takes(callback: Callable[..., Any], count: int) -> bool:

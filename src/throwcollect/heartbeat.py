@@ -1,7 +1,8 @@
 """Signs of life of a node that need no ROS: a line in its log when it is ready, and a file that shows that it runs.
 
 The loop of a node touches the file, and the health check of its container looks at the time of the file, which costs
-nearly nothing. To ask the node itself, a process would have to join the graph, every few seconds in every container.
+nearly nothing; a file that is older than 5 s means that the node is stuck. To ask the node itself, a process would have
+to join the graph, every few seconds in every container.
 The image names the file; outside of containers there is none.
 """
 
@@ -13,8 +14,6 @@ from pathlib import Path
 
 VARIABLE = "THROWCOLLECT_HEARTBEAT"
 """Name of the environment variable that names the file."""
-SILENT_S = 5.0
-"""Age of the file at which a node counts as stuck, here and in the image; its loop runs several times a second."""
 _PERIOD_S = 1.0
 
 
@@ -38,12 +37,3 @@ class Heartbeat:
         if self._path is not None and now >= self._due:
             self._due = now + _PERIOD_S
             self._path.touch()
-
-
-def is_beating() -> bool:
-    """Say whether the node of this container has touched its file within the last seconds."""
-    try:
-        # The time of a file is a time of day, so it cannot be compared with the monotonic clock.
-        return time.time() - Path(os.environ[VARIABLE]).stat().st_mtime < SILENT_S
-    except (KeyError, OSError):
-        return False

@@ -69,7 +69,7 @@ class RunKey:
 
         key = load_pem_private_key(_read(self.private_key), None)
         if not isinstance(key, ec.EllipticCurvePrivateKey):
-            raise unreadable_key(self.private_key, "it is of another kind than those that are made here")
+            raise ConfigError(f"{self.private_key}: not a key of a run")
         return key.private_numbers().private_value.to_bytes(_SECRET_BYTES, "big")
 
     def create(self, secret: bytes | None = None) -> None:
@@ -124,19 +124,14 @@ class Signer:
         return hmac.compare_digest(signature.encode(), self.sign(*parts).encode())
 
 
-def unreadable_key(path: Path, reason: str) -> ConfigError:
-    """Make the error for a file of a key that cannot be read; `reason` says why, in words."""
-    return ConfigError(
-        f"the key of the run cannot be read: {path}: {reason}",
-        expected=f"a directory with the key of a run, which only its owner can read (--key, {KEY_VARIABLE})",
-    )
-
-
 def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise unreadable_key(path, error.strerror or str(error)) from error
+        raise ConfigError(
+            f"the key of the run cannot be read: {path}: {error.strerror}",
+            expected=f"a directory with the key of a run, which only its owner can read (--key, {KEY_VARIABLE})",
+        ) from error
 
 
 def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:

@@ -30,13 +30,9 @@ node.create_service(ros.get_service("std_srvs/srv/Trigger"), "trigger", answer)
 executor = ros.SingleThreadedExecutor()
 executor.add_node(node)
 print("ready", flush=True)
-try:
-    executor.spin()
-except ros.ExternalShutdownException:
-    pass
-print("asked to end", flush=True)
+executor.spin()
 """
-"""A node with the service ``trigger``, which ends at SIGTERM and leaves its context to the end of the process."""
+"""A node with the service ``trigger``, which leaves its context to the end of the process."""
 
 if ON_RCLPY:
     from rclpy import exceptions as exceptions

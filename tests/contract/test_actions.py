@@ -220,11 +220,10 @@ def test_an_execute_callback_that_fails_aborts_the_goal(rig):
 
 def test_goals_and_feedback_of_a_wrong_type_are_refused(rig, controller, client):
     _, ours = send(rig, controller, client, "a")
-    with pytest.raises(
-        TypeError, match=choose_words(embedded="expected .*FollowJointTrajectory.Goal, got .*Result", rclpy="^$")
-    ):
+    refused = choose_words(embedded="FollowJointTrajectory.* cannot be serialised", rclpy="^$")
+    with pytest.raises(TypeError, match=refused):
         client.send_goal_async(FJT.Result())
-    with pytest.raises(TypeError, match=choose_words(embedded="expected .*FollowJointTrajectory.Feedback", rclpy="^$")):
+    with pytest.raises(TypeError, match=refused):
         ours.publish_feedback(FJT.Goal())
 
 

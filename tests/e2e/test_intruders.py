@@ -48,8 +48,11 @@ ATTEMPT = f"""
 import json, os, sys, time, zenoh
 from throwcollect.errors import ConfigError
 from throwcollect.ros.connection import zenoh_errors
-from throwcollect.ros.health_check import REQUEST, attachment
+from rclzenoh.endpoint import Attachment
+from rclzenoh.interfaces import serialize
+from rclzenoh.interfaces.srv import GetParameters
 from rclzenoh.session_config import environment_config
+REQUEST, ATTACHMENT = serialize(GetParameters.Request()), Attachment(1, 0, bytes(16)).pack()
 {BECOME_NOBODY}
 heard = []
 for name, override in json.loads(sys.argv[1]).items():
@@ -62,7 +65,7 @@ for name, override in json.loads(sys.argv[1]).items():
         continue
     subscriber = session.declare_subscriber("**", lambda sample: heard.append(str(sample.key_expr)))
     session.put("0/sim_0/episode/std_msgs::msg::dds_::UInt8MultiArray_/RIHS01_0", b"an episode")
-    asked = session.get("0/sim_0/sim_0/get_parameters/**", payload=REQUEST, attachment=attachment(), timeout=3.0)
+    asked = session.get("0/sim_0/sim_0/get_parameters/**", payload=REQUEST, attachment=ATTACHMENT, timeout=3.0)
     answers = len(list(asked))
     time.sleep(0.5)
     session.close()

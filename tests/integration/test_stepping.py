@@ -88,15 +88,6 @@ def test_the_clock_shows_steps_to_the_nanosecond(steps: int, robot: Robot) -> No
     assert stamps == sorted(set(stamps))
 
 
-def test_more_steps_than_a_caller_would_wait_for_are_refused_by_the_service(robot: Robot) -> None:
-    robot.put_into(PAUSED)
-    for steps in (100_001, 2**64 - 1):
-        refused = robot.step(steps)
-        assert refused.result == Result.RESULT_OPERATION_FAILED
-        assert refused.error_message.startswith(f"{steps} steps in one call; at most 100000")
-    assert robot.now_ns() == 0
-
-
 @in_order_of_arrival
 def test_the_step_action_gives_feedback_on_each_step_and_ends_paused(robot: Robot, action: ActionClient) -> None:
     robot.put_into(PAUSED)

@@ -1,19 +1,7 @@
-import signal
-
 import pytest
 
-from rclzenoh.context import Context, get_default_context, init, shutdown
+from rclzenoh.context import Context
 from rclzenoh.exceptions import NotInitializedException
-
-
-def test_sigterm_is_handled_as_long_as_the_default_context_lives(environment):
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    init()
-    assert signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
-    signal.raise_signal(signal.SIGTERM)
-    assert not get_default_context().ok()
-    shutdown()
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
 def test_a_context_has_an_open_session_from_init_to_shutdown(environment):

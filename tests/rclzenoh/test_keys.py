@@ -60,8 +60,6 @@ def test_an_enclave_is_part_of_the_token():
         "@ros2_lv/0/1a/0/0/MP/%/%/n",
         "@ros2_lv/0/1a/0/0/NN//%/n",
         "other/0/1a/0/0/NN/%/%/n",
-        "@ros2_lv/0/1a/0/٠/NN/%/%/n",
-        "@ros2_lv/0/1a/0/" + 5000 * "9" + "/NN/%/%/n",
     ],
 )
 def test_malformed_tokens_are_ignored(key):

@@ -15,7 +15,6 @@ def test_a_missing_router_is_an_error_that_names_the_endpoint(environment, monke
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", 'connect/endpoints=["tcp/127.0.0.1:1"]')
     with pytest.raises(NoRouterError, match=r"connecting to .*tcp/127.0.0.1:1") as caught:
         open_session(environment_config())
-    assert caught.value.endpoints == '["tcp/127.0.0.1:1"]'
     assert ".rs" not in caught.value.reason
 
 

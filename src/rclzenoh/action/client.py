@@ -105,8 +105,6 @@ class ActionClient:
                 result has been received.
             goal_uuid: Identifier of the goal; None for a random one.
         """
-        if not isinstance(goal, self._action_type.Goal):
-            raise TypeError(f"expected {self._action_type.TYPE}.Goal, got {type(goal).__name__}")
         goal_id = UUID(uuid=uuid.uuid4().bytes) if goal_uuid is None else goal_uuid
         key = bytes(goal_id.uuid)
         if feedback_callback is not None:

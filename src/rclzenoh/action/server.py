@@ -17,8 +17,6 @@ from rclzenoh.task import Future, submit
 from rclzenoh.time import S_TO_NS
 
 _RESULT_TIMEOUT_S = 900
-_RESULT_QOS = QoSProfile(depth=1000)
-"""Clients ask once for each goal, and would wait for ever for an answer to a request that was dropped."""
 
 
 class GoalResponse(Enum):
@@ -54,38 +52,27 @@ class ServerGoalHandle(TrackedGoal):
         """Whether the goal is to be cancelled."""
         return self.status == GoalStatus.STATUS_CANCELING
 
-    def execute(self, execute_callback: Callable[[ServerGoalHandle], Any] | None = None) -> None:
-        """Begin to carry the goal out.
-
-        Args:
-            execute_callback: Called with this handle, returns the result; may be a coroutine function. None for that of
-                the server; if the server has none either, only the state of the goal changes.
-        """
+    def execute(self) -> None:
+        """Let the executor call the execute callback."""
         if not self.is_cancel_requested:
             self._server.change(self, GoalEvent.EXECUTE)
-        self._server.schedule(self, execute_callback)
+        self._server.schedule(self)
 
     def publish_feedback(self, feedback: Message) -> None:
         """Publish feedback."""
         self._server.publish_feedback(self, feedback)
 
-    def succeed(self, response: Message | None = None) -> None:
-        """End the goal as reached; see `finish`."""
-        self.finish(GoalEvent.SUCCEED, response)
+    def succeed(self) -> None:
+        """End the goal as reached; the execute callback returns the result."""
+        self._server.change(self, GoalEvent.SUCCEED)
 
-    def abort(self, response: Message | None = None) -> None:
-        """End the goal as failed; see `finish`."""
-        self.finish(GoalEvent.ABORT, response)
+    def abort(self) -> None:
+        """End the goal as failed."""
+        self._server.change(self, GoalEvent.ABORT)
 
-    def canceled(self, response: Message | None = None) -> None:
-        """End the goal as cancelled; see `finish`."""
-        self.finish(GoalEvent.CANCELED, response)
-
-    def finish(self, event: GoalEvent, response: Message | None) -> None:
-        """End the goal; without a response, the execute callback returns the result."""
-        self._server.change(self, event)
-        if response is not None:
-            self._server.set_result(self, response)
+    def canceled(self) -> None:
+        """End the goal as cancelled."""
+        self._server.change(self, GoalEvent.CANCELED)
 
 
 class ActionServer:
@@ -109,7 +96,7 @@ class ActionServer:
         node: NodeEndpoints,
         action_type: type[Action],
         action_name: str,
-        execute_callback: Callable[[ServerGoalHandle], Any] | None = None,
+        execute_callback: Callable[[ServerGoalHandle], Any],
         *,
         goal_callback: Callable[[Any], Any] = lambda _: GoalResponse.ACCEPT,
         handle_accepted_callback: Callable[[ServerGoalHandle], Any] = ServerGoalHandle.execute,
@@ -128,9 +115,7 @@ class ActionServer:
         self._services = [
             node.create_service(protocol.SendGoalService, f"{prefix}/send_goal", self._on_goal),
             node.create_service(CancelGoal, f"{prefix}/cancel_goal", self._on_cancel),
-            node.create_service(
-                protocol.GetResultService, f"{prefix}/get_result", self._on_result, qos_profile=_RESULT_QOS
-            ),
+            node.create_service(protocol.GetResultService, f"{prefix}/get_result", self._on_result),
         ]
         self._feedback = node.create_publisher(protocol.FeedbackMessage, f"{prefix}/feedback", QoSProfile(depth=10))
         self._status = node.create_publisher(GoalStatusArray, f"{prefix}/status", qos_profile_action_status_default)
@@ -150,36 +135,29 @@ class ActionServer:
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
         """Publish feedback of a goal."""
-        if not isinstance(feedback, self.action_type.Feedback):
-            raise TypeError(f"expected {self.action_type.TYPE}.Feedback, got {type(feedback).__name__}")
         self._feedback.publish(self.action_type.Impl.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
 
-    def schedule(self, handle: ServerGoalHandle, execute_callback: Callable[[ServerGoalHandle], Any] | None) -> None:
-        """Let the executor carry a goal out, with the server's callback if no other is given."""
-        callback = execute_callback or self._execute_callback
-        if callback is not None:
-            submit(self._node.mailbox, partial(self._execute, handle, callback))
+    def schedule(self, handle: ServerGoalHandle) -> None:
+        """Let the executor carry a goal out."""
+        submit(self._node.mailbox, partial(self._execute, handle))
 
-    def set_result(self, handle: ServerGoalHandle, result: Message) -> None:
-        """Set the result of a goal that has ended, and answer those who wait for it; only the first result counts."""
-        if not isinstance(result, self.action_type.Result):
-            raise TypeError(f"expected {self.action_type.TYPE}.Result, got {type(result).__name__}")
-        if not handle.result_future.done():
-            response = self.action_type.Impl.GetResultService.Response(status=handle.status, result=result)
-            handle.result_future.set_result(response)
+    def _set_result(self, handle: ServerGoalHandle, result: Message) -> None:
+        """Set the result of a goal that has ended, and answer those who wait for it."""
+        response = self.action_type.Impl.GetResultService.Response(status=handle.status, result=result)
+        handle.result_future.set_result(response)
 
-    async def _execute(self, handle: ServerGoalHandle, callback: Callable[[ServerGoalHandle], Any]) -> None:
+    async def _execute(self, handle: ServerGoalHandle) -> None:
         try:
-            result = await _await_outcome(callback(handle))
+            result = await _await_outcome(self._execute_callback(handle))
         except GeneratorExit:
             raise  # The executor has ended, so no result can be sent any more.
         except BaseException:
             # Clients that wait for a result must get one, even after an error.
             self._abort_if_active(handle, "failed")
-            self.set_result(handle, self.action_type.Result())
+            self._set_result(handle, self.action_type.Result())
             raise
         self._abort_if_active(handle, "returned")
-        self.set_result(handle, self.action_type.Result() if result is None else result)
+        self._set_result(handle, self.action_type.Result() if result is None else result)
 
     def _abort_if_active(self, handle: ServerGoalHandle, how: str) -> None:
         if handle.is_active:

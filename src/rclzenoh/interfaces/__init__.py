@@ -1,8 +1,7 @@
 """ROS 2 Jazzy interfaces without ROS: message classes, CDR, type hashes, definitions."""
 
 from rclzenoh.interfaces.catalog import message_definition, type_hash
-from rclzenoh.interfaces.decoder import deserialize
-from rclzenoh.interfaces.encoder import serialize
+from rclzenoh.interfaces.cdr import deserialize, serialize
 from rclzenoh.interfaces.lookup import Action, Service, get_action, get_message, get_service
 from rclzenoh.interfaces.message import AnyMessage, Message, message_class
 

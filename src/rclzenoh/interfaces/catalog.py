@@ -107,8 +107,6 @@ def message_definition(name: str) -> str:
     ``MSG: <name>``.
     """
     _require(name)
-    if "/msg/" not in name:
-        raise ValueError(f"{name!r} is no message")
     return _STORE.generate_msgdef(name, ros_version=2)[0]
 
 

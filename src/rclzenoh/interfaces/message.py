@@ -7,8 +7,9 @@ lists.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import cache
+import array
+from collections.abc import Callable
+from functools import cache, partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -26,7 +27,8 @@ DTYPES = {
 """Array type of each primitive number."""
 
 _IDL_NAMES = {"float64": "double", "float32": "float", "bool": "boolean", "byte": "octet"}
-_ZEROS = {"string": '""', "bool": "False", "float32": "0.0", "float64": "0.0"}
+CODES = {**{name: dtype.char for name, dtype in DTYPES.items()}, "int64": "q", "uint64": "Q"}
+"""Format character of each primitive number in `struct` and `array`, which has none for truth values."""
 
 
 class Message:
@@ -101,34 +103,25 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
     name of the structure that has the field.
     """
     dtype = DTYPES[field.type]
-    is_free = field.length is None and field.bound is None
-    if is_free and isinstance(value, np.ndarray) and value.dtype == dtype and value.ndim == 1 and value.flags.carray:
-        return value
-    is_octets = isinstance(value, (bytes, bytearray))
-    array = np.frombuffer(value, np.uint8).copy() if is_octets else np.asarray(value)
-    if dtype.kind in "iu" and array.size and array.dtype.kind in "fO" and all(isinstance(item, int) for item in value):
-        # NumPy chooses int64 for 0 and uint64 for 2**63, so it makes floats or objects of a list with both.
-        info = np.iinfo(dtype.name)
-        if min(value) < info.min or max(value) > info.max:
-            raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")
-        array = np.array(value, dtype)
-    if array.dtype != dtype:
-        given = array
-        if given.size and (given.dtype.kind not in "biuf" or (given.dtype.kind == "f") > (dtype.kind == "f")):
-            raise TypeError(f"{where}.{field.name}: expected numbers of type {field.type}, got {value!r:.80}")
-        with np.errstate(all="ignore"):
-            array = given.astype(dtype)
-        # A number that is too large has become another integer, or an infinite float.
-        fits = np.array_equal(array, given) if dtype.kind in "biu" else (np.isfinite(array) == np.isfinite(given)).all()
-        if not fits:
-            raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")
-    if array.ndim != 1:
-        raise TypeError(f"{where}.{field.name}: expected one dimension, got shape {array.shape}")
-    if field.length is not None and array.size != field.length:
-        raise ValueError(f"{where}.{field.name}: expected {field.length} numbers, got {array.size}")
-    if field.sequence and field.bound is not None and array.size > field.bound:
-        raise ValueError(f"{where}.{field.name}: expected at most {field.bound} numbers, got {array.size}")
-    return np.ascontiguousarray(array)
+    try:
+        if isinstance(value, np.ndarray) and value.dtype == dtype:
+            numbers = np.ascontiguousarray(value)
+        elif field.type == "bool":
+            numbers = np.array([{True: True, False: False}[item] for item in value], dtype)
+        else:
+            # NumPy would cut off fractions, and read numbers in strings.
+            octets = isinstance(value, bytes | bytearray) and CODES[field.type] == "B"
+            numbers = np.asarray(array.array(CODES[field.type], value if octets else list(value)))
+    except (TypeError, KeyError) as error:
+        raise TypeError(f"{where}.{field.name}: expected {field.type}, got {value!r:.80}") from error
+    except OverflowError as error:
+        raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}") from error
+    if numbers.ndim != 1:
+        raise TypeError(f"{where}.{field.name}: expected one dimension, got shape {numbers.shape}")
+    if field.length not in (None, numbers.size) or (field.bound is not None and numbers.size > field.bound):
+        expected = field.length or f"at most {field.bound}"
+        raise ValueError(f"{where}.{field.name}: expected {expected} numbers, got {numbers.size}")
+    return numbers
 
 
 def _make_array_property(where: str, field: Field) -> property:
@@ -141,37 +134,31 @@ def _make_array_property(where: str, field: Field) -> property:
 
 
 def _make_initialiser(fields: tuple[Field, ...]) -> Callable[..., None]:
-    """``__init__`` written out, because a generic one costs a microsecond per field."""
-    known = [field.name for field in fields]
+    makers = {field.name: _make_default(field) for field in fields}
 
-    def reject(message: Message, unknown: Iterable[str]) -> None:
-        raise TypeError(f"{message.TYPE} has no field {', '.join(map(repr, unknown))}; known: {', '.join(known)}")
+    def initialise(self: Message, **values: Any) -> None:
+        for name, make in makers.items():
+            value = values.pop(name, None)
+            setattr(self, name, make() if value is None else value)
+        if values:
+            known = ", ".join(makers)
+            raise TypeError(f"{self.TYPE} has no field {', '.join(map(repr, values))}; known: {known}")
 
-    namespace: dict[str, Any] = {"reject": reject}
-    arguments = "".join(f"{name}=None, " for name in known)
-    lines = [f"def __init__(self, {'*, ' if known else ''}{arguments}**unknown):", " if unknown: reject(self, unknown)"]
-    for number, field in enumerate(fields):
-        name = field.name
-        if is_numbers(field):
-            zeros = np.zeros(field.length or 0, DTYPES[field.type])
-            # All empty sequences of a class share one array, because it has no element that could be changed.
-            namespace[f"zeros{number}"] = zeros
-            copy = ".copy()" if field.length else ""
-            lines += [f" if {name} is None: self._{name} = zeros{number}{copy}", f" else: self.{name} = {name}"]
-            continue
-        if field.nested:
-            namespace[f"class{number}"] = message_class(field.type)
-        element = f"class{number}()" if field.nested else _ZEROS.get(field.type, "0")
-        if field.default is not None:
-            element = repr(float(field.default) if field.type.startswith("float") else field.default)
-        if field.length is not None:
-            element = f"[{element} for _ in range({field.length})]"
-        elif field.sequence:
-            element = "[]"
-        lines.append(f" self.{name} = {element} if {name} is None else {name}")
-    exec("\n".join(lines), namespace)  # noqa: S102 - names come from the definitions, nothing from outside
-    initialiser: Callable[..., None] = namespace["__init__"]
-    return initialiser
+    return initialise
+
+
+def _make_default(field: Field) -> Callable[[], Any]:
+    """Make the function that makes the value of a field that is not set."""
+    if is_numbers(field):
+        return partial(np.zeros, field.length or 0, DTYPES[field.type])
+    if field.sequence:
+        return list
+    if field.nested:
+        make: Callable[[], Any] = message_class(field.type)
+    else:
+        kind: Any = str if field.type == "string" else type(DTYPES[field.type].type().item())
+        make = partial(kind, *() if field.default is None else (field.default,))
+    return make if field.length is None else lambda: [make() for _ in range(field.length or 0)]
 
 
 def _convert_to_plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""`throwcollect router`, `sim`, `coordinator` and `health`: the nodes, as `up` and Compose start them."""
+"""`throwcollect router`, `sim` and `coordinator`: the nodes, as `up` and Compose start them."""
 
 from __future__ import annotations
 
@@ -83,18 +83,3 @@ def coordinator(
         typer.echo(describe(info(directory)))
         raise
     typer.echo(describe(info(directory)))
-
-
-def health(
-    node: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="NODE",
-            help="router, coordinator, or the name of a simulation; by default what THROWCOLLECT_NODE says.",
-        ),
-    ] = None,
-) -> None:
-    """Ask a node for a sign of life; exit code 1 if there is none."""
-    from throwcollect.ros.health_check import check
-
-    check(node)

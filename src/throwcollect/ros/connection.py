@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from rclzenoh.exceptions import ConfigurationError, NoRouterError, UnreadableKeyError
+from rclzenoh.exceptions import ConfigurationError, NoRouterError
 from rclzenoh.session_config import DOMAIN_VARIABLE, OVERRIDE_VARIABLE, PROTECTED, Key, client_override
 from throwcollect.errors import ConfigError, UnreachableError
 from throwcollect.ros.middleware import Middleware
-from throwcollect.run_key import KEY_VARIABLE, RunKey, unreadable_key
+from throwcollect.run_key import KEY_VARIABLE, RunKey
 
 _EMBEDDED = Middleware()
 
@@ -63,14 +63,11 @@ def zenoh_errors() -> Iterator[None]:
     """Raise errors about a session as errors of throwcollect."""
     try:
         yield
-    # This error is handled before `ConfigurationError`, because it is derived from that.
-    except UnreadableKeyError as error:
-        raise unreadable_key(error.path, error.reason) from error
     except ConfigurationError as error:
-        raise ConfigError(error.message, expected=error.expected) from error
+        raise ConfigError(str(error)) from error
     except NoRouterError as error:
         raise UnreachableError(
-            error.message,
+            str(error),
             evidence=error.reason,
             hint="start a router: python -m throwcollect.ros.router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "
             f"or name another one in {OVERRIDE_VARIABLE}",

@@ -15,7 +15,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
     """Initialise a context.
 
     Args:
-        context: The context; None for the default one, for which a SIGTERM ends all spinning from now on.
+        context: The context; None for the default one.
         connection: The way into the graph; None for the one that the environment describes.
     """
     domain_id = config = None

@@ -43,7 +43,6 @@ from rclpy.task import Future
 from rclpy.time import Time
 
 from rclzenoh.session_config import (
-    LISTENS_OF_RMW,
     OPEN,
     OVERRIDE_VARIABLE,
     client_override,
@@ -160,7 +159,7 @@ def joins_protected() -> bool:
     if not Middleware("rclpy", rclpy.get_rmw_implementation_identifier()).keeps_others_out:
         return False
     with zenoh_errors():
-        return is_protected(LISTENS_OF_RMW)
+        return is_protected()
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import array
 import base64
-import binascii
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rclzenoh.interfaces.message import CODES
 from throwcollect.errors import ConfigError
 from throwcollect.ros import get_message
 from throwcollect.wording import suggest
@@ -22,13 +22,8 @@ Numbers = Callable[[NDArray[Any], str], Any]
 """Makes a plain value of an array of numbers and the IDL type of its elements."""
 
 _ARRAY = re.compile(r"(?:sequence<(?P<element>.+?)(?:, (?P<most>\d+))?>|(?P<item>.+)\[(?P<length>\d+)\])")
-_DTYPES = {
-    **{f"{sign}int{bits}": np.dtype(f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
-    "octet": np.dtype(np.uint8),
-    "float": np.dtype(np.float32),
-    "double": np.dtype(np.float64),
-    "boolean": np.dtype(np.bool_),
-}
+_CODES: dict[str, Any] = {**CODES, "octet": "B", "float": "f", "double": "d"}
+"""Format character of each type of numbers in `array`; those of integers have the same names in IDL."""
 _FLOATS = ("float", "double")
 _OCTETS = ("octet", "uint8")
 _ROS_1_NAMES = {"secs": "sec", "nsecs": "nanosec"}
@@ -118,71 +113,50 @@ def _element(kind: str) -> str:
     return parts[0] if parts else ""
 
 
-def _convert(kind: str, value: object, path: str, current: Any = None) -> Any:
+def _convert(kind: str, value: Any, path: str, current: Any = None) -> Any:
     if parts := array_parts(kind):
         element, most, length = parts
-        if element in _DTYPES:
-            array: Any = _numbers(element, value, current)
+        if element in _CODES or element == "boolean":
+            values = _numbers(element, value, current)
         elif isinstance(value, list):
-            array = [_convert(element, item, f"{path}[{index}]") for index, item in enumerate(value)]
+            values = [_convert(element, item, f"{path}[{index}]") for index, item in enumerate(value)]
         else:
             raise TypeError
-        if (most is not None and len(array) > most) or (length is not None and len(array) != length):
+        if (most is not None and len(values) > most) or (length is not None and len(values) != length):
             raise ValueError
-        return array
+        return values
     if _is_message(kind):
         package, _, short = kind.partition("/")
         message = get_message(f"{package}/msg/{short}")()
         fill(message, value, f"{path}.")
         return message
-    if kind in _DTYPES:
-        (number,) = _check_numbers(kind, [value])
+    if kind == "boolean":
+        if not isinstance(value, bool):
+            raise TypeError
+        return value
+    if kind in _FLOATS and isinstance(value, int | float | None):
+        return math.nan if value is None else float(value)
+    if kind in _CODES:
+        (number,) = array.array(_CODES[kind], [value])
         return bytes([number]) if isinstance(current, bytes) else number
     if isinstance(value, bool | dict | list) or value is None:
         raise TypeError
     return str(value)
 
 
-def _numbers(element: str, value: object, current: Any) -> Any:
-    """An array of numbers, as the class of a message takes it; ``current`` is the value that it has."""
-    dtype = _DTYPES[element]
+def _numbers(element: str, value: Any, current: Any) -> Any:
+    """Numbers or truth values as the class of a message takes them; ``current`` is the value that it has."""
     if element in _OCTETS and isinstance(value, str):
-        try:
-            value = base64.b64decode(value, validate=True)
-        except binascii.Error as error:
-            raise ValueError from error
-    if element in _OCTETS and isinstance(value, bytes | bytearray):
-        numbers = np.frombuffer(value, dtype)
-    elif isinstance(value, np.ndarray) and value.dtype == dtype:
-        numbers = value
-    elif isinstance(value, list | np.ndarray):
-        numbers = np.array(_check_numbers(element, value if isinstance(value, list) else value.tolist()), dtype)
-    else:
+        value = base64.b64decode(value, validate=True)
+    elif element in _FLOATS and isinstance(value, list):
+        value = [math.nan if each is None else each for each in value]
+    is_octets = element in _OCTETS and isinstance(value, bytes | bytearray)
+    if not is_octets and not isinstance(value, list | np.ndarray):
         raise TypeError
-    # Fields with numbers are `array.array` or lists on rclpy, and NumPy arrays on the embedded backend.
+    # Fields with numbers are `array.array` or lists on rclpy, and on the embedded backend NumPy arrays, which check.
     if isinstance(current, array.array):
-        return array.array(current.typecode, numbers.tobytes())
-    if isinstance(current, list):
-        return [bytes([octet]) for octet in numbers] if element == "octet" else numbers.tolist()
-    return numbers
-
-
-def _check_numbers(kind: str, values: list[Any]) -> list[Any]:
-    """Numbers or truth values that a type can hold."""
-    # Types are compared exactly, because `isinstance` would take truth values for whole numbers.
-    kinds = set(map(type, values))
-    allowed: set[type] = {bool} if kind == "boolean" else {int}
-    if kind in _FLOATS:
-        allowed = {int, float, type(None)}
-    if not kinds <= allowed:
-        raise TypeError
-    if kind in _FLOATS:
-        return [math.nan if value is None else float(value) for value in values]
-    if values and kind != "boolean":
-        limits = np.iinfo(_DTYPES[kind])
-        if min(values) < limits.min or max(values) > limits.max:
-            raise ValueError
-    return values
+        return array.array(current.typecode, value.tolist() if isinstance(value, np.ndarray) else value)
+    return [bytes([octet]) for octet in value] if element == "octet" and isinstance(current, list) else value
 
 
 def _is_message(kind: str) -> bool:

@@ -1,7 +1,5 @@
 """What action servers and clients of the embedded backend do beyond rclpy."""
 
-import pytest
-
 from rclzenoh.interfaces import get_action
 from rclzenoh.interfaces.msg import GoalStatus
 from throwcollect.ros import ActionClient, ActionServer, Future
@@ -28,31 +26,3 @@ def test_a_client_subscribes_only_to_topics_that_it_uses(rig):
     assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 0)
     assert rig.spin(lambda: theirs.status != GoalStatus.STATUS_UNKNOWN)
     assert (node.count_subscribers(feedback), node.count_subscribers(status)) == (0, 1)
-
-
-def test_a_handle_may_end_a_goal_without_an_execute_callback(rig):
-    handles = []
-    node = rig.node("server")
-    ActionServer(node, FJT, "/act", handle_accepted_callback=handles.append)
-    client = ActionClient(rig.node("client"), FJT, "/act")
-    assert client.wait_for_server(5)
-    theirs = rig.result(client.send_goal_async(goal("a")))
-    result = theirs.get_result_async()
-    assert rig.spin(lambda: handles)
-    handles[0].execute()
-    handles[0].succeed(FJT.Result(error_string="directly"))
-    assert rig.result(result).result.error_string == "directly"
-    with pytest.raises(RuntimeError, match="is succeeded and cannot be aborted"):
-        handles[0].abort()
-
-
-def test_the_first_result_of_a_goal_counts(rig):
-    def execute(handle):
-        handle.succeed(FJT.Result(error_string="first"))
-        return FJT.Result(error_string="second")
-
-    ActionServer(rig.node("server"), FJT, "/act", execute)
-    client = ActionClient(rig.node("client"), FJT, "/act")
-    assert client.wait_for_server(5)
-    handle = rig.result(client.send_goal_async(goal("a")))
-    assert [rig.result(handle.get_result_async()).result.error_string for _ in range(2)] == ["first", "first"]

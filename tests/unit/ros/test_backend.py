@@ -24,11 +24,6 @@ def _fresh():
     _choose_installed.cache_clear()
 
 
-def test_the_environment_can_ask_for_the_embedded_backend(monkeypatch):
-    monkeypatch.setenv(VARIABLE, "embedded")
-    assert not uses_rclpy()
-
-
 @pytest.fixture
 def ros(monkeypatch, tmp_path):
     """The files of a ROS 2 with Fast DDS that the check for rclpy looks for; none of them can be imported."""

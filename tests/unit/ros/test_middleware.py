@@ -49,14 +49,6 @@ def test_the_environment_of_a_process_names_the_backend_and_its_rmw():
     assert OTHER.environment() == {VARIABLE: "rclpy", RMW_VARIABLE: "rmw_cyclonedds_cpp"}
 
 
-def test_the_middleware_of_a_process_follows_from_its_environment(rclpy, monkeypatch):
-    assert Middleware.of_process() == FAST_DDS
-    monkeypatch.setenv(RMW_VARIABLE, OTHER.rmw)
-    assert Middleware.of_process() == OTHER
-    monkeypatch.setenv(VARIABLE, "embedded")
-    assert Middleware.of_process() == EMBEDDED
-
-
 def test_settled_middleware_overrules_the_environment_without_changing_it(rclpy, monkeypatch):
     monkeypatch.setenv(VARIABLE, "embedded")
     before = dict(os.environ)

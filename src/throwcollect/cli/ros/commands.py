@@ -35,18 +35,6 @@ ParameterArgument = Annotated[str, typer.Argument(metavar="NAME", help="Name of 
 _PROFILE = "fast_dds.xml"
 _SERVICE_S = 5.0
 """Longest wait for the parameter services of a node."""
-_FIELDS = {
-    1: ("Boolean value is:", "bool_value"),
-    2: ("Integer value is:", "integer_value"),
-    3: ("Double value is:", "double_value"),
-    4: ("String value is:", "string_value"),
-    5: ("Byte values are:", "byte_array_value"),
-    6: ("Boolean values are:", "bool_array_value"),
-    7: ("Integer values are:", "integer_array_value"),
-    8: ("Double values are:", "double_array_value"),
-    9: ("String values are:", "string_array_value"),
-}
-"""Label and field of each number of rcl_interfaces/msg/ParameterType, with the labels of `ros2 param get`."""
 _STATUSES = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
 """Names of the numbers of action_msgs/msg/GoalStatus."""
 
@@ -133,19 +121,15 @@ def _indent(message: Any) -> str:
 
 @param_app.command("get")
 def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
-    """Print the value of a parameter."""
-    from throwcollect.ros.message_values import plain
+    """Print the value of a parameter as YAML."""
+    from throwcollect.cli.ros.yaml_values import yaml_text
 
     with join_graph(run) as session:
         owner = _find_node(session, node)
-        values = _ask(session, owner, "GetParameters", names=[name]).values
+        values = _ask(session, owner, "get_parameters", names=[name]).values
         if not values:
-            require_name("parameter", name, _ask(session, owner, "ListParameters").result.names, of=owner)
-        if not values or values[0].type not in _FIELDS:
-            print("Parameter not set.")
-            return
-        label, field = _FIELDS[values[0].type]
-        print(label, plain(getattr(values[0], field)))
+            require_name("parameter", name, _ask(session, owner, "list_parameters").result.names, of=owner)
+        print(yaml_text(ros.parameter_value_to_python(values[0]) if values else None), end="")
 
 
 # A value may be a negative number, which would otherwise be taken for an option.
@@ -153,28 +137,23 @@ def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption =
 def set_parameter(
     node: NodeArgument,
     name: ParameterArgument,
-    value: Annotated[str, typer.Argument(metavar="VALUE", help="Value in YAML.")],
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="Value in YAML; a string if it is no other type's.")],
     run: RunOption = None,
 ) -> None:
     """Set a parameter."""
-    parameter = _make_parameter(name, value)
-    with join_graph(run) as session:
-        owner = _find_node(session, node)
-        (result,) = _ask(session, owner, "SetParameters", parameters=[parameter]).results
-        if not result.successful:
-            raise ConfigError(f"setting {name} of {owner} failed: {result.reason}")
-        print("Set parameter successful" + (f": {result.reason}" if result.reason else ""))
-
-
-def _make_parameter(name: str, text: str) -> Any:
-    """Make the message of a parameter of the type that its value has in YAML; other types become strings."""
     from throwcollect.cli.ros.yaml_values import parse
 
     try:
-        value = parse(text, "VALUE")
-        return ros.Parameter(name, value=text if value is None else value).to_parameter_msg()
+        parsed = parse(value, "VALUE")
+        parameter = ros.Parameter(name, value=value if parsed is None else parsed)
     except (TypeError, ConfigError):
-        return ros.Parameter(name, value=text).to_parameter_msg()
+        parameter = ros.Parameter(name, value=value)
+    with join_graph(run) as session:
+        owner = _find_node(session, node)
+        (result,) = _ask(session, owner, "set_parameters", parameters=[parameter.to_parameter_msg()]).results
+        if not result.successful:
+            raise ConfigError(f"setting {name} of {owner} failed: {result.reason}")
+        print("Set parameter successful")
 
 
 def _find_node(session: GraphSession, name: str) -> str:
@@ -185,12 +164,8 @@ def _find_node(session: GraphSession, name: str) -> str:
 
 
 def _ask(session: GraphSession, node: str, service: str, **fields: Any) -> Any:
-    service_type: Any = ros.get_service(f"rcl_interfaces/srv/{service}")
-    snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in service).strip("_")
-    client = session.node.create_client(service_type, f"{node}/{snake}")
+    kind: Any = ros.get_service(f"rcl_interfaces/srv/{service.title().replace('_', '')}")
+    client = session.node.create_client(kind, f"{node}/{service}")
     if not client.wait_for_service(timeout_sec=_SERVICE_S):
-        raise WorkerError(f"{node} offers no {snake}")
-    future = client.call_async(service_type.Request(**fields))
-    response = session.answer(future, alive=client.service_is_ready, who=node)
-    session.node.destroy_client(client)
-    return response
+        raise WorkerError(f"{node} offers no {service}")
+    return session.answer(client.call_async(kind.Request(**fields)), alive=client.service_is_ready, who=node)

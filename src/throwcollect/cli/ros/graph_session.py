@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from throwcollect import ros
-from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, Interrupted, UnreachableError, WorkerError
 from throwcollect.ros.graph_names import make_own_name
 from throwcollect.wording import suggest
 
@@ -113,9 +113,7 @@ def join_graph(run: str | None) -> Iterator[GraphSession]:
     try:
         try:
             ros.init(connection=connection)
-        except ConfigError:
-            raise
-        except ThrowcollectError as error:
+        except UnreachableError as error:
             raise ConfigError(
                 error.message,
                 expected="a router there, or another one named in ZENOH_CONFIG_OVERRIDE",

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import statistics
 import time
-from collections import deque
-from itertools import pairwise
 from operator import attrgetter
 from typing import Annotated, Any
 
@@ -23,9 +20,7 @@ TopicArgument = Annotated[str, typer.Argument(metavar="TOPIC", help="Name of the
 
 _DEPTH = 100
 """Messages that wait for `hz` to count them."""
-_REPORT_NS = 10**9
-_WINDOW = 10_000
-"""Number of messages that are averaged."""
+_PERIOD_S = 1.0
 
 
 @topic_app.command("list")
@@ -82,32 +77,18 @@ def echo(
 
 @topic_app.command("hz")
 def show_rate(topic: TopicArgument, run: RunOption = None) -> None:
-    """Print how often messages arrive, on average over the last 10,000."""
+    """Print every second how many messages have arrived in it."""
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic)
-        arrivals: deque[int] = deque(maxlen=_WINDOW)
+        arrived: list[bytes] = []
         # A subscription that asks for less than the publisher offers is served; the other way round, nothing arrives.
         qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
-        session.node.create_subscription(
-            message_type, name, lambda _: arrivals.append(time.monotonic_ns()), qos, raw=True
-        )
-        reported = time.monotonic_ns()
+        session.node.create_subscription(message_type, name, arrived.append, qos, raw=True)
         while has_reader():
-            report = reported + _REPORT_NS
-            session.spin_until(lambda until=report: time.monotonic_ns() >= until)  # type: ignore[misc]
-            if len(arrivals) > 1 and arrivals[-1] > reported:
-                print(_describe_rate(arrivals), flush=True)
-            reported = report
-
-
-def _describe_rate(arrivals: deque[int]) -> str:
-    gaps = [(after - before) * 1e-9 for before, after in pairwise(arrivals)]
-    mean = statistics.fmean(gaps)
-    rate = 1.0 / mean if mean else 0.0
-    return (
-        f"average rate: {rate:.3f}\n\tmin: {min(gaps):.3f}s max: {max(gaps):.3f}s "
-        f"std dev: {statistics.pstdev(gaps):.5f}s window: {len(gaps)}"
-    )
+            end = (begin := time.monotonic()) + _PERIOD_S
+            session.spin_until(lambda end=end: time.monotonic() >= end)  # type: ignore[misc]
+            print(f"average rate: {len(arrived) / (time.monotonic() - begin):.3f}", flush=True)
+            arrived.clear()
 
 
 def _find_message_type(session: GraphSession, topic: str) -> tuple[str, Any]:

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import re
 import sys
-from typing import Any
 
-from throwcollect.config.shape import ValueShape, shape_of
+from throwcollect.config.shape import shape_of
 from throwcollect.ros import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 _LARGEST = sys.float_info.max
@@ -40,16 +39,15 @@ def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDesc
     descriptor = ParameterDescriptor(
         description=_find_description(parts), additional_constraints=str(shape), read_only=read_only
     )
-    number = next((option for option in shape.alternatives if option.node.get("type") in ("number", "integer")), None)
-    if number is None:
-        return descriptor
-    low, high = _find_bounds(number, whole=isinstance(value, int))
-    if low is None and high is None:
-        return descriptor
-    if isinstance(value, float):
-        descriptor.floating_point_range = [floating_range(low, high)]
-    else:
-        descriptor.integer_range = [integer_range(low, high)]
+    for option in shape.alternatives:
+        node = option.node
+        if node.get("type") not in ("number", "integer"):
+            continue
+        low, high = node.get("minimum", node.get("exclusiveMinimum")), node.get("maximum", node.get("exclusiveMaximum"))
+        if isinstance(value, float):
+            descriptor.floating_point_range = [floating_range(low, high)]
+        else:
+            descriptor.integer_range = [integer_range(low, high)]
     return descriptor
 
 
@@ -59,17 +57,3 @@ def _find_description(parts: list[str | int]) -> str:
         if text := shape_of(parts[:length]).node.get("description"):
             return re.sub(r"\s+", " ", text)
     return ""
-
-
-def _find_bounds(number: ValueShape, *, whole: bool) -> tuple[Any, Any]:
-    """Find least and largest value; for numbers that are not whole, perhaps bounds that are themselves not allowed.
-
-    Where there is no bound, it is None.
-    """
-    node, step = number.node, int(whole)
-    low, above = node.get("minimum"), node.get("exclusiveMinimum")
-    high, below = node.get("maximum"), node.get("exclusiveMaximum")
-    return (
-        low if above is None else above + step,
-        high if below is None else below - step,
-    )

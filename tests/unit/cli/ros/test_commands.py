@@ -172,9 +172,9 @@ def test_topic_echo_prints_a_message_or_one_of_its_fields_as_yaml(say: Callable[
 
 
 def test_parameters_are_read_and_set(say: Callable[..., Said]) -> None:
-    assert say("param", "get", "robot/driver", "names").out == "String values are: ['a', 'b']\n"
+    assert say("param", "get", "robot/driver", "names").out == "- a\n- b\n"
     assert say("param", "set", "/robot/driver", "names", "[c]") == (0, "Set parameter successful\n", "")
-    assert say("param", "get", "/robot/driver", "names").out == "String values are: ['c']\n"
+    assert say("param", "get", "/robot/driver", "names").out == "- c\n"
     say("param", "set", "/robot/driver", "names", "[a, b]")
     refused = say("param", "set", "/robot/driver", "limit", "10")
     assert refused.code == 2

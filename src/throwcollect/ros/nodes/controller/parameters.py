@@ -22,8 +22,6 @@ _CHANGEABLE = {
     "allow_nonzero_velocity_at_trajectory_end": "Whether the last point may have a velocity",
     "cmd_timeout": "How long after the end of a trajectory the joints are stopped [s]; 0 never",
 }
-_LEAST_RATE_HZ = 0.1
-"""Least `action_monitor_rate`; all other numbers must only not be negative."""
 
 
 class ControllerParameterServer:
@@ -41,9 +39,7 @@ class ControllerParameterServer:
         for name, value, description, read_only in _list_declared(limb.controller.parameters):
             descriptor = ParameterDescriptor(description=description, read_only=read_only)
             if isinstance(value, float):
-                descriptor.floating_point_range = [
-                    floating_range(_LEAST_RATE_HZ if name == "action_monitor_rate" else 0.0, None)
-                ]
+                descriptor.floating_point_range = [floating_range(0.0, None)]
             node.declare_parameter(name, value, descriptor)
             if not read_only:
                 self._configured[name] = value

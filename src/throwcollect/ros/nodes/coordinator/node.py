@@ -19,7 +19,7 @@ from throwcollect.ros import Node, graph_changes
 from throwcollect.ros.msg import String
 from throwcollect.ros.nodes.coordinator.showing import PROGRESS_QOS, PROGRESS_TOPIC, Showing
 from throwcollect.ros.nodes.coordinator.simulation_client import EPISODE_TOPIC, SimulationClient
-from throwcollect.ros.self_check import begin_to_serve
+from throwcollect.ros.serving import begin_to_serve
 from throwcollect.run_key import Signer
 from throwcollect.side_by_side import count_cores
 from throwcollect.trial.lease import Lease
@@ -30,10 +30,8 @@ _TELL_EVERY_S = 10.0
 
 _DISCOVERY_PERIOD_S = 0.05
 _REPORT_PERIOD_S = 0.2
-_UNREADABLE_PERIOD_S = 10.0
-"""Time between two warnings of episodes that cannot be read, because anybody may publish them, and often."""
-_SHARED_PERIOD_S = 10.0
-"""Time between two warnings of simulations that share a namespace."""
+_WARNING_PERIOD_S = 10.0
+"""Time between two warnings of the same thing."""
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 """An RMW gives this name to a node when it has heard of its publisher, and not yet of the node."""
 _REACH_S = 6.0
@@ -158,7 +156,7 @@ class Coordinator(Node):
                 self.get_logger().warning(
                     f"namespace {above or '/'}: gets no trials, as {len(names)} simulations share it: "
                     f"{', '.join(sorted(names))}",
-                    throttle_duration_sec=_SHARED_PERIOD_S,
+                    throttle_duration_sec=_WARNING_PERIOD_S,
                 )
             elif names:
                 (name,) = names
@@ -184,7 +182,7 @@ class Coordinator(Node):
         except DatasetError as error:
             # Anybody may have sent it, so the simulation is not blamed.
             self.get_logger().warning(
-                f"{namespace}: an episode is dropped: {error}", throttle_duration_sec=_UNREADABLE_PERIOD_S
+                f"{namespace}: an episode is dropped: {error}", throttle_duration_sec=_WARNING_PERIOD_S
             )
             return
         simulation = self._simulations[namespace]

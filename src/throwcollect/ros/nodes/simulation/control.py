@@ -29,10 +29,8 @@ Fill = Callable[[Any, Any], None]
 """Function of a request and a response that fills the response."""
 
 _WORLD_FRAME = "world"
-_LARGEST_COORDINATE_M = 1e3
-_LARGEST_SPEED = 1e3
-"""Largest speed that a client may give a body [m/s, rad/s]: at a higher one, its place would soon be no number."""
-
+_LARGEST = 1e3
+"""Largest coordinate [m] and speed [m/s, rad/s] that a client may give a body: its place must stay a number."""
 _NORM_TOLERANCE = 1e-3
 
 _FEATURES = (
@@ -178,13 +176,13 @@ def read_state(message: EntityState) -> BodyState:
     if not abs(norm - 1.0) <= _NORM_TOLERANCE:
         text = f"orientation {state.orientation_xyzw}: a quaternion of norm {norm:g}"
         raise RequestError("INVALID_POSE", text, expected="norm 1")
-    if not all(abs(value) <= _LARGEST_COORDINATE_M for value in state.position):
-        expected = f"within {_LARGEST_COORDINATE_M:g} m of the world's origin"
-        raise RequestError("INVALID_POSE", f"position {state.position} m", expected=expected)
-    speeds = (*state.linear_velocity, *state.angular_velocity)
-    if not all(abs(speed) <= _LARGEST_SPEED for speed in speeds):
-        expected = f"numbers up to {_LARGEST_SPEED:g} m/s and rad/s"
-        raise RequestError("RESULT_OPERATION_FAILED", f"twist {speeds}", expected=expected)
+    twist = (*state.linear_velocity, *state.angular_velocity)
+    for reason, what, values in (
+        ("INVALID_POSE", "position", state.position),
+        ("RESULT_OPERATION_FAILED", "twist", twist),
+    ):
+        if not all(abs(value) <= _LARGEST for value in values):
+            raise RequestError(reason, f"{what} {values}", expected=f"at most {_LARGEST:g} m, m/s and rad/s")
     return state
 
 

@@ -337,8 +337,6 @@ class SimulationNode(Node):
         setup = self._simulation.trial.setup
         number = int(values.get(NUMBER, setup.number))
         controllers = tuple(filter(None, values.get(CONTROLLERS, setup.controllers)))
-        if number >= MOST_TRIALS:
-            raise ConfigError(f"{NUMBER}: should be below {MOST_TRIALS}, got {number}")
         if unknown := [name for name in controllers if name not in self._simulation.limbs]:
             raise ConfigError(f"no controller {unknown[0]!r}")
         return number, controllers

@@ -10,7 +10,7 @@ from throwcollect.config.loader import load
 from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
 from throwcollect.ros.nodes.simulation.node import SimulationNode
-from throwcollect.ros.self_check import begin_to_serve
+from throwcollect.ros.serving import begin_to_serve
 from throwcollect.sim.live import LiveSimulator
 
 

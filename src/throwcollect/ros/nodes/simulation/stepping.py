@@ -13,8 +13,6 @@ from throwcollect.ros.srv import StepSimulation
 from throwcollect.sim.live import LiveSimulator, StepRequest
 
 _ACTION = "simulate_steps"
-_MOST_STEPS = 100_000
-"""Most steps in one call of the service: they take some seconds, and the call cannot be cancelled."""
 
 
 class Stepping:
@@ -55,9 +53,6 @@ class Stepping:
         self, request: StepSimulation.Request, response: StepSimulation.Response
     ) -> StepSimulation.Response:
         try:
-            if request.steps > _MOST_STEPS:
-                message = f"{request.steps} steps in one call; at most {_MOST_STEPS}"
-                raise RequestError("RESULT_OPERATION_FAILED", message, hint=f"the action {_ACTION}")
             await self._take(request.steps, None)
         except RequestError as error:
             return refusal(StepSimulation.Response, error)
