@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field, FiniteFloat, ValidationError
 
 from throwcollect.arguments import check_bounds, read_word, refuse_argument
 from throwcollect.config.task_config import LARGEST_TARGET
@@ -17,14 +17,13 @@ from throwcollect.dataset.directory import has_files
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
-from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs, refuse_far_places
+from throwcollect.learning.adapting import Adaptation, Method, adapt, refuse_far_throws
 from throwcollect.learning.aiming import Aim, Choice, aim
-from throwcollect.learning.arrays import Array, ModelEntry
-from throwcollect.learning.distilling import ONNX, distil, encode_onnx
-from throwcollect.learning.learned_map import EFFORT, KeyRole, LearnedMap
+from throwcollect.learning.distilling import ONNX, DistilledMap, distil, encode_onnx
+from throwcollect.learning.learned_map import EFFORT, Axis, Correction, KeyRole, Kind, LearnedMap
 from throwcollect.learning.model_card import describe_model
-from throwcollect.learning.model_file import ModelFile
-from throwcollect.learning.score import Score, pool_scores
+from throwcollect.learning.polynomial import Array, ModelEntry, Polynomial
+from throwcollect.learning.score import Score
 from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.version import __version__
@@ -40,19 +39,73 @@ _MOST_BYTES = 100_000_000
 _File = TypeVar("_File", bound=ModelEntry)
 
 
-class Model(ModelFile):
+class TrainedOn(ModelEntry):
+    """The dataset and the throws that the model was learned from.
+
+    Attributes:
+        name: Name of the collection.
+        robot: Name of the robot.
+        task: Name of the task.
+        engine: Name of the physics engine.
+        digest: Digest of the dataset.
+        throws: Number of throws that it was learned from.
+        ignored: Number of throws that did not succeed.
+        selection: The condition on throws; None for all.
+        folds_error: By degree: median distance of throws from their prediction by polynomials fitted to others.
+        without_latents: The same distance when latents are no inputs; None if there are no latents.
+        latents_count: Whether latents have an effect that is worth knowing.
+    """
+
+    name: str
+    robot: str
+    task: str
+    engine: str
+    digest: str
+    throws: int
+    ignored: int
+    selection: str | None
+    folds_error: dict[int, FiniteFloat] = Field(min_length=1)
+    without_latents: FiniteFloat | None
+    latents_count: bool
+
+    @property
+    def error(self) -> float:
+        """The smallest of the errors, which belongs to the chosen degree."""
+        return min(self.folds_error.values())
+
+
+class Model(ModelEntry):
     """Where throws with given parameters end, and which parameters lead to a target.
 
     A model is a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`, byte for byte.
 
-    Its other attributes are those of `ModelFile`.
-
     Attributes:
+        version: Version of throwcollect that made it.
+        kind: How predictions are made.
+        axes: The inputs: parameters, then context, then latents.
+        targets: Columns of the table of throws that say where a trial ended.
+        forward: The polynomial: all inputs to targets.
+        effort: The polynomial of the largest share of a joint's torque limit.
+        correction: How the world differs from the dataset's.
+        trained_on: The throws that it was learned from.
+        adaptation: How it was adapted; None if it was not.
+        distilled: A polynomial from targets to parameters; None if it was not distilled.
         points: Arrow table of the throws that it was learned from: ``trial``, inputs, ends, effort; a file of its own.
         config: YAML of the dataset's configuration; a file of its own.
         source: Directory with the files that the configuration names, of the dataset or of a model; they are copied.
     """
 
+    format: Literal["1"] = "1"
+    version: str
+    kind: Kind
+    axes: tuple[Axis, ...] = Field(min_length=1)
+    targets: tuple[str, ...] = Field(min_length=1)
+    forward: Polynomial
+    effort: Polynomial
+    correction: Correction
+    trained_on: TrainedOn
+    adaptation: Adaptation | None
+    distilled: DistilledMap | None = None
     points: Any = Field(default=None, exclude=True)
     config: str = Field(default="", exclude=True)
     source: Path | None = Field(default=None, exclude=True)
@@ -166,22 +219,18 @@ class Model(ModelFile):
         check_bounds("seed", seed, least=0)
         _check_scatter(scatter)
         distilled = None if self.distilled is None else distil(leave_out_correction(self.learned))
-        scores = [
-            score_model(
-                self.learned,
-                simulator,
-                count=targets,
-                seed=each,
-                world=world,
-                scatter=scatter,
-                error=self.trained_on.error,
-                latents_count=self.trained_on.latents_count,
-                distilled=distilled,
-                processes=processes,
-            )
-            for each in range(seed, seed + seeds)
-        ]
-        return pool_scores(scores)
+        return score_model(
+            self.learned,
+            simulator,
+            count=targets,
+            seeds=range(seed, seed + seeds),
+            world=world,
+            scatter=scatter,
+            error=self.trained_on.error,
+            latents_count=self.trained_on.latents_count,
+            distilled=distilled,
+            processes=processes,
+        )
 
     def adapt(
         self,
@@ -218,9 +267,7 @@ class Model(ModelFile):
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
-        refuse_far_inputs(self.learned, KeyRole.PARAMETER, parameters)
-        refuse_far_inputs(self.learned, KeyRole.CONTEXT, context)
-        refuse_far_places(self.learned, measured)
+        refuse_far_throws(self.learned, parameters, context, measured)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
         deviation = float(np.hypot(scatter, self.trained_on.error))
         correction, adaptation = adapt(
@@ -276,14 +323,12 @@ class Model(ModelFile):
         rows = []
         for number, point in enumerate(points):
             if wrong := sorted(set(point) ^ set(names), key=str):
-                state = "is missing" if wrong[0] in names else "is no key of this model"
-                if wrong[0] in (axis.key for axis in self.learned.axes_of(KeyRole.LATENT)):
-                    state = "is a property of the world, which the model has learned; leave it out"
+                state = "is missing" if wrong[0] in names else "is no key that this model takes"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
             rows.append([point[name] for name in names])
         values = np.array(rows, np.float64).reshape(-1, len(names))
         if not np.isfinite(values).all():
-            number, column = (int(each[0]) for each in np.nonzero(~np.isfinite(values)))
+            number, column = np.argwhere(~np.isfinite(values))[0].tolist()
             value = values[number, column]
             raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
         split = len(self.parameters)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from throwcollect.learning.adapting import Adaptation, Method
-from throwcollect.learning.learned_map import Axis
-from throwcollect.learning.model_file import ModelFile
 from throwcollect.learning.score import SCORE_HEAD, Score, format_length, format_scatter
 from throwcollect.wording import format_count
+
+if TYPE_CHECKING:
+    from throwcollect.learning.model import Model
 
 PROGRAM = """\
 import json
@@ -45,45 +47,40 @@ parameters = dict(zip(keys, session.run(None, {"target": [target]})[0][0].tolist
 """Does the same with ``model.onnx``."""
 
 
-def describe_model(file: ModelFile, score: Score | None) -> str:
+def describe_model(model: Model, score: Score | None) -> str:
     """README.md of a model; its score is None if nobody has thrown with it."""
-    trained = file.trained_on
+    trained, targets = model.trained_on, model.targets
+    selected = f" (those with `{trained.selection}`)" if trained.selection else ""
+    folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in trained.folds_error.items())
+    if trained.without_latents is not None:
+        folds += f"; without latents: {format_length(trained.without_latents, targets)}"
+    axes = (
+        [f"`{axis.key}`", axis.role.value]
+        + [f"{number:.6g}" for number in (axis.minimum, axis.maximum, axis.nominal)]
+        + [axis.unit or "-"]
+        for axis in model.axes
+    )
     lines = [
         f"# A model of {trained.name}",
         "",
-        f"It maps the parameters of a trial to where it ends ({', '.join(file.targets)}), and back: from a target to "
+        f"It maps the parameters of a trial to where it ends ({', '.join(targets)}), and back: from a target to "
         f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
-        f"`{trained.digest}`" + (f" (those with `{trained.selection}`)" if trained.selection else "") + "; "
-        f"{trained.ignored} that did not succeed were left out. Robot: {trained.robot}; task: {trained.task}; physics "
-        f"engine: {trained.engine}. Made with throwcollect {file.version}.",
+        f"`{trained.digest}`{selected}; {trained.ignored} that did not succeed were left out. Robot: {trained.robot}; "
+        f"task: {trained.task}; physics engine: {trained.engine}. Made with throwcollect {model.version}.",
         "",
-        "| key | it is | from | to | configured | unit |",
-        "|---|---|---|---|---|---|",
-        *map(_describe_axis, file.axes),
-        "",
+        *_tabulate(("key", "it is", "from", "to", "configured", "unit"), axes),
         "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing is "
         "extrapolated beyond the ranges.",
         "",
-        f"Predictions for throws that polynomials were not fitted to are off by {_format_length(trained.error, file)} "
-        "(median, in simulation); by degree: "
-        + ", ".join(f"{degree}: {_format_length(error, file)}" for degree, error in trained.folds_error.items())
-        + (
-            f"; without latents: {_format_length(trained.without_latents, file)}"
-            if trained.without_latents is not None
-            else ""
-        )
-        + ".",
+        "Predictions for throws that polynomials were not fitted to are off by "
+        f"{format_length(trained.error, targets)} (median, in simulation); by degree: {folds}.",
         "",
     ]
-    if file.adaptation is not None:
-        lines += _describe_adaptation(file.adaptation, file)
+    if model.adaptation is not None:
+        lines += _describe_adaptation(model.adaptation, targets)
     if score is not None:
-        lines += _describe_score(score, file)
-    return "\n".join([*lines, *_describe_use(file)])
-
-
-def _describe_use(file: ModelFile) -> list[str]:
-    lines = [
+        lines += _describe_score(score, targets)
+    lines += [
         "## What it was not tested on",
         "",
         "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every number "
@@ -93,88 +90,58 @@ def _describe_use(file: ModelFile) -> list[str]:
         "",
         "`model.json` alone is enough. For a `target`, in the order and the units above:",
         "",
-        "```python",
-        PROGRAM.rstrip(),
-        "```",
+        f"```python\n{PROGRAM}```",
         "",
     ]
-    if file.distilled is not None:
+    if model.distilled is not None:
         lines += [
             "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its parameters "
             "stay inside of their ranges for any target, in reach or not. In Python:",
             "",
-            "```python",
-            ONNX_PROGRAM.rstrip(),
-            "```",
+            f"```python\n{ONNX_PROGRAM}```",
             "",
         ]
-    return lines
+    return "\n".join(lines)
 
 
-def _describe_axis(axis: Axis) -> str:
-    unit = axis.unit or "-"
-    return (
-        f"| `{axis.key}` | {axis.role.value} | {axis.minimum:.6g} | {axis.maximum:.6g} | {axis.nominal:.6g} | {unit} |"
-    )
-
-
-def _describe_adaptation(adaptation: Adaptation, file: ModelFile) -> list[str]:
+def _describe_adaptation(adaptation: Adaptation, targets: Sequence[str]) -> Iterator[str]:
     throws = format_count(adaptation.throws, "throw")
+    yield "## Adapted to another world\n"
     if adaptation.method is Method.NONE:
-        return ["## Adapted to another world", "", f"{throws} there did not speak for any difference.", ""]
-    lines = [
-        "## Adapted to another world",
-        "",
-        f"By {throws} there; what differs was taken to be: {adaptation.method.value}.",
-        "",
-        "| | found | standard deviation |",
-        "|---|---|---|",
-        *(f"| `{each.name}` | {each.value:.4g} | {each.deviation:.2g} |" for each in adaptation.found),
-        "",
-    ]
+        yield f"{throws} there did not speak for any difference.\n"
+        return
+    yield f"By {throws} there; what differs was taken to be: {adaptation.method.value}.\n"
+    found = ((f"`{each.name}`", f"{each.value:.4g}", f"{each.deviation:.2g}") for each in adaptation.found)
+    yield from _tabulate(("", "found", "standard deviation"), found)
     before, after = adaptation.medians
     if after is not None:
-        lines += [
-            f"The throws were off by {_format_length(before, file)} before (median), "
-            f"and by {_format_length(after, file)} after, each predicted by a model that was adapted to the others.",
-            "",
-        ]
-    return lines
+        yield (
+            f"The throws were off by {format_length(before, targets)} before (median), and by "
+            f"{format_length(after, targets)} after, each predicted by a model that was adapted to the others.\n"
+        )
 
 
-def _describe_score(score: Score, file: ModelFile) -> list[str]:
-    targets = format_count(score.targets, "target")
+def _describe_score(score: Score, targets: Sequence[str]) -> Iterator[str]:
     rows = score.list_rows()
     here = len(rows) - len(score.adapted)
-    lines = [
-        "## How it hits",
-        "",
-        f"Misses of {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
-        "the seeds; each draws targets, the throws that were learned from, and those in another world; in simulation:",
-        "",
-        *_tabulate(rows[:here]),
-        "",
-    ]
+    yield "## How it hits\n"
+    yield (
+        f"Misses of {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')} (from "
+        f"{score.seed} on), medians of the seeds; each draws targets, the throws that were learned from, and those in "
+        "another world; in simulation:\n"
+    )
+    yield from _tabulate(("", *SCORE_HEAD), rows[:here])
     if score.adapted:
-        scatter = (
-            f", with a scatter of {format_scatter(score.scatter, file.targets)} of what is measured"
-            if score.scatter
-            else ""
+        measured = f", with a scatter of {format_scatter(score.scatter, targets)} of what is measured"
+        yield (
+            f"In another world{measured if score.scatter else ''}, at those of these targets that can be reached "
+            "there, in simulation:\n"
         )
-        lines += [
-            f"In another world{scatter}, at those of these targets that can be reached there, in simulation:",
-            "",
-            *_tabulate(rows[here:]),
-            "",
-        ]
-    return lines
+        yield from _tabulate(("", *SCORE_HEAD), rows[here:])
 
 
-def _tabulate(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    lines = [("", *SCORE_HEAD), ("---",) * (len(SCORE_HEAD) + 1), *rows]
-    return [f"| {' | '.join(cells)} |" for cells in lines]
-
-
-def _format_length(value: float | None, file: ModelFile) -> str:
-    """A distance between targets, over all of them."""
-    return format_length(value, file.targets)
+def _tabulate(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Make the lines of a table in Markdown, and an empty one after it."""
+    for cells in (head, ["---"] * len(head), *rows):
+        yield f"| {' | '.join(cells)} |"
+    yield ""
