@@ -116,11 +116,14 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
     facts = _list_facts(dataset, info)
     task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
+    by = robot_of(dataset.config).introduction
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
     return Report(
         name=info.name,
-        lead=f"{info.trials:,} {task.subject}{finished}.",
+        lead=f"{info.trials:,} simulated {dataset.config.task.subject} by {by}{finished}.",
         tiles=(
+            Tile(f"{len(outcomes.codes):,}", f"{noun}s planned"),
+            Tile(format_share(outcomes.succeeded, len(outcomes.codes)), in_words(outcomes.success)),
             *task.tiles,
             Tile(format_duration(info.duration_s), "of simulated time"),
             Tile(format_size(info.size_bytes), "on disk"),
@@ -154,20 +157,14 @@ def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
 
 
 def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded."""
+    """Make the part of the task; an empty one for a task without."""
     name = dataset.config.task.name
-    if path := task_of(dataset.config).report:
-        report = load_part("tasks", name, path)
-        with explain_failure("tasks", name, "report its trials"):
-            added: TaskReport = report(dataset, outcomes)
-        return added
-    trials = len(outcomes.codes)
-    tiles = (
-        Tile(f"{trials:,}", "trials planned"),
-        Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success)),
-    )
-    by = robot_of(dataset.config).introduction
-    return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
+    if not (path := task_of(dataset.config).report):
+        return TaskReport()
+    report = load_part("tasks", name, path)
+    with explain_failure("tasks", name, "report its trials"):
+        added: TaskReport = report(dataset, outcomes)
+    return added
 
 
 def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> ReportSection:

@@ -8,8 +8,7 @@ import pytest
 from throwcollect.report.contents import format_duration, format_share, format_size
 from throwcollect.report.outcomes import Outcomes, style_of
 from throwcollect.report.sections import FailureGroup, group_failures
-from throwcollect.report.throw.measured import Residuals
-from throwcollect.report.throw.throw_sections import _show_physics
+from throwcollect.report.throw.flights import Residuals, show_physics
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 from throwcollect.tasks.throw_into.into_result import IntoOutcome
@@ -75,5 +74,5 @@ def test_a_size_is_shown_in_decimal_units(count: int, text: str) -> None:
 
 def test_the_page_says_where_exact_flights_are_drawn():
     """A logarithmic axis has no place for 0, so the page says which bar has the flights that agree to the last bit."""
-    section = _show_physics(Residuals(episodes=3, checked=3, distance_m=np.array([0.0, 0.0, 3e-15])))
+    section = show_physics(Residuals(episodes=3, checked=3, distance_m=np.array([0.0, 0.0, 3e-15])))
     assert "2 agree to the last bit (drawn at 1e-17 m)" in str(section.text)

@@ -7,16 +7,13 @@ import pyarrow as pa
 import pytest
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.report.throw.measured import CellAxis, Landings, count_throws
-from throwcollect.report.throw.throw_figures import draw_coverage_map
+from throwcollect.report.figures import Points
+from throwcollect.report.throw.throw_sections import CellAxis, _show_cells, count_throws, draw_coverage_map
 
 
-def make_landings(distance: list[float], angle: list[float]) -> Landings:
-    count, zero = len(distance), np.zeros(len(distance))
-    trials = np.arange(count)
-    return Landings(
-        trials, trials, np.array(distance), zero, zero, trials * 0, np.array(distance), np.array(angle), zero
-    )
+def make_landings(distance: list[float]) -> Points:
+    trials, zero = np.arange(len(distance)), np.zeros(len(distance))
+    return Points(trials, trials, np.array(distance), zero, np.array(distance), zero, trials * 0)
 
 
 def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
@@ -27,28 +24,31 @@ def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
             "hit_angle_rad": {"min": 0, "max": 1, "bins": 1},
         }
     )
-    throws = pa.table({"scene_landing_height_m": [0.2, 0.7, 1.0, 0.1]})
-    found = count_throws(make_landings([1.2, 1.2, 2.0, 2.1], [0.5, 0.5, 1.0, 0.5]), throws, target=target)
+    throws = pa.table({"scene_landing_height_m": [0.2, 0.7, 1.0, 0.1], "hit_angle_rad": [0.5, 0.5, 1.0, 0.5]})
+    found = count_throws(make_landings([1.2, 1.2, 2.0, 2.1]), throws, target=target)
     assert found is not None
     assert found.counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height
-    assert (found.hit, found.throws, found.counts.size) == (3, 4, 4)
-    assert [(first.label[:3], second.label[:3]) for first, second, _ in found.pairs] == [
-        ("lan", "hit"),
-        ("lan", "lan"),
-        ("hit", "lan"),
+    assert found.others == 1
+    panels = {panel.title: panel for panel in _show_cells(found, "landed")}
+    assert list(panels) == [
+        "Targets: landing distance and hit angle",
+        "Targets: landing distance and landing height",
+        "Targets: hit angle and landing height",
     ]
-    assert found.pairs[1][2].tolist() == [[1, 1], [0, 1]]
-    assert found.pairs[2][2].tolist() == [[1, 2]]
+    first, second, third = (np.nan_to_num(panel.figure.data[0].z).T.tolist() for panel in panels.values())
+    assert (first, second, third) == ([[2], [1]], [[1, 1], [0, 1]], [[1, 2]])
+    text = panels["Targets: landing distance and hit angle"].text
+    assert text == "3 of 4 cells have a throw that landed, at most 1; 1 landed in no cell."
 
 
 def test_cells_have_round_edges_if_no_target_is_configured() -> None:
-    found = count_throws(make_landings([1.0, 1.34, 2.4], [1.2, 1.21, 1.3]), pa.table({}), target=None)
+    found = count_throws(make_landings([1.0, 1.34, 2.4]), pa.table({"hit_angle_rad": [1.2, 1.21, 1.3]}), target=None)
     assert found is not None
     distance, angle = found.axes
     assert distance.edges == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance.edges)])
     assert np.diff(angle.edges) == pytest.approx(0.5)
     assert found.counts.sum() == 3
-    assert count_throws(make_landings([], []), pa.table({}), target=None) is None
+    assert count_throws(make_landings([]), pa.table({}), target=None) is None
 
 
 @pytest.mark.parametrize(("most", "mark"), [(1, 1), (8, 1), (9, None)])

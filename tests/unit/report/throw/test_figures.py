@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from throwcollect.dataset.motion import Joint
-from throwcollect.report.throw.throw_figures import draw_joint
+from throwcollect.report.throw.flights import draw_joint
 
 
 def test_a_joint_that_slides_is_drawn_in_millimetres_and_one_that_turns_in_degrees() -> None:

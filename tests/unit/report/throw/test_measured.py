@@ -10,8 +10,9 @@ import pytest
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.report.figures import Points
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.throw.measured import choose_examples, measure_residuals, read_landings
+from throwcollect.report.throw.flights import choose_examples, measure_residuals
 from throwcollect.report.throw.throw_sections import report_throws
 
 
@@ -19,7 +20,7 @@ def test_example_throws_have_an_episode_and_are_in_order_of_distance(collection:
     collection.refuse(5, "too fast")
     dataset = Dataset.open(collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[2]))
     outcomes = Outcomes.of(dataset.throws["outcome"].to_pylist())
-    landings = read_landings(dataset.throws, outcomes)
+    landings = Points.read(dataset.throws, outcomes, "landing", None, "release_speed_mps")
     results = [collection.result(collection.episode(trial)) for trial in (0, 1, 3, 4, 6)]
     assert landings.trial.tolist() == [0, 1, 3, 4, 6]
     assert landings.x_m.tolist() == [result.landing.position[0] for result in results]
@@ -77,7 +78,7 @@ def test_a_report_on_throws_into_a_bin_shows_the_bin_and_which_throws_stayed_in_
     outcomes = Outcomes.of(dataset["outcome"].tolist(), success="in_bin")
     assert outcomes.counts["in_bin"] == 2
     report = report_throws(dataset, outcomes)
-    assert (report.tiles[1].value, report.tiles[1].label) == ("33.3 %", "in bin")
+    assert [tile.label for tile in report.tiles] == ["landing distance", "release speed"]
     landing, _ = report.results
     assert landing.text.startswith(
         "2 of 6 throws stayed in the bin; the balls crossed the plane of the rim at z = 0.25 m"
