@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from operator import index
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import BODY_COMPONENTS
-from throwcollect.engines.engine import BODY_NUMBERS
 from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
@@ -288,43 +286,33 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
     # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
-    elsewhere = partial(_resample_body, places=places, recorded_hz=recorded_hz)
-    names = ("object_position", "object_orientation_xyzw", "object_linear_velocity", "object_angular_velocity")
-    found = dict(zip(names, elsewhere(*samples.parts_of(0)), strict=True))
-    numbers = range(1, samples.bodies.shape[1] + 1)
-    bodies = [np.hstack(elsewhere(*samples.parts_of(number))) for number in numbers]
-    found["bodies"] = np.stack(bodies, axis=1) if bodies else np.zeros((count, 0, BODY_NUMBERS))
-    # A command holds until the next one.
-    found["command"] = samples.command[places.astype(np.intp)]
-    found["position"] = _interpolate_cubically(samples.position, samples.velocity / recorded_hz, places)
-    found |= {name: _interpolate_linearly(getattr(samples, name), places) for name in ("velocity", "effort")}
+    bodies = range(samples.bodies.shape[1] + 1)
+    recorded = np.stack([np.hstack(samples.parts_of(number)) for number in bodies], axis=1)
+    recorded[..., 3:7] = _remove_flips(recorded[..., 3:7])
+    between = _interpolate_linearly(recorded, places)
+    between[..., :3] = _interpolate_cubically(recorded[..., :3], recorded[..., 7:10] / recorded_hz, places)
+    between[..., 3:7] /= np.linalg.norm(between[..., 3:7], axis=-1, keepdims=True)
+    position, turn, linear, angular = np.split(between[:, 0], (3, 7, 10), axis=1)
     elapsed_ns = np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64)
-    return Samples(stamps_ns=samples.stamps_ns[0] + elapsed_ns, **found)
-
-
-def _resample_body(
-    position: NDArray[np.float64],
-    orientation: NDArray[np.float64],
-    linear: NDArray[np.float64],
-    angular: NDArray[np.float64],
-    *,
-    places: NDArray[np.float64],
-    recorded_hz: int,
-) -> tuple[NDArray[np.float64], ...]:
-    """Compute a body between its samples; see `resample`."""
-    turn = _interpolate_linearly(_remove_flips(orientation), places)
-    return (
-        _interpolate_cubically(position, linear / recorded_hz, places),
-        turn / np.linalg.norm(turn, axis=1, keepdims=True),
-        _interpolate_linearly(linear, places),
-        _interpolate_linearly(angular, places),
+    return Samples(
+        stamps_ns=samples.stamps_ns[0] + elapsed_ns,
+        position=_interpolate_cubically(samples.position, samples.velocity / recorded_hz, places),
+        velocity=_interpolate_linearly(samples.velocity, places),
+        effort=_interpolate_linearly(samples.effort, places),
+        object_position=position,
+        object_orientation_xyzw=turn,
+        object_linear_velocity=linear,
+        object_angular_velocity=angular,
+        bodies=between[:, 1:],
+        # A command holds until the next one.
+        command=samples.command[places.astype(np.intp)],
     )
 
 
 def _interpolate_linearly(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     before = np.minimum(places.astype(np.intp), len(values) - 1)
     after = np.minimum(before + 1, len(values) - 1)
-    share = (places - before)[:, np.newaxis]
+    share = (places - before).reshape(-1, *[1] * (values.ndim - 1))
     between: NDArray[np.float64] = (1 - share) * values[before] + share * values[after]
     return between
 
@@ -341,6 +329,6 @@ def _interpolate_cubically(
 def _remove_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose, of the two quaternions of each orientation, the one that is near the quaternion before."""
     # Each flip turns the sign of all quaternions that follow, so that two flips cancel out.
-    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
-    signs = np.where(np.cumsum(turns) % 2, -1.0, 1.0)
-    return np.vstack([quaternions[:1], quaternions[1:] * signs[:, np.newaxis]])
+    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0
+    signs = np.where(np.cumsum(turns, axis=0) % 2, -1.0, 1.0)
+    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., np.newaxis]])

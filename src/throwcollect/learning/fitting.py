@@ -20,7 +20,8 @@ from throwcollect.dataset.selection import find_rows
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath
 from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, LearnedMap, count_needed_throws, fit_throws
-from throwcollect.learning.model import MODEL, Model, TrainedOn, load_model
+from throwcollect.learning.model import MODEL, Model, load_model
+from throwcollect.learning.model_card import TrainedOn
 from throwcollect.learning.polynomial import Array
 from throwcollect.version import __version__
 from throwcollect.wording import format_count, suggest

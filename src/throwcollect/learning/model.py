@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import Field, FiniteFloat, ValidationError
+from pydantic import Field, ValidationError
 
 from throwcollect.arguments import check_bounds, read_word, refuse_argument
 from throwcollect.config.task_config import LARGEST_TARGET
@@ -17,12 +17,12 @@ from throwcollect.dataset.directory import has_files
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
-from throwcollect.learning.adapting import Adaptation, Method, adapt, refuse_far_throws
+from throwcollect.learning.adapting import Method, adapt, refuse_far_throws
 from throwcollect.learning.aiming import Aim, Choice, aim
-from throwcollect.learning.distilling import ONNX, DistilledMap, distil, encode_onnx
-from throwcollect.learning.learned_map import EFFORT, Axis, Correction, KeyRole, Kind, LearnedMap
-from throwcollect.learning.model_card import describe_model
-from throwcollect.learning.polynomial import Array, ModelEntry, Polynomial
+from throwcollect.learning.distilling import ONNX, distil, encode_onnx
+from throwcollect.learning.learned_map import EFFORT, KeyRole, LearnedMap
+from throwcollect.learning.model_card import ModelCard
+from throwcollect.learning.polynomial import Array, ModelEntry
 from throwcollect.learning.score import Score
 from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
@@ -39,73 +39,19 @@ _MOST_BYTES = 100_000_000
 _File = TypeVar("_File", bound=ModelEntry)
 
 
-class TrainedOn(ModelEntry):
-    """The dataset and the throws that the model was learned from.
-
-    Attributes:
-        name: Name of the collection.
-        robot: Name of the robot.
-        task: Name of the task.
-        engine: Name of the physics engine.
-        digest: Digest of the dataset.
-        throws: Number of throws that it was learned from.
-        ignored: Number of throws that did not succeed.
-        selection: The condition on throws; None for all.
-        folds_error: By degree: median distance of throws from their prediction by polynomials fitted to others.
-        without_latents: The same distance when latents are no inputs; None if there are no latents.
-        latents_count: Whether latents have an effect that is worth knowing.
-    """
-
-    name: str
-    robot: str
-    task: str
-    engine: str
-    digest: str
-    throws: int
-    ignored: int
-    selection: str | None
-    folds_error: dict[int, FiniteFloat] = Field(min_length=1)
-    without_latents: FiniteFloat | None
-    latents_count: bool
-
-    @property
-    def error(self) -> float:
-        """The smallest of the errors, which belongs to the chosen degree."""
-        return min(self.folds_error.values())
-
-
-class Model(ModelEntry):
+class Model(ModelCard):
     """Where throws with given parameters end, and which parameters lead to a target.
 
     A model is a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`, byte for byte.
 
+    Its other attributes are those of `ModelCard`.
+
     Attributes:
-        version: Version of throwcollect that made it.
-        kind: How predictions are made.
-        axes: The inputs: parameters, then context, then latents.
-        targets: Columns of the table of throws that say where a trial ended.
-        forward: The polynomial: all inputs to targets.
-        effort: The polynomial of the largest share of a joint's torque limit.
-        correction: How the world differs from the dataset's.
-        trained_on: The throws that it was learned from.
-        adaptation: How it was adapted; None if it was not.
-        distilled: A polynomial from targets to parameters; None if it was not distilled.
         points: Arrow table of the throws that it was learned from: ``trial``, inputs, ends, effort; a file of its own.
         config: YAML of the dataset's configuration; a file of its own.
         source: Directory with the files that the configuration names, of the dataset or of a model; they are copied.
     """
 
-    format: Literal["1"] = "1"
-    version: str
-    kind: Kind
-    axes: tuple[Axis, ...] = Field(min_length=1)
-    targets: tuple[str, ...] = Field(min_length=1)
-    forward: Polynomial
-    effort: Polynomial
-    correction: Correction
-    trained_on: TrainedOn
-    adaptation: Adaptation | None
-    distilled: DistilledMap | None = None
     points: Any = Field(default=None, exclude=True)
     config: str = Field(default="", exclude=True)
     source: Path | None = Field(default=None, exclude=True)
@@ -306,7 +252,7 @@ class Model(ModelEntry):
             write_file(beside / MODEL, (self.model_dump_json(indent=1) + "\n").encode())
             write_file(beside / POINTS, encode_table(self.points))
             write_file(beside / CONFIG, self.config.encode())
-            write_file(beside / CARD, describe_model(self, None).encode())
+            write_file(beside / CARD, self.describe(None).encode())
             if self.source is not None:
                 copy_carried(self.source, beside)
             if onnx is not None:
@@ -315,7 +261,7 @@ class Model(ModelEntry):
     def write_score(self, directory: Path, score: Score) -> None:
         """Write a score into the directory of this model, in place of an earlier one, and into the model's card."""
         write_file(directory / SCORE, (score.model_dump_json(indent=1) + "\n").encode())
-        write_file(directory / CARD, describe_model(self, score).encode())
+        write_file(directory / CARD, self.describe(score).encode())
 
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points."""

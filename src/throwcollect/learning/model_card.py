@@ -1,16 +1,18 @@
-"""Writes the card of a model: axes, errors, misses, what it was not tested on, and how a robot's program uses it."""
+"""What is in ``model.json``, and the card of a model: axes, errors, misses, and how a robot's program uses it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import Literal
+
+from pydantic import Field, FiniteFloat
 
 from throwcollect.learning.adapting import Adaptation, Method
+from throwcollect.learning.distilling import DistilledMap
+from throwcollect.learning.learned_map import Axis, Correction, Kind
+from throwcollect.learning.polynomial import ModelEntry, Polynomial
 from throwcollect.learning.score import SCORE_HEAD, Score, format_length, format_scatter
 from throwcollect.wording import format_count
-
-if TYPE_CHECKING:
-    from throwcollect.learning.model import Model
 
 PROGRAM = """\
 import json
@@ -47,61 +49,125 @@ parameters = dict(zip(keys, session.run(None, {"target": [target]})[0][0].tolist
 """Does the same with ``model.onnx``."""
 
 
-def describe_model(model: Model, score: Score | None) -> str:
-    """README.md of a model; its score is None if nobody has thrown with it."""
-    trained, targets = model.trained_on, model.targets
-    selected = f" (those with `{trained.selection}`)" if trained.selection else ""
-    folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in trained.folds_error.items())
-    if trained.without_latents is not None:
-        folds += f"; without latents: {format_length(trained.without_latents, targets)}"
-    axes = (
-        [f"`{axis.key}`", axis.role.value]
-        + [f"{number:.6g}" for number in (axis.minimum, axis.maximum, axis.nominal)]
-        + [axis.unit or "-"]
-        for axis in model.axes
-    )
-    lines = [
-        f"# A model of {trained.name}",
-        "",
-        f"It maps the parameters of a trial to where it ends ({', '.join(targets)}), and back: from a target to "
-        f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
-        f"`{trained.digest}`{selected}; {trained.ignored} that did not succeed were left out. Robot: {trained.robot}; "
-        f"task: {trained.task}; physics engine: {trained.engine}. Made with throwcollect {model.version}.",
-        "",
-        *_tabulate(("key", "it is", "from", "to", "configured", "unit"), axes),
-        "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing is "
-        "extrapolated beyond the ranges.",
-        "",
-        "Predictions for throws that polynomials were not fitted to are off by "
-        f"{format_length(trained.error, targets)} (median, in simulation); by degree: {folds}.",
-        "",
-    ]
-    if model.adaptation is not None:
-        lines += _describe_adaptation(model.adaptation, targets)
-    if score is not None:
-        lines += _describe_score(score, targets)
-    lines += [
-        "## What it was not tested on",
-        "",
-        "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every number "
-        "on this page is one in simulation.",
-        "",
-        "## In a program of a robot",
-        "",
-        "`model.json` alone is enough. For a `target`, in the order and the units above:",
-        "",
-        f"```python\n{PROGRAM}```",
-        "",
-    ]
-    if model.distilled is not None:
-        lines += [
-            "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its parameters "
-            "stay inside of their ranges for any target, in reach or not. In Python:",
+class TrainedOn(ModelEntry):
+    """The dataset and the throws that the model was learned from.
+
+    Attributes:
+        name: Name of the collection.
+        robot: Name of the robot.
+        task: Name of the task.
+        engine: Name of the physics engine.
+        digest: Digest of the dataset.
+        throws: Number of throws that it was learned from.
+        ignored: Number of throws that did not succeed.
+        selection: The condition on throws; None for all.
+        folds_error: By degree: median distance of throws from their prediction by polynomials fitted to others.
+        without_latents: The same distance when latents are no inputs; None if there are no latents.
+        latents_count: Whether latents have an effect that is worth knowing.
+    """
+
+    name: str
+    robot: str
+    task: str
+    engine: str
+    digest: str
+    throws: int
+    ignored: int
+    selection: str | None
+    folds_error: dict[int, FiniteFloat] = Field(min_length=1)
+    without_latents: FiniteFloat | None
+    latents_count: bool
+
+    @property
+    def error(self) -> float:
+        """The smallest of the errors, which belongs to the chosen degree."""
+        return min(self.folds_error.values())
+
+
+class ModelCard(ModelEntry):
+    """``model.json``: a learned map without the throws that it was learned from; `describe` makes its card.
+
+    Attributes:
+        version: Version of throwcollect that made it.
+        kind: How predictions are made.
+        axes: The inputs: parameters, then context, then latents.
+        targets: Columns of the table of throws that say where a trial ended.
+        forward: The polynomial: all inputs to targets.
+        effort: The polynomial of the largest share of a joint's torque limit.
+        correction: How the world differs from the dataset's.
+        trained_on: The throws that it was learned from.
+        adaptation: How it was adapted; None if it was not.
+        distilled: A polynomial from targets to parameters; None if it was not distilled.
+    """
+
+    format: Literal["1"] = "1"
+    version: str
+    kind: Kind
+    axes: tuple[Axis, ...] = Field(min_length=1)
+    targets: tuple[str, ...] = Field(min_length=1)
+    forward: Polynomial
+    effort: Polynomial
+    correction: Correction
+    trained_on: TrainedOn
+    adaptation: Adaptation | None
+    distilled: DistilledMap | None = None
+
+    def describe(self, score: Score | None) -> str:
+        """README.md of the model; its score is None if nobody has thrown with it."""
+        trained, targets = self.trained_on, self.targets
+        selected = f" (those with `{trained.selection}`)" if trained.selection else ""
+        folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in trained.folds_error.items())
+        if trained.without_latents is not None:
+            folds += f"; without latents: {format_length(trained.without_latents, targets)}"
+        axes = (
+            [f"`{axis.key}`", axis.role.value]
+            + [f"{number:.6g}" for number in (axis.minimum, axis.maximum, axis.nominal)]
+            + [axis.unit or "-"]
+            for axis in self.axes
+        )
+        lines = [
+            f"# A model of {trained.name}",
             "",
-            f"```python\n{ONNX_PROGRAM}```",
+            f"It maps the parameters of a trial to where it ends ({', '.join(targets)}), and back: from a target to "
+            f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
+            f"`{trained.digest}`{selected}; {trained.ignored} that did not succeed were left out. Robot: "
+            f"{trained.robot}; task: {trained.task}; physics engine: {trained.engine}. Made with "
+            f"throwcollect {self.version}.",
+            "",
+            *_tabulate(("key", "it is", "from", "to", "configured", "unit"), axes),
+            "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing "
+            "is extrapolated beyond the ranges.",
+            "",
+            "Predictions for throws that polynomials were not fitted to are off by "
+            f"{format_length(trained.error, targets)} (median, in simulation); by degree: {folds}.",
             "",
         ]
-    return "\n".join(lines)
+        if self.adaptation is not None:
+            lines += _describe_adaptation(self.adaptation, targets)
+        if score is not None:
+            lines += _describe_score(score, targets)
+        lines += [
+            "## What it was not tested on",
+            "",
+            "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every "
+            "number on this page is one in simulation.",
+            "",
+            "## In a program of a robot",
+            "",
+            "`model.json` alone is enough. For a `target`, in the order and the units above:",
+            "",
+            f"```python\n{PROGRAM}```",
+            "",
+        ]
+        if self.distilled is not None:
+            lines += [
+                "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its "
+                "parameters stay inside of their ranges for any target, in reach or not. In Python:",
+                "",
+                f"```python\n{ONNX_PROGRAM}```",
+                "",
+            ]
+        return "\n".join(lines)
 
 
 def _describe_adaptation(adaptation: Adaptation, targets: Sequence[str]) -> Iterator[str]:

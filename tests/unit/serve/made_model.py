@@ -9,7 +9,8 @@ import numpy as np
 import pyarrow as pa
 
 from throwcollect.learning.learned_map import EFFORT, Axis, Correction, KeyRole, Kind
-from throwcollect.learning.model import Model, TrainedOn
+from throwcollect.learning.model import Model
+from throwcollect.learning.model_card import TrainedOn
 from throwcollect.learning.polynomial import Polynomial
 
 KEYS = ("task.a", "task.b")
