@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,10 +17,10 @@ from throwcollect.dataset.directory import has_files
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
-from throwcollect.learning.adapting import Method, adapt, refuse_far_throws
+from throwcollect.learning.adapting import Adaptation, Method, adapt, refuse_far_throws
 from throwcollect.learning.aiming import Aim, Choice, aim
 from throwcollect.learning.distilling import ONNX, distil, encode_onnx
-from throwcollect.learning.learned_map import EFFORT, KeyRole, LearnedMap
+from throwcollect.learning.learned_map import EFFORT, Correction, KeyRole, LearnedMap
 from throwcollect.learning.model_card import ModelCard
 from throwcollect.learning.polynomial import Array, ModelEntry
 from throwcollect.learning.score import Score
@@ -172,8 +172,7 @@ class Model(ModelCard):
             seeds=range(seed, seed + seeds),
             world=world,
             scatter=scatter,
-            error=self.trained_on.error,
-            latents_count=self.trained_on.latents_count,
+            adapt_map=self._bind_adapt(scatter),
             distilled=distilled,
             processes=processes,
         )
@@ -214,21 +213,16 @@ class Model(ModelCard):
                 hint="try bias",
             )
         refuse_far_throws(self.learned, parameters, context, measured)
-        # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
-        deviation = float(np.hypot(scatter, self.trained_on.error))
-        correction, adaptation = adapt(
-            self.learned,
-            parameters,
-            context,
-            measured,
-            method=chosen,
-            scatter=deviation,
-            latents_count=self.trained_on.latents_count,
-        )
+        correction, adaptation = self._bind_adapt(scatter)(self.learned, parameters, context, measured, method=chosen)
         # The map of the other world shares what was computed from the throws.
         changed = {"correction": correction, "learned": self.learned.correct(correction)}
         world = self.model_copy(update={**changed, "adaptation": adaptation, "version": __version__, "distilled": None})
         return world if self.distilled is None else world.distil()
+
+    def _bind_adapt(self, scatter: float) -> partial[tuple[Correction, Adaptation]]:
+        # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
+        deviation = float(np.hypot(scatter, self.trained_on.error))
+        return partial(adapt, scatter=deviation, latents_count=self.trained_on.latents_count)
 
     def distil(self) -> Model:
         """Add one polynomial from targets to parameters, which `save` writes into ``model.onnx``, too.

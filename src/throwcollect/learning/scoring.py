@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.throw import Throw
-from throwcollect.learning.adapting import Adaptation, Method, adapt, leave_as_it_is
+from throwcollect.learning.adapting import Adaptation, Method, leave_as_it_is
 from throwcollect.learning.aiming import aim
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.learned_map import (
@@ -34,6 +34,9 @@ REAL_THROWS = (0, 1, 3, 5, 10)
 """Numbers of throws in another world that a model is adapted by."""
 _APART = 1000
 """Added to the seed of targets, this gives the seed of throws to adapt by, so that these are no seed's targets."""
+
+Adapts = Callable[[LearnedMap, Array, Array, Array], tuple[Correction, Adaptation]]
+"""`adapt`, with all that is the same for all throws."""
 
 
 @runtime_checkable
@@ -65,8 +68,7 @@ def score_model(
     seeds: range,
     world: Simulates | None,
     scatter: float,
-    error: float,
-    latents_count: bool,
+    adapt_map: Adapts,
     distilled: DistilledMap | None,
     processes: int,
 ) -> Score:
@@ -80,8 +82,7 @@ def score_model(
         seeds: Seeds of their choice, of the throws that smaller models are learned from, and of the noise.
         world: Simulates the other world; None for none.
         scatter: Standard deviation of noise on the measured ends of throws in the other world.
-        error: Standard deviation of throws from the predictions of the map.
-        latents_count: Whether latents have an effect that is worth knowing.
+        adapt_map: Adapts a map to throws in the other world.
         distilled: The map that is distilled for the world of the dataset; None for none.
         processes: How many processes simulate.
     """
@@ -106,9 +107,7 @@ def score_model(
         throws += _list_throws(targets, places[len(sizes)])
         if world is None:
             continue
-        adaptations = _adapt_step_by_step(
-            learned, world, seed, scatter=scatter, error=error, latents_count=latents_count, processes=processes
-        )
+        adaptations = _adapt_step_by_step(learned, world, seed, scatter, adapt_map, processes)
         targets, found = _throw_there(learned, adaptations, targets, world, processes)
         adapted_throws += _list_throws(targets, found[-1]) if found else []
         for (number, (_, each)), ends in zip(adaptations.items(), found, strict=False):
@@ -141,14 +140,7 @@ def leave_out_correction(learned: LearnedMap) -> LearnedMap:
 
 
 def _adapt_step_by_step(
-    learned: LearnedMap,
-    world: Simulates,
-    seed: int,
-    *,
-    scatter: float,
-    error: float,
-    latents_count: bool,
-    processes: int,
+    learned: LearnedMap, world: Simulates, seed: int, scatter: float, adapt_map: Adapts, processes: int
 ) -> dict[int, tuple[Correction, Adaptation]]:
     """Throw in another world, and adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
     context = _find_nominal_context(learned)
@@ -162,14 +154,7 @@ def _adapt_step_by_step(
     parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
     found = {0: leave_as_it_is(learned, np.empty(0), scatter)}
     for number in sorted({min(number, len(measured)) for number in REAL_THROWS} - {0}):
-        found[number] = adapt(
-            learned,
-            parameters[:number],
-            given[:number],
-            measured[:number],
-            scatter=float(np.hypot(scatter, error)),
-            latents_count=latents_count,
-        )
+        found[number] = adapt_map(learned, parameters[:number], given[:number], measured[:number])
     return found
 
 

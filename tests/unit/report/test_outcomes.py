@@ -7,7 +7,7 @@ import pytest
 
 from throwcollect.report.contents import format_duration, format_share, format_size
 from throwcollect.report.outcomes import Outcomes, style_of
-from throwcollect.report.sections import FailureGroup, group_failures
+from throwcollect.report.sections import tabulate_failures
 from throwcollect.report.throw.flights import Residuals, show_physics
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
@@ -48,10 +48,13 @@ def test_failures_whose_reasons_differ_only_in_numbers_are_one_group() -> None:
         (2, "self_hit", "the ball touched arm_right_7_link at 0.812 s"),
         (3, "refused", "arm_right_4_joint needs 14 Nm at -1e-3 s"),
     ]
-    assert group_failures(rows) == (
-        FailureGroup("refused", "arm_right_4_joint needs # Nm at # s", 2, (1, 3)),
-        FailureGroup("self_hit", "the ball touched arm_right_7_link at 0.812 s", 1, (2,)),
+    table = tabulate_failures(rows)
+    assert table is not None
+    assert table.rows == (
+        ("refused", "arm_right_4_joint needs # Nm at # s", "2", "1, 3"),
+        ("self hit", "the ball touched arm_right_7_link at 0.812 s", "1", "2"),
     )
+    assert tabulate_failures(rows[:1]) is None
 
 
 @pytest.mark.parametrize(
