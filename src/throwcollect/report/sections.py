@@ -103,7 +103,8 @@ class Report:
 def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     """Make the report on a dataset, and on a model that was learned from it, if its directory is given."""
     throws, info = dataset.throws, summary(dataset)
-    outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
+    declared = (dataset.config.task.success, *(each.value for each in task_of(dataset.config).outcomes))
+    outcomes = Outcomes.of(throws["outcome"].to_pylist(), declared)
     parameters = read_parameters(dataset.config, throws, outcomes)
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
     facts = _list_facts(dataset, info)

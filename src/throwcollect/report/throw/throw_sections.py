@@ -18,7 +18,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.report.contents import Panel, ReportSection, TaskReport
 from throwcollect.report.figures import BLUE, SCALE, Points, colour_bar, draw_coloured, draw_map, place_bars
 from throwcollect.report.measured import MOST_POINTS, read_numbers
-from throwcollect.report.outcomes import LANDED, Outcomes
+from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.throw.flights import choose_examples, measure_residuals, show_examples, show_physics
 from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.tasks.task import task_of
@@ -76,7 +76,7 @@ def _show_landings(
         return ReportSection("landing", "Landings", title, f"No ball crossed the {_name_plane(outcomes)}.")
     text = f"{outcomes.succeeded:,} of {len(outcomes.codes):,} throws {outcomes.verbs[1]}"
     if len(planned):
-        if outcomes.success != LANDED:
+        if outcomes.success != "landed":
             text += f"; the balls crossed the {_name_plane(outcomes)}"
         x, y, distance = planned.x_m, planned.y_m, planned.distance_m
         text += (
@@ -86,7 +86,7 @@ def _show_landings(
     others = len(landings) - len(planned)
     text += f". {format_count(others, 'further ball')} crossed the {_name_plane(outcomes)}, too." if others else "."
     # A landing is all that a throw is about, but only a part of what other tasks are about.
-    figure = draw_map(landings, outcomes, bodies, speed="release speed" if outcomes.success == LANDED else None)
+    figure = draw_map(landings, outcomes, bodies, speed="release speed" if outcomes.success == "landed" else None)
     notes = [_say_how_many(landings)]
     if len({body.name for body in bodies}) < len(bodies):
         notes.append("Bodies differ from throw to throw; those of a few throws are drawn.")
@@ -143,7 +143,7 @@ def _say_how_many(landings: Points) -> str:
 
 
 def _name_plane(outcomes: Outcomes) -> str:
-    return "landing plane" if outcomes.success == LANDED else "plane of the rim"
+    return "landing plane" if outcomes.success == "landed" else "plane of the rim"
 
 
 @dataclass(frozen=True)

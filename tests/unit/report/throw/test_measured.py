@@ -11,9 +11,10 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.figures import Points
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.outcomes import SUCCESS, Outcomes
 from throwcollect.report.throw.flights import choose_examples, measure_residuals
 from throwcollect.report.throw.throw_sections import report_throws
+from throwcollect.tasks.throw_into.into_result import IntoOutcome
 
 
 def test_example_throws_have_an_episode_and_are_in_order_of_distance(collection: Any, tmp_path: Path) -> None:
@@ -75,7 +76,7 @@ def test_a_report_on_throws_into_a_bin_shows_the_bin_and_which_throws_stayed_in_
         "sweep": {"sampler": "grid", "parameters": swept},
     }
     dataset = Dataset.open(make_collection(settings).collect(tmp_path / "a", change=rest_in_bin))
-    outcomes = Outcomes.of(dataset["outcome"].tolist(), success="in_bin")
+    outcomes = Outcomes.of(dataset["outcome"].tolist(), list(IntoOutcome))
     assert outcomes.counts["in_bin"] == 2
     report = report_throws(dataset, outcomes)
     assert [tile.label for tile in report.tiles] == ["landing distance", "release speed"]
@@ -95,4 +96,4 @@ def test_a_report_on_throws_into_a_bin_shows_the_bin_and_which_throws_stayed_in_
         assert (max(pole_drawn.x), max(pole_drawn.y)) == pytest.approx((1.1, 2.1 if column == 1 else 1.0), abs=1e-3)
         assert pole_drawn.fillcolor == "rgba(63, 111, 176, 0.200)"
     legend = {trace.name: trace.marker.color for trace in above.figure.data if trace.showlegend is not False}
-    assert legend["in bin"] == outcomes.style_of("landed").colour
+    assert legend["in bin"] == SUCCESS.colour
