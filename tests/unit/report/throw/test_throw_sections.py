@@ -5,47 +5,70 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
+from throwcollect.config.sweep import TargetConfig
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.figures import Points
 from throwcollect.report.outcomes import SUCCESS, Outcomes
-from throwcollect.report.throw.flights import choose_examples, measure_residuals
-from throwcollect.report.throw.throw_sections import report_throws
+from throwcollect.report.throw.throw_sections import (
+    CellAxis,
+    _show_cells,
+    count_throws,
+    draw_coverage_map,
+    report_throws,
+)
 from throwcollect.tasks.throw_into.into_result import IntoOutcome
 
 
-def test_example_throws_have_an_episode_and_are_in_order_of_distance(collection: Any, tmp_path: Path) -> None:
-    collection.refuse(5, "too fast")
-    dataset = Dataset.open(collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[2]))
-    outcomes = Outcomes.of(dataset.throws["outcome"].to_pylist())
-    landings = Points.read(dataset.throws, outcomes, "landing", None, "release_speed_mps")
-    results = [collection.result(collection.episode(trial)) for trial in (0, 1, 3, 4, 6)]
-    assert landings.trial.tolist() == [0, 1, 3, 4, 6]
-    assert landings.x_m.tolist() == [result.landing.position[0] for result in results]
-    assert landings.distance_m == pytest.approx([np.hypot(*result.landing.position[:2]) for result in results])
-    nearest = landings.trial[np.argsort(landings.distance_m)].tolist()
-    examples = choose_examples(dataset, landings, outcomes)
-    assert list(examples) == nearest
+def make_landings(distance: list[float]) -> Points:
+    trials, zero = np.arange(len(distance)), np.zeros(len(distance))
+    return Points(trials, trials, np.array(distance), zero, np.array(distance), zero, trials * 0)
 
 
-def test_flights_of_a_sound_dataset_are_ballistic(collected: Path) -> None:
-    residuals = measure_residuals(Dataset.open(collected))
-    assert (residuals.episodes, residuals.checked, len(residuals.distance_m)) == (7, 7, 7)
-    assert residuals.distance_m.max() < 1e-12
+def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
+    target = TargetConfig.model_validate(
+        {
+            "distance_m": {"min": 1, "max": 2, "bins": 2},
+            "height_m": {"min": 0, "max": 1, "bins": 2},
+            "hit_angle_rad": {"min": 0, "max": 1, "bins": 1},
+        }
+    )
+    throws = pa.table({"scene_landing_height_m": [0.2, 0.7, 1.0, 0.1], "hit_angle_rad": [0.5, 0.5, 1.0, 0.5]})
+    found = count_throws(make_landings([1.2, 1.2, 2.0, 2.1]), throws, target=target)
+    assert found is not None
+    assert found.counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height
+    assert found.others == 1
+    panels = {panel.title: panel for panel in _show_cells(found, "landed")}
+    assert list(panels) == [
+        "Targets: landing distance and hit angle",
+        "Targets: landing distance and landing height",
+        "Targets: hit angle and landing height",
+    ]
+    first, second, third = (np.nan_to_num(panel.figure.data[0].z).T.tolist() for panel in panels.values())
+    assert (first, second, third) == ([[2], [1]], [[1, 1], [0, 1]], [[1, 2]])
+    text = panels["Targets: landing distance and hit angle"].text
+    assert text == "3 of 4 cells have a throw that landed, at most 1; 1 landed in no cell."
 
 
-def test_a_kick_in_a_flight_shows_in_its_residual(collection: Any, tmp_path: Path) -> None:
-    def kick(samples: Any, header: Any) -> Any:
-        if header.trial == 3:
-            samples.object_position[-5:, 0] += 1e-6
-        return samples, header
+def test_cells_have_round_edges_if_no_target_is_configured() -> None:
+    found = count_throws(make_landings([1.0, 1.34, 2.4]), pa.table({"hit_angle_rad": [1.2, 1.21, 1.3]}), target=None)
+    assert found is not None
+    distance, angle = found.axes
+    assert distance.edges == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance.edges)])
+    assert np.diff(angle.edges) == pytest.approx(0.5)
+    assert found.counts.sum() == 3
+    assert count_throws(make_landings([]), pa.table({}), target=None) is None
 
-    found = measure_residuals(Dataset.open(collection.collect(tmp_path / "dataset", change=kick)))
-    assert (found.distance_m > 1e-9).sum() == 1
-    assert found.distance_m[3] == pytest.approx(1e-6, rel=1e-3)
+
+@pytest.mark.parametrize(("most", "mark"), [(1, 1), (8, 1), (9, None)])
+def test_the_colour_scale_begins_at_0_and_marks_only_whole_throws(most: int, mark: int | None) -> None:
+    axis = CellAxis("landing distance", "landing distance [m]", np.array([1.0, 2.0]))
+    (cells,) = draw_coverage_map(axis, axis, np.array([[most]])).data
+    assert (cells.zmin, cells.zmax, cells.colorbar.dtick) == (0, most, mark)
 
 
 def test_the_report_on_a_derived_dataset_shows_throws_of_its_own_trials(collected: Path, tmp_path: Path) -> None:
