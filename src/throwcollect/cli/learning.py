@@ -208,7 +208,7 @@ def score(
     if policy is not None:
         own = directory / CONFIG
         worlds = {own: overrides(settings)} if world is None else {own: [], world: overrides(settings)}
-        _score_policy(directory, policy, worlds, (targets, seed, seeds), hit, json=json)
+        _score_policy(directory, policy, worlds, targets, range(seed, seed + seeds), hit, json=json)
         return
     model = load_model(directory)
     if settings and world is None:
@@ -236,13 +236,14 @@ def adapt(
     json: JsonOption = False,
 ) -> None:
     """Correct a model by a few throws of another robot or simulation."""
-    from throwcollect.learning.lists import read_table
+    from throwcollect.learning.lists import read_rows
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
 
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
-    rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))
+    names = (*keys, *model.targets)
+    rows = _read_dataset(throws, names, model) if throws.is_dir() else read_rows(throws, names, "THROWS")
     adapted = model.adapt(
         [dict(zip(keys, row[: len(keys)], strict=True)) for row in rows],
         [row[len(keys) :] for row in rows],
@@ -287,8 +288,8 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
     return values
 
 
-def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[list[float]]:
-    """Read the throws of a dataset that a model can learn from: the keys and the targets of each."""
+def _read_dataset(directory: Path, names: Sequence[str], model: Model) -> list[list[float]]:
+    """Read the throws of a dataset that a model can learn from: keys and columns of each."""
     from throwcollect.config.values import column_of
     from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.fitting import keep_informative
@@ -301,7 +302,6 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[li
             expected=f"{trained.task} of {trained.robot}, as the model has it",
         )
     throws = keep_informative(config.task, dataset.throws, model.targets)
-    names = [*keys, *model.targets]
     if missing := [name for name in names if column_of(name) not in throws.column_names]:
         raise ConfigError(
             f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
@@ -319,19 +319,17 @@ def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
 
 
 def _score_policy(
-    directory: Path, policy: str, worlds: dict[Path, list[str]], asked: tuple[int, int, int], hit: float, *, json: bool
+    directory: Path, policy: str, worlds: dict[Path, list[str]], count: int, seeds: range, hit: float, *, json: bool
 ) -> None:
-    """Score a policy at targets that a model or a dataset has, in some worlds, each with what `--set` changes.
-
-    Asked for is the number of targets, the first seed, and the number of seeds.
-    """
+    """Score a policy at targets that a model or a dataset has, in some worlds, each with what `--set` changes."""
     from contextlib import ExitStack
 
     from throwcollect.config.loader import load as load_config
     from throwcollect.config.policy import PolicyConfig
     from throwcollect.config.values import with_values
-    from throwcollect.learning.policy_score import read_ends, score_policy
+    from throwcollect.learning.fitting import read_ends
     from throwcollect.learning.score import SCORE_HEAD
+    from throwcollect.learning.scoring import score_policy
     from throwcollect.simulator import Simulator
 
     ends = read_ends(directory)
@@ -342,11 +340,11 @@ def _score_policy(
             section = (config.task.policy or PolicyConfig(use=policy)).model_copy(update={"use": policy})
             simulator = Simulator(with_values(config, {"task.policy": section}))
             simulators[str(path)] = opened.enter_context(simulator)
-        found = score_policy(ends, simulators, *asked, hit=hit, processes=count_cores())
+        found = score_policy(ends, simulators, count, seeds, hit=hit, processes=count_cores())
     if json:
         print_json([each.model_dump() for each in found])
         return
-    aimed = f"{format_count(asked[0], 'target')} for each of {format_count(asked[2], 'seed')}"
+    aimed = f"{format_count(count, 'target')} for each of {format_count(len(seeds), 'seed')}"
     typer.echo(f"{policy} throws at {aimed}, medians of the seeds, in simulation:")
     rows = [(each.world, f"{each.hits:.0%}", *each.errors.cells) for each in found]
     typer.echo("\n".join(align([("", "hits", *SCORE_HEAD), *rows], numbers=True)))

@@ -32,12 +32,13 @@ _GYM = 2
 
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
-    task = source.dataset.config.task
+    config, task = source.dataset.config, source.dataset.config.task
+    noun, position = task.noun, f"{config.acted_on}_position_m"
     success, measure = task.success, next(iter(task.targets), "outcome")
     return Layout(
         files={
-            "throws.hdf5": "the throw of trial N is the group `data/demo_N`; "
-            f"`mask/{success}` lists those that {success}; "
+            "throws.hdf5": f"the {noun} of trial N is the group `data/demo_N`; "
+            f"`mask/{success}` lists those that succeeded; "
             "`throws/` is the table of all trials, one dataset a column, with NaN, -1 or an empty string where there "
             "is nothing.",
         },
@@ -45,14 +46,15 @@ def describe(source: ExportSource) -> Layout:
 import h5py
 
 file = h5py.File("throws.hdf5")
-ball_position_m = file["data/demo_{source.throws[0].trial}/obs/ball_position_m"][:]
+{position} = file["data/demo_{source.throws[0].trial}/obs/{position}"][:]
 {measure} = file["throws/{measure}"][:]""",
         notes=(
-            "The layout is that of robomimic. Each group of a throw has `obs/` with what is measured, `next_obs/`, the "
-            "same one sample later (in the last sample, that of the sample itself), `actions`, the commanded positions "
-            f"of the moving joints one sample later, `rewards`, 1 in the last sample of a throw that {success}, and "
-            "`dones`, 1 in the last sample; and beside them `time_s` and what is commanded in the samples themselves. "
-            "Every dataset has the attributes `unit` and `description`, and `components` where it has several columns.",
+            f"The layout is that of robomimic. Each group of a {noun} has `obs/` with what is measured, `next_obs/`, "
+            "the same one sample later (in the last sample, that of the sample itself), `actions`, the commanded "
+            "positions of the moving joints one sample later, `rewards`, 1 in the last sample of a "
+            f"{noun} that succeeded, and `dones`, 1 in the last sample; and beside them `time_s` and what is commanded "
+            "in the samples themselves. Every dataset has the attributes `unit` and `description`, and `components` "
+            "where it has several columns.",
             "Actions are in radians, and robomimic's policies put out numbers between -1 and 1, so set "
             '`train.action_config.actions.normalization` to "min_max" there (version 0.5.0). '
             "`env_args` names no environment that robomimic could make.",

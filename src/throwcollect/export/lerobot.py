@@ -86,7 +86,8 @@ def list_features(moving: Sequence[str], targets: Sequence[TargetColumn], bodies
 
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
-    success = source.dataset.config.task.success
+    config = source.dataset.config
+    success, noun, body = config.task.success, config.task.noun, config.acted_on
     longest = max(map(source.count_samples, source.throws))
     return Layout(
         files={
@@ -100,9 +101,9 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 dataset = LeRobotDataset("me/throws", root=".")
 {success} = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: episode["outcome"] == "{success}")""",
         notes=(
-            f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a throw. Frames are float32, "
-            "as usual there. Joints that do not move, orientation and spin of the ball, and commanded velocities are "
-            "left out.",
+            f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a {noun}. Frames are float32, "
+            f"as usual there. Joints that do not move, orientation and spin of the {body}, and commanded velocities "
+            "are left out.",
             f"The longest episode has {longest} frames. A policy of LeRobot commands all of it at once with "
             f"`--policy.chunk_size={longest} --policy.n_action_steps={longest}` (ACT), and is to be asked at "
             f"{source.rate_hz} Hz. ACT and Diffusion train without images, because there is "
@@ -116,9 +117,9 @@ dataset = LeRobotDataset("me/throws", root=".")
             "| `observation.environment_state` | m, m/s | position and velocity of all that moves, in world"
             f"{_describe_goal(source)} |",
             "| `action` | rad | their commanded positions one frame later, on the trajectory sent to controllers |",
-            f"| `next.reward` | 1 | 1 in the last frame of a throw that {success}, 0 in all others |",
-            f"| `next.success` | | true in the last frame of a throw that {success} |",
-            "| `next.done` | | true in the last frame of a throw |",
+            f"| `next.reward` | 1 | 1 in the last frame of a {noun} that succeeded, 0 in all others |",
+            f"| `next.success` | | true in the last frame of a {noun} that succeeded |",
+            f"| `next.done` | | true in the last frame of a {noun} |",
             "",
             list_joints(source),
         ],

@@ -24,11 +24,12 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
-    shard, trial = next(iter(source.shards)), source.throws[0].trial
+    shard, trial, noun = next(iter(source.shards)), source.throws[0].trial, source.dataset.config.task.noun
+    position = f"{source.dataset.config.acted_on}_position_m"
     return Layout(
         files={
             "throws.npz": "one array a column, one element a trial; NaN, -1 or an empty string where there is nothing.",
-            "trajectories/": "one archive a recording. The samples of its k-th throw, which is trial `trial[k]`, are "
+            "trajectories/": f"one archive a recording. The samples of its k-th {noun}, which is trial `trial[k]`, are "
             "rows `offsets[k]` to `offsets[k + 1]` of each array.",
         },
         loading=f"""\
@@ -38,7 +39,7 @@ throws = np.load("throws.npz")
 archive = np.load("trajectories/{shard}.npz")
 k = list(archive["trial"]).index({trial})
 rows = slice(*archive["offsets"][k : k + 2])
-time_s, ball_position_m = archive["time_s"][rows], archive["ball_position_m"][rows]""",
+time_s, {position} = archive["time_s"][rows], archive["{position}"][rows]""",
         notes=("`joints` and `moving_joints` name the joints; no array needs `allow_pickle`.",),
         over_time=tabulate_signals(source),
     )

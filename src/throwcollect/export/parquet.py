@@ -72,11 +72,11 @@ _ROWS_PER_GROUP = 30_000
 
 def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
-    measures = ", ".join(source.dataset.config.task.events) or "measures"
+    noun, events = source.dataset.config.task.noun, source.dataset.config.task.events
     return Layout(
         files={
-            THROWS: f"one row a trial: swept values, outcome, {measures}.",
-            f"{_TRAJECTORIES}/": "one row a sample, throw after throw; `trial` says of which. No throw is divided "
+            THROWS: f"one row a trial: swept values, outcome, {', '.join(events) or 'measures'}.",
+            f"{_TRAJECTORIES}/": f"one row a sample, {noun} after {noun}; `trial` says of which. No {noun} is divided "
             "between files or row groups.",
             f"{_MOTIONS}/": "one row a point of the trajectories that controllers were sent, as `task.trajectory` with "
             "`family: file` reads them.",
@@ -87,8 +87,8 @@ import pandas as pd
 throws = pd.read_parquet("{THROWS}")
 samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.throws[0].trial})])""",
         notes=(
-            "Without `filters` these are the samples of all throws. Units and descriptions are also in the metadata of "
-            "the fields.",
+            f"Without `filters` these are the samples of all {noun}s. Units and descriptions are also in the metadata "
+            "of the fields.",
         ),
         over_time=tabulate_signals(source, columns=True),
         hub={

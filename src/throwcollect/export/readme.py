@@ -96,8 +96,8 @@ def _explain_rate(source: ExportSource) -> str:
         how = f"Each is one of the {recorded_hz} Hz record, unchanged: every {recorded_hz // source.rate_hz}th."
     else:
         how = (
-            f"They lie between those of the {recorded_hz} Hz record: positions of joints and ball on the cubic through "
-            "positions and velocities of both neighbours, all else linear, orientations normalised."
+            f"They lie between those of the {recorded_hz} Hz record: positions of joints and bodies on the cubic "
+            "through positions and velocities of both neighbours, all else linear, orientations normalised."
         )
     return (
         f"The samples are at {source.rate_hz} Hz. {how} Nothing is filtered: what is faster than "
@@ -106,13 +106,14 @@ def _explain_rate(source: ExportSource) -> str:
 
 
 def _explain_targets(source: ExportSource) -> list[str]:
-    """Say which throws have targets, if the dataset has some."""
+    """Say which trials have targets, if the dataset has some."""
+    noun = source.dataset.config.task.noun
     if not any(is_target(name) for name in source.table.column_names):
         return []
     if not source.targets:
-        return ["Not every throw has a target, so targets are in the table of all trials alone."]
+        return [f"Not every {noun} has a target, so targets are in the table of all trials alone."]
     names = _quote([each.name for each in source.targets])
-    return [f"Every throw has a target, {names}, which is the same in all its samples, for policies to condition on."]
+    return [f"Every {noun} has a target, {names}, which is the same in all its samples, for policies to condition on."]
 
 
 def tabulate_signals(source: ExportSource, *, columns: bool = False) -> list[str]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from operator import index
 from pathlib import Path
 
@@ -14,11 +13,11 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from throwcollect.arguments import refuse_argument
+from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import BODY_COMPONENTS
-from throwcollect.engines.engine import BODY_NUMBERS
 from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
@@ -76,45 +75,15 @@ class Signal:
         return self.components or (self.name,)
 
 
-def list_signals(
-    joints: Sequence[str],
-    moving: Sequence[str],
-    targets: Sequence[TargetColumn],
-    sliding: Collection[str] = (),
-    bodies: Sequence[str] = (),
-) -> tuple[Signal, ...]:
-    """Describe all signals of an exported throw; those of targets have the same value in all its samples.
-
-    Arrays of joints have the units of joints that turn in their names; components that are `sliding` have their own.
-    """
-    every = f"{len(joints)} joints"
-    return (
-        Signal("time_s", "Time since the start of the trial.", pattern="time_s"),
-        _describe_joints("joint_position_rad", "Measured joint positions.", joints, sliding, every),
-        _describe_joints("joint_velocity_radps", "Measured joint velocities.", joints, sliding, every),
-        _describe_joints("joint_effort_nm", "Torques of the motors; 0 for locked joints.", joints, sliding, every),
-        _describe_joints(
-            "command_position_rad",
-            "Commanded positions, on the trajectory that controllers were sent.",
-            moving,
-            sliding,
-        ),
-        _describe_joints("command_velocity_radps", "Commanded velocities.", moving, sliding),
-        _describe_joints("command_acceleration_radps2", "Commanded accelerations.", moving, sliding),
-        *(signal for body in bodies for signal in _describe_body(body)),
-        *(Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets),
-    )
-
-
-def _describe_joints(
-    name: str, description: str, joints: Sequence[str], sliding: Collection[str], each: str = "moving joints"
-) -> Signal:
-    ending = name.removeprefix("joint_")
-    names = {joint: f"{joint}_{ending}" for joint in joints}
-    components = tuple(name_sliding(own) if joint in sliding else own for joint, own in names.items())
-    return Signal(name, description, components, each, f"<joint>_{ending}")
-
-
+_JOINT_SIGNALS = {
+    "joint_position_rad": "Measured joint positions.",
+    "joint_velocity_radps": "Measured joint velocities.",
+    "joint_effort_nm": "Torques of the motors; 0 for locked joints.",
+    "command_position_rad": "Commanded positions, on the trajectory that controllers were sent.",
+    "command_velocity_radps": "Commanded velocities.",
+    "command_acceleration_radps2": "Commanded accelerations.",
+}
+"""Of all joints what is measured, of those that move what is commanded."""
 _BODY_SIGNALS = {
     "position_m": ("Centre of the {} in world.", "position", "xyz"),
     "orientation_xyzw": ("Unit quaternion, {} to world.", "orientation_xyzw", "xyzw"),
@@ -123,11 +92,26 @@ _BODY_SIGNALS = {
 }
 
 
-def _describe_body(body: str) -> Iterator[Signal]:
-    """Describe the signals of a body that moves, by its name."""
-    for ending, (description, quantity, axes) in _BODY_SIGNALS.items():
-        components = tuple(f"{body}_{component}" for component in BODY_COMPONENTS[quantity])
-        yield Signal(f"{body}_{ending}", description.format(body), components, ", ".join(axes), ", ".join(components))
+def list_signals(config: Config, targets: Sequence[TargetColumn]) -> Iterator[Signal]:
+    """Describe all signals of an exported throw; those of targets have the same value in all its samples.
+
+    Arrays of joints have the units of joints that turn in their names; components of those that slide have their own.
+    """
+    robot = robot_of(config)
+    yield Signal("time_s", "Time since the start of the trial.", pattern="time_s")
+    for name, description in _JOINT_SIGNALS.items():
+        measured, ending = name.startswith("joint_"), name.removeprefix("joint_")
+        joints = robot.joints if measured else config.moving_joints
+        names = {joint: f"{joint}_{ending}" for joint in joints}
+        components = tuple(name_sliding(own) if joint in robot.sliding else own for joint, own in names.items())
+        each = f"{len(joints)} joints" if measured else "moving joints"
+        yield Signal(name, description, components, each, f"<joint>_{ending}")
+    for body in moving_bodies_of(config):
+        for ending, (description, quantity, axes) in _BODY_SIGNALS.items():
+            components = tuple(f"{body}_{component}" for component in BODY_COMPONENTS[quantity])
+            pattern = ", ".join(components)
+            yield Signal(f"{body}_{ending}", description.format(body), components, ", ".join(axes), pattern)
+    yield from (Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets)
 
 
 Signals = Mapping[str, NDArray[np.float64]]
@@ -208,13 +192,7 @@ class ExportSource:
             dataset,
             rate_hz,
             targets,
-            list_signals(
-                dataset.joints,
-                dataset.moving_joints,
-                targets,
-                robot_of(dataset.config).sliding,
-                moving_bodies_of(dataset.config),
-            ),
+            tuple(list_signals(dataset.config, targets)),
             throws,
             dataset.throws.drop_columns(list(_PLACES)),
             ProgressLog(len(dataset.throws), "trial", "exported"),
@@ -237,7 +215,9 @@ class ExportSource:
             header, recorded = throw.read_samples()
             samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
             trajectory = commanded_trajectory(self.dataset.config_of(throw), recorded)
-            signals = _compute_signals(samples, trajectory, header.start_ns)
+            time_s = samples.seconds_since(header.start_ns)
+            joints = (samples.position, samples.velocity, samples.effort, *sample_quintic(trajectory, time_s))
+            signals = {"time_s": time_s, **dict(zip(_JOINT_SIGNALS, joints, strict=True))}
             for number, body in enumerate(moving_bodies_of(config)):
                 names = (f"{body}_{ending}" for ending in _BODY_SIGNALS)
                 signals |= dict(zip(names, samples.parts_of(number), strict=True))
@@ -250,20 +230,6 @@ def _list_targets(throws: Dataset) -> tuple[TargetColumn, ...]:
     """List the columns of targets that every throw has, in the order of the task."""
     columns = [each for each in throws.config.task.target_columns if each.name in throws.throws.column_names]
     return tuple(each for each in columns if not throws.throws[each.name].null_count)
-
-
-def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> dict[str, NDArray[np.float64]]:
-    time_s = samples.seconds_since(start_ns)
-    position, velocity, acceleration = sample_quintic(trajectory, time_s)
-    return {
-        "time_s": time_s,
-        "joint_position_rad": samples.position,
-        "joint_velocity_radps": samples.velocity,
-        "joint_effort_nm": samples.effort,
-        "command_position_rad": position,
-        "command_velocity_radps": velocity,
-        "command_acceleration_radps2": acceleration,
-    }
 
 
 def read_metadata(field: pa.Field) -> dict[str, str]:
@@ -288,43 +254,33 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
     # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
-    elsewhere = partial(_resample_body, places=places, recorded_hz=recorded_hz)
-    names = ("object_position", "object_orientation_xyzw", "object_linear_velocity", "object_angular_velocity")
-    found = dict(zip(names, elsewhere(*samples.parts_of(0)), strict=True))
-    numbers = range(1, samples.bodies.shape[1] + 1)
-    bodies = [np.hstack(elsewhere(*samples.parts_of(number))) for number in numbers]
-    found["bodies"] = np.stack(bodies, axis=1) if bodies else np.zeros((count, 0, BODY_NUMBERS))
-    # A command holds until the next one.
-    found["command"] = samples.command[places.astype(np.intp)]
-    found["position"] = _interpolate_cubically(samples.position, samples.velocity / recorded_hz, places)
-    found |= {name: _interpolate_linearly(getattr(samples, name), places) for name in ("velocity", "effort")}
+    bodies = range(samples.bodies.shape[1] + 1)
+    recorded = np.stack([np.hstack(samples.parts_of(number)) for number in bodies], axis=1)
+    recorded[..., 3:7] = _remove_flips(recorded[..., 3:7])
+    between = _interpolate_linearly(recorded, places)
+    between[..., :3] = _interpolate_cubically(recorded[..., :3], recorded[..., 7:10] / recorded_hz, places)
+    between[..., 3:7] /= np.linalg.norm(between[..., 3:7], axis=-1, keepdims=True)
+    position, turn, linear, angular = np.split(between[:, 0], (3, 7, 10), axis=1)
     elapsed_ns = np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64)
-    return Samples(stamps_ns=samples.stamps_ns[0] + elapsed_ns, **found)
-
-
-def _resample_body(
-    position: NDArray[np.float64],
-    orientation: NDArray[np.float64],
-    linear: NDArray[np.float64],
-    angular: NDArray[np.float64],
-    *,
-    places: NDArray[np.float64],
-    recorded_hz: int,
-) -> tuple[NDArray[np.float64], ...]:
-    """Compute a body between its samples; see `resample`."""
-    turn = _interpolate_linearly(_remove_flips(orientation), places)
-    return (
-        _interpolate_cubically(position, linear / recorded_hz, places),
-        turn / np.linalg.norm(turn, axis=1, keepdims=True),
-        _interpolate_linearly(linear, places),
-        _interpolate_linearly(angular, places),
+    return Samples(
+        stamps_ns=samples.stamps_ns[0] + elapsed_ns,
+        position=_interpolate_cubically(samples.position, samples.velocity / recorded_hz, places),
+        velocity=_interpolate_linearly(samples.velocity, places),
+        effort=_interpolate_linearly(samples.effort, places),
+        object_position=position,
+        object_orientation_xyzw=turn,
+        object_linear_velocity=linear,
+        object_angular_velocity=angular,
+        bodies=between[:, 1:],
+        # A command holds until the next one.
+        command=samples.command[places.astype(np.intp)],
     )
 
 
 def _interpolate_linearly(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     before = np.minimum(places.astype(np.intp), len(values) - 1)
     after = np.minimum(before + 1, len(values) - 1)
-    share = (places - before)[:, np.newaxis]
+    share = (places - before).reshape(-1, *[1] * (values.ndim - 1))
     between: NDArray[np.float64] = (1 - share) * values[before] + share * values[after]
     return between
 
@@ -341,6 +297,6 @@ def _interpolate_cubically(
 def _remove_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose, of the two quaternions of each orientation, the one that is near the quaternion before."""
     # Each flip turns the sign of all quaternions that follow, so that two flips cancel out.
-    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
-    signs = np.where(np.cumsum(turns) % 2, -1.0, 1.0)
-    return np.vstack([quaternions[:1], quaternions[1:] * signs[:, np.newaxis]])
+    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0
+    signs = np.where(np.cumsum(turns, axis=0) % 2, -1.0, 1.0)
+    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., np.newaxis]])

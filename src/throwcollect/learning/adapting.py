@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum
 
@@ -11,11 +10,9 @@ from pydantic import FiniteFloat
 
 from throwcollect.dataset.misses import find_median
 from throwcollect.errors import ConfigError
-from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.learning.learned_map import Correction, KeyRole, LearnedMap
+from throwcollect.learning.polynomial import Array, ModelEntry
 from throwcollect.reproducible_math import matmul, solve
-from throwcollect.units import unit_of_name
-from throwcollect.wording import join_names
 
 _OFFSET = 0.1
 """Standard deviation that is expected of the offset [m or rad] before any throw."""
@@ -38,8 +35,6 @@ _FAR = 2.0
 _LEAST_WIDTH = 1.0
 """A region where throws ended counts as at least this wide [m or rad], as another world may shift a small region by
 more than its width."""
-_NOT_MIXED_UP = {"m": "m, not cm or mm", "rad": "rad, not degrees"}
-"""Units of places, and those that people measure in."""
 _CLEARLY = 3.0
 """Adapting helps if the sum of squared misses falls by more than the square of this many standard deviations."""
 
@@ -165,30 +160,22 @@ def _list_found(learned: LearnedMap, correction: Correction, method: Method, dev
     return [*found, *(AdaptedNumber(name=name, value=value, deviation=spread) for name, value, spread in offsets)]
 
 
-def refuse_far_inputs(learned: LearnedMap, role: KeyRole, inputs: Array) -> None:
-    """Refuse throws where polynomials cannot predict: mostly mistakes, such as degrees in place of radians.
+def refuse_far_throws(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> None:
+    """Refuse throws where the map says nothing: mostly mistakes, such as degrees in place of radians.
 
     Args:
         learned: The map.
-        role: Parameters or context.
-        inputs: Their scaled values, shape ``(n_throws, n_axes of the role)``.
-    """
-    for number, column in np.argwhere(np.abs(inputs) > _FAR).tolist():
-        axis = learned.axes_of(role)[column]
-        value = learned.unscale(role, inputs)[number, column]
-        raise ConfigError(
-            f"throw {number}: {axis.key} is {value:g}",
-            expected=f"about {axis.minimum:g} to {axis.maximum:g}, the range that the model was learned from",
-        )
-
-
-def refuse_far_places(learned: LearnedMap, places: Array) -> None:
-    """Refuse throws that ended far from all learned ones: mostly mistakes, such as millimetres in place of metres.
-
-    Args:
-        learned: The map.
+        parameters: Scaled parameters of the throws, shape ``(n_throws, n_parameters)``.
+        context: Scaled context of the throws, shape ``(n_throws, n_context)``.
         places: Where they ended, shape ``(n_throws, n_targets)``.
     """
+    for role, inputs in ((KeyRole.PARAMETER, parameters), (KeyRole.CONTEXT, context)):
+        for number, column in np.argwhere(np.abs(inputs) > _FAR).tolist():
+            axis = learned.axes_of(role)[column]
+            raise ConfigError(
+                f"throw {number}: {axis.key} is {learned.unscale(role, inputs)[number, column]:g}",
+                expected=f"about {axis.minimum:g} to {axis.maximum:g}, the range that the model was learned from",
+            )
     low, high = learned.outputs.min(axis=0), learned.outputs.max(axis=0)
     away = np.linalg.norm(np.maximum(0.0, np.maximum(low - places, places - high)), axis=1)
     ranges = ", ".join(f"{least:.3g} to {most:.3g}" for least, most in zip(low.tolist(), high.tolist(), strict=True))
@@ -197,17 +184,8 @@ def refuse_far_places(learned: LearnedMap, places: Array) -> None:
         raise ConfigError(
             f"throw {number}: {', '.join(f'{target} is {end:g}' for target, end in ends)}",
             expected=f"about {ranges}, where the throws ended that the model was learned from",
-            hint=_suggest_checks(learned.targets),
+            hint="check units, which the names end with, and the order of the numbers",
         )
-
-
-def _suggest_checks(targets: Sequence[str]) -> str | None:
-    """Say which mistakes move the ends of throws far away; None if none is likely."""
-    units = dict.fromkeys(filter(None, map(unit_of_name, targets)))
-    checks = [f"check the unit: {' and '.join(_NOT_MIXED_UP.get(unit, unit) for unit in units)}"] if units else []
-    if len(targets) > 1:
-        checks.append(f"check that {join_names(targets)} are not swapped")
-    return "; ".join(checks) or None
 
 
 def leave_as_it_is(learned: LearnedMap, distances: Array, scatter: float) -> tuple[Correction, Adaptation]:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import KeyRole, LearnedMap, find_nearest
+from throwcollect.learning.polynomial import Array
 from throwcollect.learning.score import format_length
 from throwcollect.reproducible_math import matmul, solve
 

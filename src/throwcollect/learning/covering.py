@@ -16,7 +16,6 @@ from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.aiming import aim
-from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import (
     EFFORT,
     Axis,
@@ -28,6 +27,7 @@ from throwcollect.learning.learned_map import (
     fit_throws,
     scale_values,
 )
+from throwcollect.learning.polynomial import Array
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import spread
 

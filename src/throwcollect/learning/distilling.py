@@ -9,9 +9,16 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily
-from throwcollect.learning.arrays import Array, Vector
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
-from throwcollect.learning.polynomial import SAMPLES_PER_TERM, Polynomial, fit_polynomial, list_exponents, list_terms
+from throwcollect.learning.polynomial import (
+    SAMPLES_PER_TERM,
+    Array,
+    Polynomial,
+    Vector,
+    fit_polynomial,
+    list_exponents,
+    list_terms,
+)
 from throwcollect.reproducible_math import matmul, solve
 
 ONNX = "model.onnx"

@@ -63,7 +63,6 @@ class FirstThrow:
         ranges: Least and greatest value of the keys to sweep.
         landed: Share of the trials of a grid over the ranges that landed [-].
         distance_m: How far the throw lands from the robot's base.
-        tried: How many candidates ended how.
     """
 
     start: Mapping[str, float]
@@ -72,7 +71,6 @@ class FirstThrow:
     ranges: Mapping[str, tuple[float, float]]
     landed: float
     distance_m: float
-    tried: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,9 @@ class _Search:
         said = time.monotonic()
         try:
             for number, candidate in enumerate(candidates):
-                distance = self._try(config, candidate, feasibility, simulator)
+                # Joints that do not carry the tool rest where the first candidate has them.
+                values = self._list_values(candidate)
+                distance = self._throw(config, values, feasibility, simulator)
                 if distance is not None:
                     landed.append((distance, candidate))
                 if len(landed) >= _ENOUGH or (waited := time.monotonic() - begin) > _PATIENCE_S:
@@ -201,20 +201,16 @@ class _Search:
     def _name(self, posture: NDArray[np.float64]) -> dict[str, float]:
         return dict(zip(self._joints, np.round(posture, 4).tolist(), strict=True))
 
-    def _try(
-        self, config: Config, candidate: _Candidate, feasibility: Feasibility, simulator: Simulator
-    ) -> float | None:
-        """Try a motion; return how far it throws [m] if the throw lands."""
+    def _list_values(self, candidate: _Candidate) -> dict[str, float]:
         start, end = self._name(candidate.start), self._name(candidate.end)
         names = [self._joints[index] for index in self._carrying]
         values = {f"task.start.{joint}": start[joint] for joint in names}
-        values |= {f"task.end.{joint}": end[joint] for joint in names} | {"task.duration_s": candidate.duration_s}
-        # Joints that do not carry the tool rest where the first candidate has them.
-        return self._throw(config, values, feasibility, simulator)
+        return values | {f"task.end.{joint}": end[joint] for joint in names} | {"task.duration_s": candidate.duration_s}
 
     def _throw(
         self, config: Config, values: Mapping[str, float], feasibility: Feasibility, simulator: Simulator
     ) -> float | None:
+        """Try a motion; return how far it throws [m] if the throw lands."""
         try:
             trial = with_values(config, values)
             if (reason := feasibility.check(trial, trajectory_of(trial))) is not None:
@@ -257,7 +253,7 @@ class _Search:
                 self._say(f"{share:.0%} land with {joint} from {low:.2f} to {high:.2f} rad")
                 if share >= _LEAST_SHARE:
                     task = config.task
-                    return FirstThrow(task.start, task.end, task.duration_s, ranges, share, distance, dict(self._tried))
+                    return FirstThrow(task.start, task.end, task.duration_s, ranges, share, distance)
                 half, slower = half / 2, 1 + (slower - 1) / 2
         finally:
             simulator.close()

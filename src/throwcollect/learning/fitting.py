@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -18,10 +19,10 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath
-from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, LearnedMap, count_needed_throws, fit_throws
-from throwcollect.learning.model import Model
-from throwcollect.learning.model_file import TrainedOn
+from throwcollect.learning.model import MODEL, Model, load_model
+from throwcollect.learning.model_card import TrainedOn
+from throwcollect.learning.polynomial import Array
 from throwcollect.version import __version__
 from throwcollect.wording import format_count, suggest
 
@@ -197,3 +198,20 @@ def _read_numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
         trial = throws["trial"][int(wrong[0])].as_py()
         raise DatasetError(f"{column} of trial {trial} is {values[wrong[0]]}", path=dataset.directory)
     return values
+
+
+def read_ends(directory: Path) -> Array:
+    """Read where the throws of a model or of a dataset ended, shape ``(n, n_targets)``.
+
+    Raises:
+        ConfigError: If no throw succeeded, or its task has nothing to aim at.
+        DatasetError: If there is neither, or it is damaged.
+    """
+    if (directory / MODEL).exists():
+        return load_model(directory).learned.outputs
+    dataset = Dataset.open(directory)
+    task = dataset.config.task
+    throws = keep_informative(task, dataset.throws, task.targets)
+    if not task.targets or not len(throws):
+        raise ConfigError(f"{directory}: no throw shows a target", expected="a dataset with throws that succeeded")
+    return np.column_stack([throws[name].to_numpy() for name in task.targets])

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import FiniteFloat
 
-from throwcollect.learning.arrays import Array, Vector
-from throwcollect.learning.polynomial import Polynomial, cross_validate, fit_polynomial
+from throwcollect.learning.polynomial import Array, Polynomial, Vector, cross_validate, fit_polynomial
 from throwcollect.units import unit_of_name
 
 EFFORT = "effort_peak_share"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,14 +17,13 @@ from throwcollect.dataset.directory import has_files
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
-from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs, refuse_far_places
+from throwcollect.learning.adapting import Adaptation, Method, adapt, refuse_far_throws
 from throwcollect.learning.aiming import Aim, Choice, aim
-from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.learning.distilling import ONNX, distil, encode_onnx
-from throwcollect.learning.learned_map import EFFORT, KeyRole, LearnedMap
-from throwcollect.learning.model_card import describe_model
-from throwcollect.learning.model_file import ModelFile
-from throwcollect.learning.score import Score, pool_scores
+from throwcollect.learning.learned_map import EFFORT, Correction, KeyRole, LearnedMap
+from throwcollect.learning.model_card import ModelCard
+from throwcollect.learning.polynomial import Array, ModelEntry
+from throwcollect.learning.score import Score
 from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.version import __version__
@@ -40,12 +39,12 @@ _MOST_BYTES = 100_000_000
 _File = TypeVar("_File", bound=ModelEntry)
 
 
-class Model(ModelFile):
+class Model(ModelCard):
     """Where throws with given parameters end, and which parameters lead to a target.
 
     A model is a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`, byte for byte.
 
-    Its other attributes are those of `ModelFile`.
+    Its other attributes are those of `ModelCard`.
 
     Attributes:
         points: Arrow table of the throws that it was learned from: ``trial``, inputs, ends, effort; a file of its own.
@@ -166,22 +165,17 @@ class Model(ModelFile):
         check_bounds("seed", seed, least=0)
         _check_scatter(scatter)
         distilled = None if self.distilled is None else distil(leave_out_correction(self.learned))
-        scores = [
-            score_model(
-                self.learned,
-                simulator,
-                count=targets,
-                seed=each,
-                world=world,
-                scatter=scatter,
-                error=self.trained_on.error,
-                latents_count=self.trained_on.latents_count,
-                distilled=distilled,
-                processes=processes,
-            )
-            for each in range(seed, seed + seeds)
-        ]
-        return pool_scores(scores)
+        return score_model(
+            self.learned,
+            simulator,
+            count=targets,
+            seeds=range(seed, seed + seeds),
+            world=world,
+            scatter=scatter,
+            adapt_map=self._bind_adapt(scatter),
+            distilled=distilled,
+            processes=processes,
+        )
 
     def adapt(
         self,
@@ -218,24 +212,17 @@ class Model(ModelFile):
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
-        refuse_far_inputs(self.learned, KeyRole.PARAMETER, parameters)
-        refuse_far_inputs(self.learned, KeyRole.CONTEXT, context)
-        refuse_far_places(self.learned, measured)
-        # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
-        deviation = float(np.hypot(scatter, self.trained_on.error))
-        correction, adaptation = adapt(
-            self.learned,
-            parameters,
-            context,
-            measured,
-            method=chosen,
-            scatter=deviation,
-            latents_count=self.trained_on.latents_count,
-        )
+        refuse_far_throws(self.learned, parameters, context, measured)
+        correction, adaptation = self._bind_adapt(scatter)(self.learned, parameters, context, measured, method=chosen)
         # The map of the other world shares what was computed from the throws.
         changed = {"correction": correction, "learned": self.learned.correct(correction)}
         world = self.model_copy(update={**changed, "adaptation": adaptation, "version": __version__, "distilled": None})
         return world if self.distilled is None else world.distil()
+
+    def _bind_adapt(self, scatter: float) -> partial[tuple[Correction, Adaptation]]:
+        # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
+        deviation = float(np.hypot(scatter, self.trained_on.error))
+        return partial(adapt, scatter=deviation, latents_count=self.trained_on.latents_count)
 
     def distil(self) -> Model:
         """Add one polynomial from targets to parameters, which `save` writes into ``model.onnx``, too.
@@ -259,7 +246,7 @@ class Model(ModelFile):
             write_file(beside / MODEL, (self.model_dump_json(indent=1) + "\n").encode())
             write_file(beside / POINTS, encode_table(self.points))
             write_file(beside / CONFIG, self.config.encode())
-            write_file(beside / CARD, describe_model(self, None).encode())
+            write_file(beside / CARD, self.describe(None).encode())
             if self.source is not None:
                 copy_carried(self.source, beside)
             if onnx is not None:
@@ -268,7 +255,7 @@ class Model(ModelFile):
     def write_score(self, directory: Path, score: Score) -> None:
         """Write a score into the directory of this model, in place of an earlier one, and into the model's card."""
         write_file(directory / SCORE, (score.model_dump_json(indent=1) + "\n").encode())
-        write_file(directory / CARD, describe_model(self, score).encode())
+        write_file(directory / CARD, self.describe(score).encode())
 
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points."""
@@ -276,14 +263,12 @@ class Model(ModelFile):
         rows = []
         for number, point in enumerate(points):
             if wrong := sorted(set(point) ^ set(names), key=str):
-                state = "is missing" if wrong[0] in names else "is no key of this model"
-                if wrong[0] in (axis.key for axis in self.learned.axes_of(KeyRole.LATENT)):
-                    state = "is a property of the world, which the model has learned; leave it out"
+                state = "is missing" if wrong[0] in names else "is no key that this model takes"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
             rows.append([point[name] for name in names])
         values = np.array(rows, np.float64).reshape(-1, len(names))
         if not np.isfinite(values).all():
-            number, column = (int(each[0]) for each in np.nonzero(~np.isfinite(values)))
+            number, column = np.argwhere(~np.isfinite(values))[0].tolist()
             value = values[number, column]
             raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
         split = len(self.parameters)

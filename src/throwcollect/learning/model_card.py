@@ -1,12 +1,16 @@
-"""Writes the card of a model: axes, errors, misses, what it was not tested on, and how a robot's program uses it."""
+"""What is in ``model.json``, and the card of a model: axes, errors, misses, and how a robot's program uses it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Literal
+
+from pydantic import Field, FiniteFloat
 
 from throwcollect.learning.adapting import Adaptation, Method
-from throwcollect.learning.learned_map import Axis
-from throwcollect.learning.model_file import ModelFile
+from throwcollect.learning.distilling import DistilledMap
+from throwcollect.learning.learned_map import Axis, Correction, Kind
+from throwcollect.learning.polynomial import ModelEntry, Polynomial
 from throwcollect.learning.score import SCORE_HEAD, Score, format_length, format_scatter
 from throwcollect.wording import format_count
 
@@ -45,136 +49,165 @@ parameters = dict(zip(keys, session.run(None, {"target": [target]})[0][0].tolist
 """Does the same with ``model.onnx``."""
 
 
-def describe_model(file: ModelFile, score: Score | None) -> str:
-    """README.md of a model; its score is None if nobody has thrown with it."""
-    trained = file.trained_on
-    lines = [
-        f"# A model of {trained.name}",
-        "",
-        f"It maps the parameters of a trial to where it ends ({', '.join(file.targets)}), and back: from a target to "
-        f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
-        f"`{trained.digest}`" + (f" (those with `{trained.selection}`)" if trained.selection else "") + "; "
-        f"{trained.ignored} that did not succeed were left out. Robot: {trained.robot}; task: {trained.task}; physics "
-        f"engine: {trained.engine}. Made with throwcollect {file.version}.",
-        "",
-        "| key | it is | from | to | configured | unit |",
-        "|---|---|---|---|---|---|",
-        *map(_describe_axis, file.axes),
-        "",
-        "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing is "
-        "extrapolated beyond the ranges.",
-        "",
-        f"Predictions for throws that polynomials were not fitted to are off by {_format_length(trained.error, file)} "
-        "(median, in simulation); by degree: "
-        + ", ".join(f"{degree}: {_format_length(error, file)}" for degree, error in trained.folds_error.items())
-        + (
-            f"; without latents: {_format_length(trained.without_latents, file)}"
-            if trained.without_latents is not None
-            else ""
+class TrainedOn(ModelEntry):
+    """The dataset and the throws that the model was learned from.
+
+    Attributes:
+        name: Name of the collection.
+        robot: Name of the robot.
+        task: Name of the task.
+        engine: Name of the physics engine.
+        digest: Digest of the dataset.
+        throws: Number of throws that it was learned from.
+        ignored: Number of throws that did not succeed.
+        selection: The condition on throws; None for all.
+        folds_error: By degree: median distance of throws from their prediction by polynomials fitted to others.
+        without_latents: The same distance when latents are no inputs; None if there are no latents.
+        latents_count: Whether latents have an effect that is worth knowing.
+    """
+
+    name: str
+    robot: str
+    task: str
+    engine: str
+    digest: str
+    throws: int
+    ignored: int
+    selection: str | None
+    folds_error: dict[int, FiniteFloat] = Field(min_length=1)
+    without_latents: FiniteFloat | None
+    latents_count: bool
+
+    @property
+    def error(self) -> float:
+        """The smallest of the errors, which belongs to the chosen degree."""
+        return min(self.folds_error.values())
+
+
+class ModelCard(ModelEntry):
+    """``model.json``: a learned map without the throws that it was learned from; `describe` makes its card.
+
+    Attributes:
+        version: Version of throwcollect that made it.
+        kind: How predictions are made.
+        axes: The inputs: parameters, then context, then latents.
+        targets: Columns of the table of throws that say where a trial ended.
+        forward: The polynomial: all inputs to targets.
+        effort: The polynomial of the largest share of a joint's torque limit.
+        correction: How the world differs from the dataset's.
+        trained_on: The throws that it was learned from.
+        adaptation: How it was adapted; None if it was not.
+        distilled: A polynomial from targets to parameters; None if it was not distilled.
+    """
+
+    format: Literal["1"] = "1"
+    version: str
+    kind: Kind
+    axes: tuple[Axis, ...] = Field(min_length=1)
+    targets: tuple[str, ...] = Field(min_length=1)
+    forward: Polynomial
+    effort: Polynomial
+    correction: Correction
+    trained_on: TrainedOn
+    adaptation: Adaptation | None
+    distilled: DistilledMap | None = None
+
+    def describe(self, score: Score | None) -> str:
+        """README.md of the model; its score is None if nobody has thrown with it."""
+        trained, targets = self.trained_on, self.targets
+        selected = f" (those with `{trained.selection}`)" if trained.selection else ""
+        folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in trained.folds_error.items())
+        if trained.without_latents is not None:
+            folds += f"; without latents: {format_length(trained.without_latents, targets)}"
+        axes = (
+            [f"`{axis.key}`", axis.role.value]
+            + [f"{number:.6g}" for number in (axis.minimum, axis.maximum, axis.nominal)]
+            + [axis.unit or "-"]
+            for axis in self.axes
         )
-        + ".",
-        "",
-    ]
-    if file.adaptation is not None:
-        lines += _describe_adaptation(file.adaptation, file)
-    if score is not None:
-        lines += _describe_score(score, file)
-    return "\n".join([*lines, *_describe_use(file)])
-
-
-def _describe_use(file: ModelFile) -> list[str]:
-    lines = [
-        "## What it was not tested on",
-        "",
-        "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every number "
-        "on this page is one in simulation.",
-        "",
-        "## In a program of a robot",
-        "",
-        "`model.json` alone is enough. For a `target`, in the order and the units above:",
-        "",
-        "```python",
-        PROGRAM.rstrip(),
-        "```",
-        "",
-    ]
-    if file.distilled is not None:
-        lines += [
-            "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its parameters "
-            "stay inside of their ranges for any target, in reach or not. In Python:",
+        lines = [
+            f"# A model of {trained.name}",
             "",
-            "```python",
-            ONNX_PROGRAM.rstrip(),
-            "```",
+            f"It maps the parameters of a trial to where it ends ({', '.join(targets)}), and back: from a target to "
+            f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
+            f"`{trained.digest}`{selected}; {trained.ignored} that did not succeed were left out. Robot: "
+            f"{trained.robot}; task: {trained.task}; physics engine: {trained.engine}. Made with "
+            f"throwcollect {self.version}.",
+            "",
+            *_tabulate(("key", "it is", "from", "to", "configured", "unit"), axes),
+            "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing "
+            "is extrapolated beyond the ranges.",
+            "",
+            "Predictions for throws that polynomials were not fitted to are off by "
+            f"{format_length(trained.error, targets)} (median, in simulation); by degree: {folds}.",
             "",
         ]
-    return lines
+        if self.adaptation is not None:
+            lines += _describe_adaptation(self.adaptation, targets)
+        if score is not None:
+            lines += _describe_score(score, targets)
+        lines += [
+            "## What it was not tested on",
+            "",
+            "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every "
+            "number on this page is one in simulation.",
+            "",
+            "## In a program of a robot",
+            "",
+            "`model.json` alone is enough. For a `target`, in the order and the units above:",
+            "",
+            f"```python\n{PROGRAM}```",
+            "",
+        ]
+        if self.distilled is not None:
+            lines += [
+                "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its "
+                "parameters stay inside of their ranges for any target, in reach or not. In Python:",
+                "",
+                f"```python\n{ONNX_PROGRAM}```",
+                "",
+            ]
+        return "\n".join(lines)
 
 
-def _describe_axis(axis: Axis) -> str:
-    unit = axis.unit or "-"
-    return (
-        f"| `{axis.key}` | {axis.role.value} | {axis.minimum:.6g} | {axis.maximum:.6g} | {axis.nominal:.6g} | {unit} |"
-    )
-
-
-def _describe_adaptation(adaptation: Adaptation, file: ModelFile) -> list[str]:
+def _describe_adaptation(adaptation: Adaptation, targets: Sequence[str]) -> Iterator[str]:
     throws = format_count(adaptation.throws, "throw")
+    yield "## Adapted to another world\n"
     if adaptation.method is Method.NONE:
-        return ["## Adapted to another world", "", f"{throws} there did not speak for any difference.", ""]
-    lines = [
-        "## Adapted to another world",
-        "",
-        f"By {throws} there; what differs was taken to be: {adaptation.method.value}.",
-        "",
-        "| | found | standard deviation |",
-        "|---|---|---|",
-        *(f"| `{each.name}` | {each.value:.4g} | {each.deviation:.2g} |" for each in adaptation.found),
-        "",
-    ]
+        yield f"{throws} there did not speak for any difference.\n"
+        return
+    yield f"By {throws} there; what differs was taken to be: {adaptation.method.value}.\n"
+    found = ((f"`{each.name}`", f"{each.value:.4g}", f"{each.deviation:.2g}") for each in adaptation.found)
+    yield from _tabulate(("", "found", "standard deviation"), found)
     before, after = adaptation.medians
     if after is not None:
-        lines += [
-            f"The throws were off by {_format_length(before, file)} before (median), "
-            f"and by {_format_length(after, file)} after, each predicted by a model that was adapted to the others.",
-            "",
-        ]
-    return lines
+        yield (
+            f"The throws were off by {format_length(before, targets)} before (median), and by "
+            f"{format_length(after, targets)} after, each predicted by a model that was adapted to the others.\n"
+        )
 
 
-def _describe_score(score: Score, file: ModelFile) -> list[str]:
-    targets = format_count(score.targets, "target")
+def _describe_score(score: Score, targets: Sequence[str]) -> Iterator[str]:
     rows = score.list_rows()
     here = len(rows) - len(score.adapted)
-    lines = [
-        "## How it hits",
-        "",
-        f"Misses of {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
-        "the seeds; each draws targets, the throws that were learned from, and those in another world; in simulation:",
-        "",
-        *_tabulate(rows[:here]),
-        "",
-    ]
+    yield "## How it hits\n"
+    yield (
+        f"Misses of {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')} (from "
+        f"{score.seed} on), medians of the seeds; each draws targets, the throws that were learned from, and those in "
+        "another world; in simulation:\n"
+    )
+    yield from _tabulate(("", *SCORE_HEAD), rows[:here])
     if score.adapted:
-        scatter = (
-            f", with a scatter of {format_scatter(score.scatter, file.targets)} of what is measured"
-            if score.scatter
-            else ""
+        measured = f", with a scatter of {format_scatter(score.scatter, targets)} of what is measured"
+        yield (
+            f"In another world{measured if score.scatter else ''}, at those of these targets that can be reached "
+            "there, in simulation:\n"
         )
-        lines += [
-            f"In another world{scatter}, at those of these targets that can be reached there, in simulation:",
-            "",
-            *_tabulate(rows[here:]),
-            "",
-        ]
-    return lines
+        yield from _tabulate(("", *SCORE_HEAD), rows[here:])
 
 
-def _tabulate(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    lines = [("", *SCORE_HEAD), ("---",) * (len(SCORE_HEAD) + 1), *rows]
-    return [f"| {' | '.join(cells)} |" for cells in lines]
-
-
-def _format_length(value: float | None, file: ModelFile) -> str:
-    """A distance between targets, over all of them."""
-    return format_length(value, file.targets)
+def _tabulate(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Make the lines of a table in Markdown, and an empty one after it."""
+    for cells in (head, ["---"] * len(head), *rows):
+        yield f"| {' | '.join(cells)} |"
+    yield ""

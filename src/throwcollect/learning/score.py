@@ -10,7 +10,7 @@ from pydantic import Field, FiniteFloat
 
 from throwcollect.dataset.misses import find_median, find_share90
 from throwcollect.learning.adapting import Method
-from throwcollect.learning.arrays import Array, ModelEntry
+from throwcollect.learning.polynomial import Array, ModelEntry
 from throwcollect.units import format_distance, unit_of_name
 from throwcollect.wording import format_count
 
@@ -62,24 +62,19 @@ class Errors(MissStatistics):
         return (*misses, str(self.throws), str(self.missed))
 
     @classmethod
-    def of(cls, away: Array, targets: Sequence[str]) -> Errors:
-        """Sum up how far throws ended from their targets.
+    def of(cls, seeds: Sequence[Array], targets: Sequence[str]) -> Errors:
+        """Sum up how far throws ended from their targets: medians of the misses of each seed, and all throws.
 
         Args:
-            away: Ends minus targets of at least one throw, NaN if it did not succeed; shape ``(n, n_targets)``.
+            seeds: For each seed, ends minus targets of at least one throw, shape ``(n, n_targets)``, NaN where it did
+                not succeed.
             targets: Names of the targets, which tell their units.
         """
         units = np.array([unit_of_name(target) for target in targets])
-        first, *others = (_sum_up(away[:, units == unit], unit) for unit in list_units(targets))
+        first, *others = (_sum_up([away[:, units == unit] for away in seeds], unit) for unit in list_units(targets))
+        away = np.concatenate(seeds)
         missed = int((~np.isfinite(away).all(axis=1)).sum())
         return cls(throws=len(away), missed=missed, **vars(first), others=others)
-
-    @classmethod
-    def middle(cls, some: Sequence[Errors]) -> Errors:
-        """Sum up the errors of several seeds, at least one: the medians of their misses, and all their throws."""
-        first, *others = (_take_middle(each) for each in zip(*(each.by_unit for each in some), strict=True))
-        throws, missed = sum(each.throws for each in some), sum(each.missed for each in some)
-        return cls(throws=throws, missed=missed, **vars(first), others=others)
 
 
 def list_units(targets: Sequence[str]) -> list[str]:
@@ -101,26 +96,15 @@ def format_scatter(scatter: float, targets: Sequence[str]) -> str:
     return " and ".join(format_distance(scatter, unit) for unit in list_units(targets))
 
 
-def _sum_up(away: Array, unit: str) -> MissStatistics:
-    distances = np.linalg.norm(away, axis=1)
+def _sum_up(seeds: Sequence[Array], unit: str) -> MissStatistics:
     # A throw that did not succeed has no distance, and counts as farther away than all others.
-    misses = np.where(np.isfinite(distances), distances, np.inf)
-    largest = float(misses.max())
-    return MissStatistics(
-        unit=unit,
-        median=find_median(misses),
-        share90=find_share90(misses),
-        largest=largest if np.isfinite(largest) else None,
-    )
-
-
-def _take_middle(some: Sequence[MissStatistics]) -> MissStatistics:
+    misses = [np.nan_to_num(np.linalg.norm(away, axis=1), nan=np.inf, posinf=np.inf) for away in seeds]
+    numbers = [(find_median(each), find_share90(each), float(each.max())) for each in misses]
+    # None counts as larger than all numbers.
     median, share90, largest = (
-        # None counts as larger than all numbers.
-        find_median([np.inf if (value := getattr(each, name)) is None else value for each in some])
-        for name in ("median", "share90", "largest")
+        find_median([np.inf if each is None else each for each in column]) for column in zip(*numbers, strict=True)
     )
-    return MissStatistics(unit=some[0].unit, median=median, share90=share90, largest=largest)
+    return MissStatistics(unit=unit, median=median, share90=share90, largest=largest)
 
 
 class Trained(ModelEntry):
@@ -201,30 +185,24 @@ class Score(ModelEntry):
         return rows
 
 
-def pool_scores(scores: Sequence[Score]) -> Score:
-    """Put the scores of several seeds together, at least one."""
-    first = scores[0]
-    sizes = [each.trained_on for each in first.trained]
-    numbers = sorted({each.real_throws for score in scores for each in score.adapted})
-    there = [each for score in scores for each in score.adapted]
-    distilled = [score.distilled for score in scores if score.distilled is not None]
-    return first.model_copy(
-        update={
-            "seeds": len(scores),
-            "trained": [
-                Trained(trained_on=size, errors=Errors.middle([score.trained[at].errors for score in scores]))
-                for at, size in enumerate(sizes)
-            ],
-            "distilled": Errors.middle(distilled) if distilled else None,
-            "throws": [throw for score in scores for throw in score.throws],
-            "adapted": [_pool_adapted([each for each in there if each.real_throws == number]) for number in numbers],
-            "adapted_throws": [throw for score in scores for throw in score.adapted_throws],
-        }
-    )
+class PolicyScore(ModelEntry):
+    """How a policy hits in one world, in simulation.
 
+    Attributes:
+        world: The world.
+        targets: Number of targets of each seed.
+        seed: The first seed of their choice.
+        seeds: Number of seeds.
+        hits: Share of throws that succeeded and ended at most `hit` from their target, in its unit.
+        clipped: Share of their samples in which a command was beyond a limit.
+        errors: By how much the targets are missed; medians over seeds.
+    """
 
-def _pool_adapted(some: Sequence[Adapted]) -> Adapted:
-    """Pool results of several seeds: the method that most of them chose, and the errors of all."""
-    methods = [each.method for each in some]
-    method = max(methods, key=methods.count)
-    return Adapted(real_throws=some[0].real_throws, method=method, errors=Errors.middle([each.errors for each in some]))
+    world: str
+    targets: int
+    seed: int
+    seeds: int
+    hit: FiniteFloat
+    hits: FiniteFloat
+    clipped: FiniteFloat
+    errors: Errors

@@ -1,17 +1,17 @@
-"""Scores a learned map by throwing at targets in simulation."""
+"""Scores a learned map or a policy by throwing at targets in simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from throwcollect.config.schema import Config
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.throw import Throw
-from throwcollect.learning.adapting import Adaptation, adapt, leave_as_it_is
+from throwcollect.learning.adapting import Adaptation, Method, leave_as_it_is
 from throwcollect.learning.aiming import aim
-from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.learned_map import (
     Correction,
@@ -23,7 +23,8 @@ from throwcollect.learning.learned_map import (
     no_correction,
     number_cells,
 )
-from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
+from throwcollect.learning.polynomial import Array
+from throwcollect.learning.score import Adapted, Errors, PolicyScore, Score, ThrowAtTarget, Trained
 from throwcollect.progress_log import log_progress
 from throwcollect.side_by_side import limit_processes
 
@@ -33,6 +34,9 @@ REAL_THROWS = (0, 1, 3, 5, 10)
 """Numbers of throws in another world that a model is adapted by."""
 _APART = 1000
 """Added to the seed of targets, this gives the seed of throws to adapt by, so that these are no seed's targets."""
+
+Adapts = Callable[[LearnedMap, Array, Array, Array], tuple[Correction, Adaptation]]
+"""`adapt`, with all that is the same for all throws."""
 
 
 @runtime_checkable
@@ -61,11 +65,10 @@ def score_model(
     simulator: Simulates,
     *,
     count: int,
-    seed: int,
+    seeds: range,
     world: Simulates | None,
     scatter: float,
-    error: float,
-    latents_count: bool,
+    adapt_map: Adapts,
     distilled: DistilledMap | None,
     processes: int,
 ) -> Score:
@@ -75,45 +78,60 @@ def score_model(
         learned: The map. If it was adapted already, adapting to the other world begins with its correction, and the
             throws in the world of the dataset leave the correction out.
         simulator: Simulates the world of the dataset.
-        count: Number of targets.
-        seed: Seed of their choice, of the throws that smaller models are learned from, and of the noise.
+        count: Number of targets of each seed.
+        seeds: Seeds of their choice, of the throws that smaller models are learned from, and of the noise.
         world: Simulates the other world; None for none.
         scatter: Standard deviation of noise on the measured ends of throws in the other world.
-        error: Standard deviation of throws from the predictions of the map.
-        latents_count: Whether latents have an effect that is worth knowing.
+        adapt_map: Adapts a map to throws in the other world.
         distilled: The map that is distilled for the world of the dataset; None for none.
         processes: How many processes simulate.
     """
     context = _find_nominal_context(learned)
     plain = leave_out_correction(learned)
-    targets = draw_targets(plain.carry_over(context), count, seed)
     given = np.tile(context, (count, 1))
     needed = count_needed_throws(len(learned.axes_of(KeyRole.PARAMETER)))
-    maps = {size: _learn_from(plain, size, seed) for size in SIZES if needed <= size < len(learned.values)}
-    maps[len(learned.values)] = plain
-    lists = [aim(each, targets, given).parameters for each in maps.values()]
-    if distilled is not None:
-        lists.append(distilled.aim(targets, given))
-    places = _throw(learned, lists, given, simulator, processes)
-    errors = [Errors.of(each - targets, learned.targets) for each in places]
-    adapted: list[Adapted] = []
+    sizes = [size for size in SIZES if needed <= size < len(learned.values)]
+    throws: list[ThrowAtTarget] = []
     adapted_throws: list[ThrowAtTarget] = []
-    if world is not None:
-        adaptations = _adapt_step_by_step(
-            learned, world, seed, scatter=scatter, error=error, latents_count=latents_count, processes=processes
-        )
-        adapted, adapted_throws = _throw_there(learned, adaptations, targets, world, processes)
+    # Misses by seed: of each size, then of the model itself, then of the distilled map.
+    misses: list[list[Array]] = []
+    there: dict[int, list[tuple[Method, Array]]] = {}
+    for seed in seeds:
+        targets = draw_targets(plain.carry_over(context), count, seed)
+        maps = [*(_learn_from(plain, size, seed) for size in sizes), plain]
+        lists = [aim(each, targets, given).parameters for each in maps]
+        if distilled is not None:
+            lists.append(distilled.aim(targets, given))
+        places = _throw(learned, lists, given, simulator, processes)
+        misses.append([each - targets for each in places])
+        throws += _list_throws(targets, places[len(sizes)])
+        if world is None:
+            continue
+        adaptations = _adapt_step_by_step(learned, world, seed, scatter, adapt_map, processes)
+        targets, found = _throw_there(learned, adaptations, targets, world, processes)
+        adapted_throws += _list_throws(targets, found[-1]) if found else []
+        for (number, (_, each)), ends in zip(adaptations.items(), found, strict=False):
+            there.setdefault(number, []).append((each.method, ends - targets))
+    errors = [Errors.of(each, learned.targets) for each in zip(*misses, strict=True)]
+    numbers = [*sizes, len(learned.values)]
     return Score(
         targets=count,
-        seed=seed,
-        # `errors` may have one element more than `maps`, the last one: that of the distilled map, which has no size.
-        trained=[Trained(trained_on=size, errors=each) for size, each in zip(maps, errors, strict=False)],
+        seed=seeds[0],
+        seeds=len(seeds),
+        # There may be one element more in `errors`, the last one: that of the distilled map, which has no size.
+        trained=[Trained(trained_on=size, errors=each) for size, each in zip(numbers, errors, strict=False)],
         distilled=None if distilled is None else errors[-1],
-        throws=_list_throws(targets, places[len(maps) - 1]),
+        throws=throws,
         scatter=scatter,
-        adapted=adapted,
+        adapted=[_sum_up_adapted(number, there[number], learned.targets) for number in sorted(there)],
         adapted_throws=adapted_throws,
     )
+
+
+def _sum_up_adapted(number: int, seeds: Sequence[tuple[Method, Array]], targets: Sequence[str]) -> Adapted:
+    """Sum up seeds after a number of throws in another world: the method that most chose, and all misses."""
+    methods, misses = zip(*seeds, strict=True)
+    return Adapted(real_throws=number, method=max(methods, key=methods.count), errors=Errors.of(misses, targets))
 
 
 def leave_out_correction(learned: LearnedMap) -> LearnedMap:
@@ -122,14 +140,7 @@ def leave_out_correction(learned: LearnedMap) -> LearnedMap:
 
 
 def _adapt_step_by_step(
-    learned: LearnedMap,
-    world: Simulates,
-    seed: int,
-    *,
-    scatter: float,
-    error: float,
-    latents_count: bool,
-    processes: int,
+    learned: LearnedMap, world: Simulates, seed: int, scatter: float, adapt_map: Adapts, processes: int
 ) -> dict[int, tuple[Correction, Adaptation]]:
     """Throw in another world, and adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
     context = _find_nominal_context(learned)
@@ -143,14 +154,7 @@ def _adapt_step_by_step(
     parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
     found = {0: leave_as_it_is(learned, np.empty(0), scatter)}
     for number in sorted({min(number, len(measured)) for number in REAL_THROWS} - {0}):
-        found[number] = adapt(
-            learned,
-            parameters[:number],
-            given[:number],
-            measured[:number],
-            scatter=float(np.hypot(scatter, error)),
-            latents_count=latents_count,
-        )
+        found[number] = adapt_map(learned, parameters[:number], given[:number], measured[:number])
     return found
 
 
@@ -160,25 +164,20 @@ def _throw_there(
     targets: Array,
     world: Simulates,
     processes: int,
-) -> tuple[list[Adapted], list[ThrowAtTarget]]:
+) -> tuple[Array, list[Array]]:
     """Throw in another world at the targets that can be reached there, once with each adaptation.
 
     Returns:
-        How each adaptation hits, and the throws of the last one; both empty if no target can be reached.
+        These targets, and for each adaptation the places where the throws ended, as `_throw` gives them; no places if
+        there are no such targets.
     """
     given = np.tile(_find_nominal_context(learned), (len(targets), 1))
     worlds = [learned.correct(correction) for correction, _ in adaptations.values()]
     reachable = aim(worlds[-1], targets, given).reachable
     targets, given = targets[reachable], given[reachable]
     if not len(targets):
-        return [], []
-    lists = [aim(each, targets, given).parameters for each in worlds]
-    found = _throw(learned, lists, given, world, processes)
-    adapted = [
-        Adapted(real_throws=number, method=each.method, errors=Errors.of(places - targets, learned.targets))
-        for (number, (_, each)), places in zip(adaptations.items(), found, strict=True)
-    ]
-    return adapted, _list_throws(targets, found[-1])
+        return targets, []
+    return targets, _throw(learned, [aim(each, targets, given).parameters for each in worlds], given, world, processes)
 
 
 def draw_targets(landings: Array, count: int, seed: int) -> Array:
@@ -266,11 +265,15 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
     processes = limit_processes(processes, len(thrown))
     throws = world.throw_many([points[number] for number in thrown], processes=processes)
     for number, throw in log_progress(zip(thrown, throws, strict=True), len(thrown), "throw", "simulated"):
-        place = [throw.row[column] for column in learned.targets]
-        task = world.config.task
-        if throw.outcome in (task.success, *task.informative) and None not in place:
-            places[number] = place
+        places[number] = _find_end(throw, world.config.task, learned.targets)
     return np.split(places, len(lists))
+
+
+def _find_end(throw: Throw, task: TaskConfig, columns: Sequence[str]) -> list[float]:
+    """Find where a throw ended, in columns of its row; NaN if it did not succeed."""
+    ends = [throw.row[column] for column in columns]
+    shown = throw.outcome in (task.success, *task.informative) and None not in ends
+    return ends if shown else [np.nan] * len(ends)
 
 
 def _list_throws(targets: Array, places: Array) -> list[ThrowAtTarget]:
@@ -278,3 +281,40 @@ def _list_throws(targets: Array, places: Array) -> list[ThrowAtTarget]:
         ThrowAtTarget(target=target, place=place if np.isfinite(place).all() else None)
         for target, place in zip(targets.tolist(), places.tolist(), strict=True)
     ]
+
+
+def score_policy(
+    ends: Array, worlds: Mapping[str, Simulates], count: int, seeds: range, *, hit: float, processes: int
+) -> list[PolicyScore]:
+    """Let the policy of each world throw at targets.
+
+    Args:
+        ends: Where throws ended, over which targets are drawn evenly, shape ``(n, n_targets)``.
+        worlds: Simulators of configurations with a policy, by how they are named.
+        count: Number of targets of each seed; a model that was learned from these ends gets the same ones.
+        seeds: Seeds of their choice.
+        hit: Largest miss of a hit, in the unit of the targets.
+        processes: How many processes simulate.
+    """
+    targets = np.vstack([draw_targets(ends, count, seed) for seed in seeds])
+    found = []
+    for name, world in worlds.items():
+        task = world.config.task
+        columns = [next(each.name for each in task.target_columns if each.of == end) for end in task.targets]
+        aimed = [dict(zip(columns, row, strict=True)) for row in targets.tolist()]
+        throws = world.throw_many([{}] * len(aimed), targets=aimed, processes=limit_processes(processes, len(aimed)))
+        simulated = [*log_progress(throws, len(aimed), "throw", "simulated")]
+        away = np.array([_find_end(throw, task, task.targets) for throw in simulated]) - targets
+        found.append(
+            PolicyScore(
+                world=name,
+                targets=count,
+                seed=seeds[0],
+                seeds=len(seeds),
+                hit=hit,
+                hits=float((np.linalg.norm(away, axis=1) <= hit).mean()),
+                clipped=float(np.mean([throw.row["clipped_share"] for throw in simulated])),
+                errors=Errors.of(np.split(away, len(seeds)), task.targets),
+            )
+        )
+    return found

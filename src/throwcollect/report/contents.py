@@ -88,16 +88,14 @@ class TaskReport:
     """The part of a report that the task of its trials adds.
 
     Attributes:
-        subject: Words for the trials that follow their number in a sentence.
-        tiles: Key numbers.
+        tiles: Key numbers, which follow how many trials there are and succeeded.
         results: Sections on the results of the trials, which open the page.
         episodes: Sections on single episodes, which follow those on parameters, outcomes and limits.
     """
 
-    subject: str
-    tiles: tuple[Tile, ...]
-    results: tuple[ReportSection, ...]
-    episodes: tuple[ReportSection, ...]
+    tiles: tuple[Tile, ...] = ()
+    results: tuple[ReportSection, ...] = ()
+    episodes: tuple[ReportSection, ...] = ()
 
 
 def format_share(count: int, total: int) -> str:

@@ -1,21 +1,27 @@
-"""Figures that any dataset has.
+"""Figures: swept keys, outcomes, limits and throughput of any dataset, and maps of points with bodies around them.
 
 Text, sizes and colours of the theme are the page's own.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+import pyarrow as pa
 from numpy.typing import NDArray
+from plotly.subplots import make_subplots
 
-from throwcollect.report.measured import JointPeaks, SweptKey, Throughput, choose_points
-from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
+from throwcollect.report.contents import Tile
+from throwcollect.report.measured import JointPeaks, SweptKey, Throughput, choose_points, read_numbers
+from throwcollect.report.outcomes import SUCCESS, Outcomes, in_words
+from throwcollect.robots.surroundings import BodyLook
 
-BLUE = style_of(LANDED).colour
+BLUE = SUCCESS.colour
 NEUTRAL = "#8a8f98"
 LEGEND_ABOVE = {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"}
 LIMIT_LINE = {"color": "#D55E00", "width": 1.5, "dash": "dash"}
@@ -29,22 +35,49 @@ _CELL_PX = 128
 _CELL_GAP = 0.012
 
 
+SCALE = "Viridis"
+"""Colour scale of numbers."""
+_MOST_SVG_POINTS = 1500
+"""Plots of more points are drawn by WebGL, which is faster."""
+
+
 def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) -> go.Figure:
     """Draw each pair of at most `MOST_KEYS` swept keys below the diagonal, and on it how often each value occurs."""
     count = len(parameters)
     chosen = choose_points(len(outcomes.codes), count_matrix_points(parameters))
-    figure = go.Figure()
-    for code, name in enumerate(outcomes.names):
-        trials = chosen[outcomes.codes[chosen] == code]
-        style = outcomes.style_of(name)
-        for row in range(1, count):
-            for column in range(row):
+    cells: list[list[dict[str, Any] | None]] = [
+        [{} if column <= row else None for column in range(count)] for row in range(count)
+    ]
+    figure = make_subplots(count, count, specs=cells, horizontal_spacing=_CELL_GAP, vertical_spacing=_CELL_GAP)
+    figure.update_xaxes(showticklabels=False, tickangle=0).update_yaxes(showticklabels=False)
+    for row, parameter in enumerate(parameters):
+        figure.add_bar(
+            **place_bars(parameter.edges),
+            y=parameter.counts.sum(axis=1),
+            row=row + 1,
+            col=row + 1,
+            marker={"color": NEUTRAL, "opacity": 0.55},
+            showlegend=False,
+            hovertemplate="%{y} trials near %{x:.4g}<extra></extra>",
+        )
+        figure.update_yaxes(row=row + 1, col=row + 1, showgrid=False, rangemode="tozero")
+        last, above = parameter.short_label
+        axis: dict[str, Any] = {"range": _matrix_range(parameter), "nticks": 4, "tickfont": {"size": 9}}
+        axis |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
+        labels = {"title": {"text": f"{last}<br>{above}", "font": {"size": 10}}, "showticklabels": True}
+        figure.update_xaxes(axis, col=row + 1)
+        figure.update_xaxes(labels, row=count, col=row + 1)
+        for column in range(row):
+            figure.update_yaxes({**axis, **(labels if column == 0 else {})}, row=row + 1, col=column + 1)
+            for code, name in enumerate(outcomes.names):
+                trials = chosen[outcomes.codes[chosen] == code]
+                style = outcomes.style_of(name)
                 figure.add_scatter(
                     x=single_precision(parameters[column].values[trials]),
-                    y=single_precision(parameters[row].values[trials]),
+                    y=single_precision(parameter.values[trials]),
                     customdata=trials,
-                    xaxis=_name_axis("x", column),
-                    yaxis=_name_axis("y", row),
+                    row=row + 1,
+                    col=column + 1,
                     mode="markers",
                     marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
                     name=in_words(name),
@@ -53,17 +86,6 @@ def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) ->
                     showlegend=row == 1,
                     hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{in_words(name)}</extra>",
                 )
-    for index, parameter in enumerate(parameters):
-        figure.add_bar(
-            **place_bars(parameter.edges),
-            y=parameter.counts.sum(axis=1),
-            xaxis=_name_axis("x", index),
-            yaxis=_name_axis("y", count + index),
-            marker={"color": NEUTRAL, "opacity": 0.55},
-            showlegend=False,
-            hovertemplate="%{y} trials near %{x:.4g}<extra></extra>",
-        )
-    figure.update_layout(_matrix_axes(parameters))
     legend = {"x": 1, "y": 1, "xanchor": "right", "yanchor": "top"}
     return figure.update_layout(height=90 + _CELL_PX * max(count, 2), bargap=0, legend=legend)
 
@@ -73,37 +95,11 @@ def count_matrix_points(parameters: Sequence[SweptKey]) -> int:
     return _MOST_MATRIX_POINTS // max(len(parameters) * (len(parameters) - 1) // 2, 4)
 
 
-def _matrix_axes(parameters: Sequence[SweptKey]) -> dict[str, object]:
-    """Axes of the matrix: x and y of each parameter, numbered as the parameters, then the y axes of the counts."""
-    count = len(parameters)
-    axes: dict[str, object] = {}
-    for index, parameter in enumerate(parameters):
-        across = [index / count + _CELL_GAP / 2, (index + 1) / count - _CELL_GAP / 2]
-        down = [1 - across[1], 1 - across[0]]
-        last, above = parameter.short_label
-        title = {"text": f"{last}<br>{above}", "font": {"size": 10}}
-        shared = {"title": title, "tickfont": {"size": 9}, "nticks": 4, "range": _matrix_range(parameter)}
-        shared |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
-        # Each column has its labels below its lowest panel; in the last column, this is the panel with the counts.
-        lowest = _name_axis("y", count - 1 if index < count - 1 else count + index)
-        axes[_name_axis("xaxis", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
-        if index:
-            axes[_name_axis("yaxis", index)] = {**shared, "domain": down, "anchor": "x"}
-        counts = {"domain": down, "anchor": _name_axis("x", index), "showticklabels": False, "showgrid": False}
-        axes[_name_axis("yaxis", count + index)] = {**counts, "rangemode": "tozero"}
-    return axes
-
-
 def _matrix_range(parameter: SweptKey) -> list[float]:
     ends = parameter.edges[[0, -1]]
     low, high = np.log10(ends) if parameter.logarithmic else ends
     room = 0.04 * (high - low)
     return [float(low - room), float(high + room)]
-
-
-def _name_axis(letter: str, index: int) -> str:
-    """Name of an axis: with ``x`` in a trace, with ``xaxis`` in a layout."""
-    return letter if index == 0 else f"{letter}{index + 1}"
 
 
 def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:
@@ -194,3 +190,136 @@ def place_bars(edges: NDArray[np.float64]) -> dict[str, Any]:
 def single_precision(values: NDArray[np.float64]) -> NDArray[np.float32]:
     """Round values to single precision, which halves the page and makes no visible difference."""
     return values.astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Points:
+    """Trials that ended at a place, of any outcome; each array has the shape ``(n,)``.
+
+    Attributes:
+        row: Place of the trial in the table.
+        trial: Number of the trial.
+        x_m: Centre of the object in world [m], forward of the robot.
+        y_m: Centre of the object in world [m], left of the robot.
+        distance_m: How far it got [m].
+        speed_mps: Speed with which it left the tool [m/s].
+        code: Outcome, as index into `Outcomes.names`.
+    """
+
+    row: NDArray[np.intp]
+    trial: NDArray[np.int64]
+    x_m: NDArray[np.float64]
+    y_m: NDArray[np.float64]
+    distance_m: NDArray[np.float64]
+    speed_mps: NDArray[np.float64]
+    code: NDArray[np.intp]
+
+    @classmethod
+    def read(cls, throws: pa.Table, outcomes: Outcomes, end: str, distance: str | None, speed: str) -> Points:
+        """Read those that have an `end`, such as ``landing``, from a table.
+
+        The other names are those of columns; without one of distances, they are from the robot's base, horizontal.
+        """
+        x, y = read_numbers(throws, f"{end}_x_m"), read_numbers(throws, f"{end}_y_m")
+        far = np.hypot(x, y) if distance is None else read_numbers(throws, distance)
+        trials = np.asarray(throws["trial"].to_numpy())
+        points = cls(np.arange(len(throws)), trials, x, y, far, read_numbers(throws, speed), outcomes.codes)
+        return points[np.isfinite(x + y + far)]
+
+    def __len__(self) -> int:
+        return len(self.trial)
+
+    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Points:
+        return Points(**{name: column[rows] for name, column in vars(self).items()})
+
+    def show_ranges(self, distance: str, speed: str) -> tuple[Tile, ...]:
+        """Show how far and how fast the trials were, under these labels; nothing if there are none."""
+        if not len(self):
+            return ()
+        return (
+            Tile(f"{self.distance_m.min():.2f}–{self.distance_m.max():.2f} m", distance),
+            Tile(f"{self.speed_mps.min():.2f}–{self.speed_mps.max():.2f} m/s", speed),
+        )
+
+
+def draw_map(points: Points, outcomes: Outcomes, bodies: Sequence[BodyLook] = (), *, speed: str | None) -> go.Figure:
+    """Draw places from above, coloured by the speed of this name, or by outcome."""
+    figure = draw_coloured(
+        points,
+        outcomes,
+        (points.x_m, points.y_m, points.speed_mps),
+        hover="x %{x:.3f} m, y %{y:.3f} m" + (f", {speed} %{{marker.color:.2f}} m/s" if speed is not None else ""),
+        scale_title=None if speed is None else f"{speed} [m/s]",
+    )
+    draw_bodies(figure, bodies, "above_m")
+    robot = {"symbol": "star-triangle-up", "size": 13, "color": NEUTRAL, "line": {"width": 1, "color": "white"}}
+    figure.add_scatter(x=[0], y=[0], mode="markers", name="robot", marker=robot, hovertemplate="robot<extra></extra>")
+    figure.update_xaxes(title="x, forward [m]", constrain="domain")
+    figure.update_yaxes(title="y, left [m]", scaleanchor="x", constrain="domain")
+    return figure.update_layout(height=460)
+
+
+def draw_bodies(figure: go.Figure, bodies: Sequence[BodyLook], outline: str) -> None:
+    """Draw one of the outlines of bodies behind all that a figure shows; the more of a name, the paler each is."""
+    shown, same = len(figure.data), Counter(body.name for body in bodies)
+    for body in bodies:
+        first, *others = getattr(body, outline)
+        x, y = zip(first, *others, first, strict=True)
+        red, green, blue = bytes.fromhex(body.color[1:])
+        fill = f"rgba({red}, {green}, {blue}, {0.2 / same[body.name]:.3f})"
+        look = {"mode": "lines", "fill": "toself", "fillcolor": fill, "line": {"color": body.color, "width": 1}}
+        figure.add_scatter(x=x, y=y, **look, name=body.name, showlegend=False, hoverinfo="skip")
+    figure.data = (*figure.data[shown:], *figure.data[:shown])
+
+
+def draw_coloured(
+    points: Points,
+    outcomes: Outcomes,
+    columns: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    *,
+    hover: str,
+    scale_title: str | None,
+) -> go.Figure:
+    """Draw numbers x and y of points, coloured by a third one, or without a title of that in the colours of outcomes.
+
+    Each outcome has a marker of its own.
+    """
+    chosen = choose_points(len(points))
+    shown, (x, y, colour) = points[chosen], (column[chosen] for column in columns)
+    kind = go.Scattergl if len(shown) > _MOST_SVG_POINTS else go.Scatter
+    size = 8 if len(shown) <= 300 else 6 if len(shown) <= 1500 else 4
+    figure = go.Figure()
+    present = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
+    # Throws that succeeded are drawn last, on top of the others, because the colour scale is mostly about them.
+    for code, name in reversed(present):
+        own, style = shown.code == code, outcomes.style_of(name)
+        look: dict[str, object] = {"color": style.colour}
+        if scale_title is not None:
+            look = {"color": single_precision(colour[own]), "coloraxis": "coloraxis"}
+            if name != outcomes.success:
+                look |= {"size": 1.4 * size, "line": {"color": style.colour, "width": size / 5}}
+        figure.add_trace(
+            kind(
+                x=single_precision(x[own]),
+                y=single_precision(y[own]),
+                customdata=shown.trial[own],
+                mode="markers",
+                marker={"symbol": style.symbol, "size": size, **look},
+                showlegend=False,
+                hovertemplate=f"trial %{{customdata}}<br>{hover}<extra>{in_words(name)}</extra>",
+            )
+        )
+    # The legend has markers of its own, because the points have no single colour.
+    for _, name in present:
+        style = outcomes.style_of(name)
+        look = {"symbol": style.symbol, "color": style.colour if scale_title is None else NEUTRAL}
+        if scale_title is not None and name != outcomes.success:
+            look = {"symbol": f"{style.symbol}-open", "color": style.colour}
+        figure.add_scatter(x=[None], y=[None], mode="markers", name=in_words(name), marker={**look, "size": 9})
+    axis = {} if scale_title is None else {"colorscale": SCALE, "colorbar": colour_bar(scale_title)}
+    return figure.update_layout(coloraxis=axis, legend=LEGEND_ABOVE)
+
+
+def colour_bar(title: str) -> dict[str, object]:
+    """Describe the bar that explains a scale of colours."""
+    return {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}

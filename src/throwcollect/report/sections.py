@@ -55,33 +55,25 @@ from throwcollect.wording import blank_numbers
 _EXAMPLES = 5
 
 
-@dataclass(frozen=True)
-class FailureGroup:
-    """A group of trials with the same outcome and, but for numbers, the same reason.
+def tabulate_failures(rows: Iterable[tuple[int, str, str | None]]) -> Table | None:
+    """Group trial, outcome and reason of each row, most frequent groups first; None if no trial failed.
 
-    Attributes:
-        pattern: Their reason; if its numbers differ between the trials, ``#`` stands in place of each number.
-        examples: Numbers of the first of these trials.
+    A trial without a reason did not fail. Reasons of a group are the same but for numbers, which are `#` where they
+    differ.
     """
-
-    outcome: str
-    pattern: str
-    count: int
-    examples: tuple[int, ...]
-
-
-def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[FailureGroup, ...]:
-    """Group trial, outcome and reason of each row, most frequent groups first; trials without a reason did not fail."""
-    groups: dict[tuple[str, str], list[tuple[int, str]]] = {}
+    groups: dict[tuple[str, str], dict[int, str]] = {}
     for trial, outcome, reason in rows:
         if reason is not None:
-            groups.setdefault((outcome, blank_numbers(reason)), []).append((trial, reason))
-    failures = []
-    for (outcome, pattern), members in groups.items():
-        trials, reasons = zip(*members, strict=True)
-        reason = pattern if len(set(reasons)) > 1 else reasons[0]
-        failures.append(FailureGroup(outcome, reason, len(trials), trials[:_EXAMPLES]))
-    return tuple(sorted(failures, key=lambda failure: (-failure.count, failure.outcome, failure.pattern)))
+            groups.setdefault((outcome, blank_numbers(reason)), {})[trial] = reason
+    ordered = sorted(groups.items(), key=lambda group: (-len(group[1]), group[0]))
+    cells = []
+    for (outcome, pattern), reasons in ordered[:_MOST_FAILURES]:
+        reason = pattern if len(set(reasons.values())) > 1 else next(iter(reasons.values()))
+        cells.append((in_words(outcome), reason, f"{len(reasons):,}", ", ".join(map(str, [*reasons][:_EXAMPLES]))))
+    if rest := ordered[_MOST_FAILURES:]:
+        cells.append(("", f"{len(rest):,} more reasons", f"{sum(len(reasons) for _, reasons in rest):,}", ""))
+    head = ("outcome", "reason (# is a number)", "trials", "such as trials")
+    return Table(head=head, rows=tuple(cells), number_columns=(2,)) if cells else None
 
 
 _MOST_FAILURES = 40
@@ -111,16 +103,20 @@ class Report:
 def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     """Make the report on a dataset, and on a model that was learned from it, if its directory is given."""
     throws, info = dataset.throws, summary(dataset)
-    outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
+    declared = (dataset.config.task.success, *(each.value for each in task_of(dataset.config).outcomes))
+    outcomes = Outcomes.of(throws["outcome"].to_pylist(), declared)
     parameters = read_parameters(dataset.config, throws, outcomes)
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
     facts = _list_facts(dataset, info)
     task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
+    by = robot_of(dataset.config).introduction
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
     return Report(
         name=info.name,
-        lead=f"{info.trials:,} {task.subject}{finished}.",
+        lead=f"{info.trials:,} simulated {dataset.config.task.subject} by {by}{finished}.",
         tiles=(
+            Tile(f"{len(outcomes.codes):,}", f"{noun}s planned"),
+            Tile(format_share(outcomes.succeeded, len(outcomes.codes)), in_words(outcomes.success)),
             *task.tiles,
             Tile(format_duration(info.duration_s), "of simulated time"),
             Tile(format_size(info.size_bytes), "on disk"),
@@ -131,7 +127,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
             *show_targets(dataset),
             *(() if model is None else (show_model(model, dataset),)),
             _show_parameters(parameters, outcomes),
-            _show_outcomes(outcomes, parameters, group_failures(reasons), noun),
+            _show_outcomes(outcomes, parameters, tabulate_failures(reasons), noun),
             _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
             *task.episodes,
             _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
@@ -154,20 +150,14 @@ def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
 
 
 def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded."""
+    """Make the part of the task; an empty one for a task without."""
     name = dataset.config.task.name
-    if path := task_of(dataset.config).report:
-        report = load_part("tasks", name, path)
-        with explain_failure("tasks", name, "report its trials"):
-            added: TaskReport = report(dataset, outcomes)
-        return added
-    trials = len(outcomes.codes)
-    tiles = (
-        Tile(f"{trials:,}", "trials planned"),
-        Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success)),
-    )
-    by = robot_of(dataset.config).introduction
-    return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
+    if not (path := task_of(dataset.config).report):
+        return TaskReport()
+    report = load_part("tasks", name, path)
+    with explain_failure("tasks", name, "report its trials"):
+        added: TaskReport = report(dataset, outcomes)
+    return added
 
 
 def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> ReportSection:
@@ -200,7 +190,7 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
 
 
 def _show_outcomes(
-    outcomes: Outcomes, parameters: tuple[SweptKey, ...], failures: tuple[FailureGroup, ...], noun: str
+    outcomes: Outcomes, parameters: tuple[SweptKey, ...], failures: Table | None, noun: str
 ) -> ReportSection:
     title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
     blocks: list[Row | Table] = []
@@ -208,8 +198,8 @@ def _show_outcomes(
     text = f"All {trials:,} {noun}s {outcomes.verbs[1]}."
     if failed:
         text = f"{failed:,} of {trials:,} {noun}s ({format_share(failed, trials)}) did not {outcomes.verbs[0]}."
-    if failures:
-        blocks.append(_tabulate(failures))
+    if failures is not None:
+        blocks.append(failures)
     if failed and len(outcomes.names) > 1 and parameters:
         text += " Below, the share of each outcome over the values of each swept key, in the colours of the bar above."
         blocks.append(
@@ -219,17 +209,6 @@ def _show_outcomes(
             )
         )
     return ReportSection("outcomes", "Outcomes", title, text, tuple(blocks))
-
-
-def _tabulate(failures: tuple[FailureGroup, ...]) -> Table:
-    rows = [
-        (in_words(each.outcome), each.pattern, f"{each.count:,}", ", ".join(map(str, each.examples)))
-        for each in failures[:_MOST_FAILURES]
-    ]
-    if rest := failures[_MOST_FAILURES:]:
-        rows.append(("", f"{len(rest):,} more reasons", f"{sum(each.count for each in rest):,}", ""))
-    head = ("outcome", "reason (# is a number)", "trials", "such as trials")
-    return Table(head=head, rows=tuple(rows), number_columns=(2,))
 
 
 def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> ReportSection:

@@ -16,7 +16,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Model, load_model, read_score
-from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, Score, ThrowAtTarget, format_length
+from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, ThrowAtTarget, format_length
 from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
 from throwcollect.report.measured import choose_points, read_numbers
@@ -48,20 +48,21 @@ def choose_scale(targets: NDArray[np.float64], places: NDArray[np.float64]) -> i
     return times
 
 
-def draw_miss_map(
+def _show_miss_map(
+    key: str,
+    shown: str,
     ends: NDArray[np.float64],
     targets: NDArray[np.float64],
     places: NDArray[np.float64],
-    titles: Sequence[str],
+    columns: Sequence[str],
     task: TaskConfig,
-    *,
-    times: int,
-) -> go.Figure:
-    """Draw targets amid the ends of other trials, and a line for each miss, in the first two columns.
+) -> Panel:
+    """Show targets amid the ends of other trials, and a line for each miss, in the first two columns.
 
     `ends` have the shape ``(n, n_columns)``. `targets`, and the `places` where the trials at these targets ended, have
-    the shape ``(n_targets, n_columns)``; a place is NaN if its trial has no end. Misses are drawn `times` as long.
+    the shape ``(n_targets, n_columns)``; a place is NaN if its trial has no end. The title begins with `shown`.
     """
+    times = choose_scale(targets, places)
     figure = go.Figure()
     ends, targets, places = map(_take_two, (ends, targets, places))
     if len(ends):
@@ -82,9 +83,10 @@ def draw_miss_map(
         )
         line = {"color": LIMIT_LINE["color"], "width": 1.5}
         figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {times}" if times > 1 else "misses")
-    first, second = [*titles, ""][:2]
+    first, second = [*(_title_column(column, task) for column in columns), ""][:2]
     figure.update_xaxes(title=first).update_yaxes(title=second, scaleanchor="x")
-    return figure.update_layout(height=420, legend=LEGEND_ABOVE)
+    title = f"{shown}, and misses drawn {times:,} times as long" if times > 1 else f"{shown} and misses"
+    return Panel(key, title, figure.update_layout(height=420, legend=LEGEND_ABOVE))
 
 
 def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,19 +94,11 @@ def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([points, np.zeros(len(points))])[:, :2]
 
 
-def title_misses(targets: str, times: int) -> str:
-    """Title of a map of misses; `targets` is the word for the targets, and misses are drawn `times` as long."""
-    return f"{targets}, and misses drawn {times:,} times as long" if times > 1 else f"{targets} and misses"
-
-
-def title_column(column: str, task: TaskConfig) -> str:
+def _title_column(column: str, task: TaskConfig) -> str:
     """Title of an axis for a column of places: the word that the task has for it, or its own name, and the unit."""
     words = {each.of: each.word for each in task.target_columns}
     unit = unit_of_name(column)
     return f"{words.get(column, column.removesuffix(f'_{unit}'))} [{unit}]" if unit else column
-
-
-_TITLE = "How targets are missed"
 
 
 def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
@@ -129,7 +123,7 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
             if each.measured
         ),
     ]
-    return (ReportSection("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(misses))),)
+    return (ReportSection("misses", "Targets", "How targets are missed", text, (tuple(panels), _tabulate(misses))),)
 
 
 def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> Panel:
@@ -142,10 +136,8 @@ def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> P
     chosen = choose_points(len(throws))
     goals, places = np.column_stack([targets[name][chosen] for name in shown]), np.column_stack(ends)[chosen]
     aimed = ~np.isnan(goals).any(axis=1)
-    titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
-    times = choose_scale(goals[aimed], places[aimed])
-    figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, dataset.config.task, times=times)
-    return Panel("map", title_misses("Targets", times), figure)
+    columns = [declared[name].of for name in shown]
+    return _show_miss_map("map", "Targets", places[~aimed], goals[aimed], places[aimed], columns, dataset.config.task)
 
 
 def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
@@ -168,12 +160,7 @@ def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
 
 def _tabulate(misses: dict[str, MissSummary]) -> Table:
     rows = tuple(
-        (
-            name,
-            f"{each.targets:,}",
-            f"{each.measured:,}",
-            *each.format_misses(unit_of_name(name)),
-        )
+        (name, f"{each.targets:,}", f"{each.measured:,}", *each.format_misses(unit_of_name(name)))
         for name, each in misses.items()
     )
     head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
@@ -183,7 +170,7 @@ def _tabulate(misses: dict[str, MissSummary]) -> Table:
 def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     """Show how a model of a dataset hits targets, from the directory of the model."""
     model, score = load_model(directory), read_score(directory)
-    trained = model.trained_on
+    trained, noun = model.trained_on, dataset.config.task.noun
     if trained.digest != dataset.digest:
         raise ConfigError(
             f"{directory}: was learned from {trained.name}, digest {trained.digest[:10]}",
@@ -192,13 +179,14 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
         )
     error = format_length(trained.error, model.targets)
     text = (
-        f"Learned from {trained.throws:,} throws: {', '.join(model.parameters)} to {', '.join(model.targets)}. "
-        f"Throws that polynomials were not fitted to are predicted to {error} (median)."
+        f"Learned from {format_count(trained.throws, noun)}: {', '.join(model.parameters)} to "
+        f"{', '.join(model.targets)}. "
+        f"{noun.capitalize()}s that polynomials were not fitted to are predicted to {error} (median)."
     )
     if score is None:
         hint = command("score", directory)
         return ReportSection(
-            "model", "Model", _MODEL_TITLE, f"{text} Nobody has thrown with it yet; {hint} does, in simulation."
+            "model", "Model", _MODEL_TITLE, f"{text} It has no score yet; {hint} tries it in simulation."
         )
     seeds = format_count(score.seeds, "seed")
     text += f" Misses are medians of {seeds}, of {score.targets} targets each, in simulation."
@@ -206,21 +194,22 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
         _show_misses("targets", "Targets", model, score.throws, dataset.config.task),
         *_show_errors(
             "training",
-            "Misses by number of throws learned from",
+            f"Misses by number of {noun}s learned from",
             [(each.trained_on, each.errors) for each in score.trained],
-            x={"title": "throws learned from", "type": "log"},
+            x={"title": f"{noun}s learned from", "type": "log"},
             y={"type": "log"},
         ),
     ]
-    rows: list[Row | Table] = [tuple(panels), _tabulate_score(score)]
+    table = Table(head=("", *SCORE_HEAD), rows=tuple(score.list_rows()), number_columns=(1, 2, 3, 4, 5))
+    rows: list[Row | Table] = [tuple(panels), table]
     if score.adapted:
         shown = "Targets there after the last of them"
         there = _show_misses("elsewhere", shown, model, score.adapted_throws, dataset.config.task)
         errors = _show_errors(
             "adapting",
-            "In another world, by number of throws there",
+            f"In another world, by number of {noun}s there",
             [(each.real_throws, each.errors) for each in score.adapted],
-            x={"title": "throws in the other world"},
+            x={"title": f"{noun}s in the other world"},
             y={"rangemode": "tozero"},
         )
         rows.append((*errors, there))
@@ -232,10 +221,7 @@ def _show_misses(key: str, shown: str, model: Model, throws: Sequence[ThrowAtTar
     shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
     targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
     places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(shape)
-    titles = [title_column(column, task) for column in model.targets]
-    times = choose_scale(targets, places)
-    figure = draw_miss_map(model.learned.outputs, targets, places, titles, task, times=times)
-    return Panel(key, title_misses(shown, times), figure)
+    return _show_miss_map(key, shown, model.learned.outputs, targets, places, model.targets, task)
 
 
 def _show_errors(
@@ -262,7 +248,3 @@ def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go
         figure.add_scatter(x=list(numbers), y=scaled, mode="lines+markers", line=line, marker=marker, name=name)
     title = f"{_NOUNS.get(misses[0].unit, 'difference')} from the target [{unit}]"
     return figure.update_yaxes(title=title).update_layout(height=420, legend=LEGEND_ABOVE)
-
-
-def _tabulate_score(score: Score) -> Table:
-    return Table(head=("", *SCORE_HEAD), rows=tuple(score.list_rows()), number_columns=(1, 2, 3, 4, 5))

@@ -95,14 +95,12 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
 def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
     """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
     (_, samples), landing = throw.read_samples(), throw.events.end
-    robot, joints = draw_robot_of(config), robot_of(config).joints
+    joints = robot_of(config).joints
     times_s = samples.seconds_since(samples.stamps_ns[0])
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
     left = throw.events.left
     released = len(samples) if left is None else int(np.searchsorted(times_s, left.time_s))
-    colours = {look.name: shape.rgba for look, shape in zip(looks_of(config), draw_bodies_of(config), strict=True)}
-    bodies = [(body, colours[body.link.name]) for body in (*bodies_of(config), object_of(config))]
-    with Renderer(robot.urdf_with_files, config.robot.base_height_m, bodies) as renderer:
+    with _open_renderer(config) as renderer:
         # The mount, or the feet, stand at the origin.
         points = [samples.object_position, np.zeros((1, 3))]
         # What the task is about is always in the picture; other bodies may be as large as a room.
@@ -127,15 +125,19 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
             if flies := starts_in_tool(config):
                 ground.shade(picture, path[-1])
                 ground.mark(picture, path, released, end)
-            seen = renderer.draw(*ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
-            body = images.fromarray(seen)
-            # The picture of the robot is its own mask, because it is transparent where nothing was drawn.
-            picture.paste(body, (0, 0), body)
+            ground.paste(picture, renderer)
             # What slides on a body would have its path behind the picture of that body.
             if not flies:
                 ground.mark(picture, path, released, end)
             pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
     return pictures
+
+
+def _open_renderer(config: Config) -> Renderer:
+    """Make a renderer of the robot and all bodies of a configuration, the object last."""
+    colours = {look.name: shape.rgba for look, shape in zip(looks_of(config), draw_bodies_of(config), strict=True)}
+    bodies = [(body, colours[body.link.name]) for body in (*bodies_of(config), object_of(config))]
+    return Renderer(draw_robot_of(config).urdf_with_files, config.robot.base_height_m, bodies)
 
 
 def _find_heading(flight: NDArray[np.float64]) -> float:
@@ -200,6 +202,14 @@ class Ground:
         """A picture of the ground alone."""
         return self._empty.copy()
 
+    def paste(self, picture: Any, renderer: Renderer) -> None:
+        """Draw robot and bodies, as they are in a renderer."""
+        camera = self.camera
+        seen = renderer.draw(*self.size, view=camera.view, projection=camera.projection, light=_LIGHT)
+        # The picture of the robot is its own mask, because it is transparent where nothing was drawn.
+        body = images.fromarray(seen)
+        picture.paste(body, (0, 0), body)
+
     def mark(self, picture: Any, path: NDArray[np.float64], left: int, end: NDArray[np.float64] | None) -> None:
         """Draw a path of the object's centre in world [m], shape ``(n, 3)``, and a cross where it ended.
 
@@ -223,10 +233,8 @@ class Still:
     """Draws single pictures of a world of a configuration, from one place, with the ground."""
 
     def __init__(self, config: Config) -> None:
-        colours = (shape.rgba for shape in draw_bodies_of(config))
-        bodies = list(zip((*bodies_of(config), object_of(config)), colours, strict=True))
         self._joints = robot_of(config).joints
-        self._renderer = Renderer(draw_robot_of(config).urdf_with_files, config.robot.base_height_m, bodies)
+        self._renderer = _open_renderer(config)
         self._ground: Ground | None = None
 
     def close(self) -> None:
@@ -243,10 +251,8 @@ class Still:
             points = np.concatenate([frames - _ROOM_M, frames + _ROOM_M, front, np.zeros((1, 3)), [[2.0, 0.0, 0.0]]])
             points[:, 2] = np.maximum(points[:, 2], 0)
             self._ground = Ground(camera_on(points, _WIDTH / _HEIGHT), points[:, :2].mean(axis=0))
-        picture, camera = self._ground.picture(), self._ground.camera
-        seen = self._renderer.draw(*self._ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
-        body = images.fromarray(seen)
-        picture.paste(body, (0, 0), body)
+        picture = self._ground.picture()
+        self._ground.paste(picture, self._renderer)
         return np.array(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS).convert("RGB"))
 
 

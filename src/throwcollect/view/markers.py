@@ -89,16 +89,18 @@ def throw_markers(throw: ShownThrow) -> Any:
 
 
 def all_markers(throws: Sequence[ShownThrow]) -> Any:
-    """A visualization_msgs/MarkerArray with thin paths of all throws, and the landing plane of the first."""
+    """A visualization_msgs/MarkerArray with thin paths of all throws, and the landing plane of the first, if any."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throws[0].start_ns
+    thin = [_make_path("paths", throw, stamp, width=_THIN_LINE_M, alpha=_OTHERS_ALPHA) for throw in throws]
+    if "landing" not in throws[0].config.task.events:
+        return array(markers=thin)
     # The first of these points is the robot's base, so that the plane includes it.
     corners = np.concatenate([np.zeros((1, 2)), *(throw.path[:, :2] for throw in throws)])
     low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
     plane = _make_marker("landing plane", marker.CUBE, _PLANE, (*(high - low), _PLANE_M), stamp)
     x, y = (low + high) / 2
     _place(plane, x, y, throws[0].config.scene.landing_height_m - _PLANE_M / 2)
-    thin = [_make_path("paths", throw, stamp, width=_THIN_LINE_M, alpha=_OTHERS_ALPHA) for throw in throws]
     return array(markers=[plane, *thin])
 
 

@@ -13,6 +13,7 @@ from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.record import Samples
+from throwcollect.episode.topics import odometry
 from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory
 from throwcollect.progress_log import log_progress
@@ -21,7 +22,7 @@ from throwcollect.view.markers import ShownThrow
 from throwcollect.view.viewer_recording import FACTS_HARDWARE, FACTS_NAME, ViewRecording
 
 _SCENE = "3D!throws"
-_BALL = "Plot!ball"
+_OBJECT = "Plot!object"
 _LIMITS = "Plot!limits"
 _FACTS = "DiagnosticStatusPanel!facts"
 _SPEED = 0.2
@@ -75,7 +76,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
             summary = recording.finish(RECORDING)
         information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
         (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
-        (beside / LAYOUT).write_bytes(layout(tuple(config.task.end)))
+        (beside / LAYOUT).write_bytes(layout(tuple(config.task.end), config.acted_on))
         robot.copy_package(beside)
         mesh_bytes = sum(file.stat().st_size for file in robot.meshes.values())
         recording_bytes = path.stat().st_size
@@ -107,13 +108,15 @@ def _schedule(dataset: Dataset, throws: Dataset) -> Iterator[tuple[ShownThrow, S
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
 
 
-def layout(joints: Sequence[str]) -> bytes:
-    """JSON text of the layout, as applications import it; joints are those whose limits are plotted."""
+def layout(joints: Sequence[str], body: str) -> bytes:
+    """JSON text of the layout, as applications import it, with plots of the limits of joints, and of the object."""
     shares = [_describe_series(f"/view/limits.position[{index}]", joint) for index, joint in enumerate(joints)]
-    height = _describe_series("/ball/odometry.pose.pose.position.z", "height [m]")
+    height = _describe_series(f"{odometry(body).name}.pose.pose.position.z", "height [m]")
     panels = {
         _SCENE: _describe_scene(),
-        _BALL: _describe_plot([height, _describe_series("/view/object_speed.data", "speed [m/s]")], "Ball"),
+        _OBJECT: _describe_plot(
+            [height, _describe_series("/view/object_speed.data", "speed [m/s]")], body.capitalize()
+        ),
         _LIMITS: _describe_plot(
             [*shares, _describe_series("-1", "lower limit"), _describe_series("1", "upper limit")],
             "Joint positions within their limits",
@@ -126,7 +129,7 @@ def layout(joints: Sequence[str]) -> bytes:
         "userNodes": {},
         "playbackConfig": {"speed": _SPEED},
         "layout": _describe_split(
-            "row", _SCENE, _describe_split("column", _FACTS, _describe_split("column", _BALL, _LIMITS, 50), 34), 64
+            "row", _SCENE, _describe_split("column", _FACTS, _describe_split("column", _OBJECT, _LIMITS, 50), 34), 64
         ),
     }
     return (json.dumps(document, indent=2) + "\n").encode()

@@ -103,7 +103,7 @@ def test_the_card_of_a_hub_dataset_names_its_data_in_the_header(to: str, exporte
     [
         (None, "The samples are those that were recorded, at 250 Hz."),
         (50, "Each is one of the 250 Hz record, unchanged: every 5th. Nothing is filtered: what is faster than 25 Hz"),
-        (60, "They lie between those of the 250 Hz record: positions of joints and ball on the cubic"),
+        (60, "They lie between those of the 250 Hz record: positions of joints and bodies on the cubic"),
     ],
 )
 def test_the_card_explains_the_rate_of_the_samples(rate_hz: int | None, text: str, exported: Export) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,12 +14,13 @@ from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.misses import find_median, find_share90
-from throwcollect.learning.adapting import Adaptation, Method
+from throwcollect.learning.adapting import Adaptation, Method, adapt
 from throwcollect.learning.distilling import distil
-from throwcollect.learning.score import Errors, Score, pool_scores
+from throwcollect.learning.score import Errors, Score
 from throwcollect.learning.scoring import draw_targets, score_model, spread_first
 
 SHIFT = np.array([0.1, 0.12])
+ADAPT = partial(adapt, scatter=0.002, latents_count=False)
 
 
 class World:
@@ -44,9 +46,9 @@ class World:
             )
 
 
-def score(world: World, other: World | None = None, *, seed: int = 0, scatter: float = 0.0) -> Score:
-    options = {"count": 25, "error": 0.002, "latents_count": False, "distilled": None, "processes": 1}
-    return score_model(learn(), world, seed=seed, world=other, scatter=scatter, **options)
+def score(world: World, other: World | None = None, *, seeds: range = range(1), scatter: float = 0.0) -> Score:
+    options = {"count": 25, "adapt_map": ADAPT, "distilled": None, "processes": 1}
+    return score_model(learn(), world, seeds=seeds, world=other, scatter=scatter, **options)
 
 
 def test_a_model_of_more_throws_hits_better() -> None:
@@ -65,7 +67,7 @@ def test_a_model_of_more_throws_hits_better() -> None:
 def test_the_same_seed_gives_the_same_score() -> None:
     first = score(World())
     assert score(World()) == first
-    assert score(World(), seed=1).throws != first.throws
+    assert score(World(), seeds=range(1, 2)).throws != first.throws
 
 
 def test_throws_that_are_refused_or_do_not_land_are_counted_as_missed() -> None:
@@ -92,10 +94,9 @@ def test_scoring_in_the_world_of_the_dataset_ignores_an_earlier_adaptation() -> 
     shifted = learned.correct(replace(learned.correction, offset=SHIFT))
     options = {
         "count": 25,
-        "seed": 0,
+        "seeds": range(1),
         "scatter": 0.0,
-        "error": 0.002,
-        "latents_count": False,
+        "adapt_map": ADAPT,
         "distilled": None,
         "processes": 1,
     }
@@ -130,15 +131,15 @@ def test_targets_are_ordered_so_that_the_first_ones_are_far_apart() -> None:
 
 
 def test_error_statistics_that_depend_on_a_throw_that_did_not_succeed_are_empty() -> None:
-    found = Errors.of(np.array([[0.3], [-0.1], [np.nan], [0.2]]), ["landing_x_m"])
+    found = Errors.of([np.array([[0.3], [-0.1], [np.nan], [0.2]])], ["landing_x_m"])
     assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.25, None, None)
-    half = Errors.of(np.array([[0.3], [-0.1], [np.nan], [np.nan]]), ["landing_x_m"])
+    half = Errors.of([np.array([[0.3], [-0.1], [np.nan], [np.nan]])], ["landing_x_m"])
     assert (half.missed, half.median, half.largest) == (2, None, None)
 
 
 def test_errors_of_a_model_are_summed_up_as_misses_of_a_dataset_are() -> None:
     misses = [0.1, 0.01, 0.03, 0.02]
-    found = Errors.of(np.array(misses)[:, np.newaxis], ["landing_x_m"])
+    found = Errors.of([np.array(misses)[:, np.newaxis]], ["landing_x_m"])
     assert (found.median, found.share90) == (find_median(misses), find_share90(misses))
     entry = Adaptation(method="none", throws=4, scatter=0.0, before=misses, after=[], found=[])
     assert entry.medians == (found.median, None)
@@ -146,37 +147,40 @@ def test_errors_of_a_model_are_summed_up_as_misses_of_a_dataset_are() -> None:
 
 def test_errors_in_metres_and_radians_are_summarised_separately() -> None:
     away = np.array([[0.5, 0.03, 0.04], [0.1, 0.0, 0.01], [-0.2, 0.3, 0.4]])
-    found = Errors.of(away, ["hit_angle_rad", "landing_x_m", "landing_y_m"])
+    found = Errors.of([away], ["hit_angle_rad", "landing_x_m", "landing_y_m"])
     lengths, angles = found.by_unit
     assert (lengths.unit, lengths.median, lengths.largest) == ("m", pytest.approx(0.05), pytest.approx(0.5))
     assert (angles.unit, angles.median, angles.largest) == ("rad", 0.2, 0.5)
-    assert Errors.middle([found, found]) == found.model_copy(update={"throws": 6})
+    assert Errors.of([away, away], ["hit_angle_rad", "landing_x_m", "landing_y_m"]) == found.model_copy(
+        update={"throws": 6}
+    )
     assert found.cells[:3] == ("5.00 cm, 11.46°", "41.00 cm, 25.21°", "50.00 cm, 28.65°")
-    assert Errors.of(away[:, :1], ["landing_time_s"]).cells[2] == "0.5 s"
+    assert Errors.of([away[:, :1]], ["landing_time_s"]).cells[2] == "0.5 s"
 
 
 def test_a_distilled_map_is_scored_at_the_same_targets() -> None:
     learned, world = learn(), World()
-    options = {"count": 25, "seed": 0, "scatter": 0.0, "error": 0.002, "latents_count": False, "processes": 1}
+    options = {"count": 25, "seeds": range(1), "scatter": 0.0, "adapt_map": ADAPT, "processes": 1}
     found = score_model(learned, world, world=None, distilled=distil(learned), **options)
     assert world.calls == 1
     assert (found.trained, found.throws) == (score(World()).trained, score(World()).throws)
     assert found.distilled.throws == 25
     assert found.trained[-1].errors.median < found.distilled.median < 0.02
-    assert pool_scores([found, found]).distilled.throws == 50
 
 
-def test_pooled_scores_of_several_seeds_are_medians() -> None:
-    some = [score(World(), World(SHIFT), seed=seed) for seed in range(3)]
-    found = pool_scores(some)
-    assert (found.seeds, found.targets, len(found.throws)) == (3, 25, 75)
+def test_scores_of_several_seeds_are_medians() -> None:
+    some = [score(World(), World(SHIFT), seeds=range(seed, seed + 1)) for seed in range(3)]
+    found = score(World(), World(SHIFT), seeds=range(3))
+    assert (found.seed, found.seeds, found.targets, len(found.throws)) == (0, 3, 25, 75)
     for at, each in enumerate(found.trained):
         assert each.errors.median == sorted(one.trained[at].errors.median for one in some)[1]
         assert each.errors.throws == 75
     assert [each.real_throws for each in found.adapted] == [0, 1, 3, 5, 10]
     assert found.adapted[-1].errors.median == sorted(one.adapted[-1].errors.median for one in some)[1]
     assert some[0].trained[0] != some[1].trained[0]
-    missed = Errors(throws=1, missed=1, median=None, share90=None, largest=None)
-    assert Errors.middle([missed, missed, found.trained[0].errors]).median is None
-    two = [missed.model_copy(update={"median": median}) for median in (0.1, 0.3)]
-    assert Errors.middle(two).median == pytest.approx(0.2)
+
+
+def test_seeds_without_a_throw_that_succeeded_count_as_farther_than_all_others() -> None:
+    missed, near, far = (np.array([[number]]) for number in (np.nan, 0.1, 0.3))
+    assert Errors.of([missed, missed, near], TARGETS[:1]).median is None
+    assert Errors.of([near, far], TARGETS[:1]).median == pytest.approx(0.2)

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from throwcollect.report.contents import format_duration, format_share, format_size
-from throwcollect.report.outcomes import Outcomes, style_of
-from throwcollect.report.sections import FailureGroup, group_failures
-from throwcollect.report.throw.measured import Residuals
-from throwcollect.report.throw.throw_sections import _show_physics
+from throwcollect.report.outcomes import SUCCESS, Outcomes
+from throwcollect.report.sections import tabulate_failures
+from throwcollect.report.throw.flights import Residuals, show_physics
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 from throwcollect.tasks.throw_into.into_result import IntoOutcome
 
 
 def test_outcomes_have_a_fixed_order_with_unknown_ones_last() -> None:
-    found = Outcomes.of(["lost", "landed", "odd", "self_hit", "landed"])
+    found = Outcomes.of(["lost", "landed", "odd", "self_hit", "landed"], list(ThrowOutcome))
     assert found.names == ("landed", "self_hit", "lost", "odd")
     assert found.codes.tolist() == [2, 0, 3, 1, 0]
     assert found.succeeded == 2
@@ -24,22 +23,16 @@ def test_outcomes_have_a_fixed_order_with_unknown_ones_last() -> None:
     assert found.are("recaught").tolist() == [False] * 5
 
 
-def test_every_outcome_has_a_colour_of_its_own() -> None:
-    for task, success in ((ThrowOutcome, "landed"), (IntoOutcome, "in_bin")):
-        found = Outcomes.of([*(outcome.value for outcome in task), REFUSED, "unheard of"], success=success)
-        assert found.names[0] == success
-        assert found.style_of(success) == style_of("landed")
+def test_every_outcome_of_a_task_has_a_colour_of_its_own() -> None:
+    for task in (ThrowOutcome, IntoOutcome):
+        found = Outcomes.of([*(outcome.value for outcome in task), REFUSED, "unheard of"], list(task))
+        assert found.names[0] == found.success
         styles = [found.style_of(name) for name in found.names]
+        assert styles[0] == SUCCESS
         for looks in ({each.colour for each in styles}, {each.symbol for each in styles}):
             assert len(looks) == len(styles)
-
-
-def test_outcomes_of_another_task_have_different_styles() -> None:
-    found = Outcomes.of(["swung", "stuck", "slipped", "lost", "stuck"], success="swung")
-    assert found.names == ("swung", "lost", "slipped", "stuck")
-    assert len({(found.style_of(name).colour, found.style_of(name).symbol) for name in found.names}) == 4
-    assert found.style_of("swung") == style_of("landed")
-    assert found.style_of("lost") == style_of("lost")
+        # An outcome looks the same whichever others occur.
+        assert Outcomes.of(["self_hit"], list(task)).style_of("self_hit") == found.style_of("self_hit")
 
 
 def test_failures_whose_reasons_differ_only_in_numbers_are_one_group() -> None:
@@ -49,10 +42,13 @@ def test_failures_whose_reasons_differ_only_in_numbers_are_one_group() -> None:
         (2, "self_hit", "the ball touched arm_right_7_link at 0.812 s"),
         (3, "refused", "arm_right_4_joint needs 14 Nm at -1e-3 s"),
     ]
-    assert group_failures(rows) == (
-        FailureGroup("refused", "arm_right_4_joint needs # Nm at # s", 2, (1, 3)),
-        FailureGroup("self_hit", "the ball touched arm_right_7_link at 0.812 s", 1, (2,)),
+    table = tabulate_failures(rows)
+    assert table is not None
+    assert table.rows == (
+        ("refused", "arm_right_4_joint needs # Nm at # s", "2", "1, 3"),
+        ("self hit", "the ball touched arm_right_7_link at 0.812 s", "1", "2"),
     )
+    assert tabulate_failures(rows[:1]) is None
 
 
 @pytest.mark.parametrize(
@@ -75,5 +71,5 @@ def test_a_size_is_shown_in_decimal_units(count: int, text: str) -> None:
 
 def test_the_page_says_where_exact_flights_are_drawn():
     """A logarithmic axis has no place for 0, so the page says which bar has the flights that agree to the last bit."""
-    section = _show_physics(Residuals(episodes=3, checked=3, distance_m=np.array([0.0, 0.0, 3e-15])))
+    section = show_physics(Residuals(episodes=3, checked=3, distance_m=np.array([0.0, 0.0, 3e-15])))
     assert "2 agree to the last bit (drawn at 1e-17 m)" in str(section.text)

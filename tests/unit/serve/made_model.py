@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from throwcollect.learning.learned_map import EFFORT, Axis, Correction, KeyRole, Kind
 from throwcollect.learning.model import Model
-from throwcollect.learning.model_file import TrainedOn
+from throwcollect.learning.model_card import TrainedOn
 from throwcollect.learning.polynomial import Polynomial
 
 KEYS = ("task.a", "task.b")

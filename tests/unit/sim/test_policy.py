@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from throwcollect import ConfigError, Simulator, Throw
 from throwcollect.errors import MemberError
 from throwcollect.export.throw_source import list_signals
-from throwcollect.robots.description import robot_of, start_posture
-from throwcollect.robots.surroundings import moving_bodies_of
+from throwcollect.robots.description import start_posture
 from throwcollect.sim.policy import Observation, shape_observation
 from throwcollect.sim.world import World
 
@@ -114,8 +113,7 @@ def test_observations_have_the_names_and_shapes_of_exports(simulator: Simulator)
     target = {"target_x_m": 1.5, "target_y_m": -0.2}
     throw = simulator.roll_out(policy, target=target, trial=3)
     config = simulator.config
-    joints = robot_of(config).joints
-    signals = list_signals(joints, tuple(config.task.end), config.task.target_columns, bodies=moving_bodies_of(config))
+    signals = list_signals(config, config.task.target_columns)
     exported = {signal.name: max(len(signal.components), 1) for signal in signals}
     known = shape_observation(config)
     assert known.items() - exported.items() == {("scene_landing_height_m", 1)}

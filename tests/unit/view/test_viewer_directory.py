@@ -196,7 +196,7 @@ def test_the_layout_shows_only_topics_of_the_recording(written: View, messages: 
     assert (facts["selectedHardwareId"], facts["selectedName"]) == (status.hardware_id, status.name)
     assert scene["scene"]["meshUpAxis"] == "z_up"
     labels = []
-    for name in ("Plot!ball", "Plot!limits"):
+    for name in ("Plot!object", "Plot!limits"):
         for series in panels[name]["paths"]:
             if re.fullmatch(r"-?[0-9.]+", series["value"]):
                 continue

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.reader import Dataset
-from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile, format_share
-from throwcollect.report.figures import LIMIT_LINE, single_precision
-from throwcollect.report.maps import Points, draw_coloured, draw_map
+from throwcollect.report.contents import Panel, ReportSection, TaskReport
+from throwcollect.report.figures import LIMIT_LINE, Points, draw_coloured, draw_map, single_precision
 from throwcollect.report.measured import read_numbers
-from throwcollect.report.outcomes import Outcomes, in_words
-from throwcollect.robots.description import robot_of
+from throwcollect.report.outcomes import Outcomes
 from throwcollect.robots.surroundings import looks_of
 from throwcollect.wording import format_count
 
@@ -24,65 +19,19 @@ _BRAKES = ("task.table.friction", "task.puck.friction", "scene.gravity_mps2")
 """Keys whose product is the deceleration of a sliding puck [m/s²]."""
 
 
-@dataclass(frozen=True)
-class Slides(Points):
-    """All trials whose puck left the tool and came to rest on the table; each array has the shape ``(n,)``.
-
-    Attributes:
-        distance_m: Distance from where the puck left the tool to where it rests [m].
-        braking_mps2: Deceleration by Coulomb friction, µ g [m/s²].
-    """
-
-    distance_m: NDArray[np.float64]
-    braking_mps2: NDArray[np.float64]
-
-    @property
-    def predicted_m(self) -> NDArray[np.float64]:
-        """Distance that follows from the speed and Coulomb friction, v²/(2 µ g) [m]."""
-        # Without friction, nothing comes to rest, so there is no slide.
-        return self.speed_mps**2 / (2 * self.braking_mps2)
-
-
 def report_slides(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     """Make the part of a report that only datasets of slides have."""
-    slides = _read_slides(dataset, outcomes)
-    return TaskReport(
-        subject=f"simulated {dataset.config.task.subject} by {robot_of(dataset.config).introduction}",
-        tiles=tuple(_show_key_numbers(slides, outcomes)),
-        results=(_show_rests(dataset, slides, outcomes), _show_distances(slides, outcomes)),
-        episodes=(),
-    )
-
-
-def _read_slides(dataset: Dataset, outcomes: Outcomes) -> Slides:
     throws = dataset.throws
+    slides = Points.read(throws, outcomes, "rest", "slide_distance_m", "puck_speed_mps")
     fixed = {leaf.name: leaf.value for leaf in leaves(dataset.config) if leaf.name in _BRAKES}
     braking = np.ones(len(throws))
     for key in _BRAKES:
         braking = braking * (read_numbers(throws, column_of(key)) if key in dataset.plan.keys else fixed[key])
-    slides = Slides(
-        row=np.arange(len(throws)),
-        trial=np.asarray(throws["trial"].to_numpy()),
-        x_m=read_numbers(throws, "rest_x_m"),
-        y_m=read_numbers(throws, "rest_y_m"),
-        speed_mps=read_numbers(throws, "puck_speed_mps"),
-        distance_m=read_numbers(throws, "slide_distance_m"),
-        braking_mps2=braking,
-        code=outcomes.codes,
-    )
-    return slides[np.isfinite(slides.distance_m)]
+    results = (_show_rests(dataset, slides, outcomes), _show_distances(slides, braking[slides.row], outcomes))
+    return TaskReport(slides.show_ranges("slide distance", "speed after the push"), results)
 
 
-def _show_key_numbers(slides: Slides, outcomes: Outcomes) -> Iterator[Tile]:
-    trials = len(outcomes.codes)
-    yield Tile(f"{trials:,}", "slides planned")
-    yield Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success))
-    if len(slides):
-        yield Tile(f"{slides.distance_m.min():.2f}–{slides.distance_m.max():.2f} m", "slide distance")
-        yield Tile(f"{slides.speed_mps.min():.2f}–{slides.speed_mps.max():.2f} m/s", "speed after the push")
-
-
-def _show_rests(dataset: Dataset, slides: Slides, outcomes: Outcomes) -> ReportSection:
+def _show_rests(dataset: Dataset, slides: Points, outcomes: Outcomes) -> ReportSection:
     title = "Where the pucks rest"
     if not len(slides):
         return ReportSection("rest", "Rests", title, "No puck left the tool and came to rest on the table.")
@@ -97,23 +46,26 @@ def _show_rests(dataset: Dataset, slides: Slides, outcomes: Outcomes) -> ReportS
     return ReportSection("rest", "Rests", title, text, ((Panel("map", "Rests from above", figure, note),),))
 
 
-def _show_distances(slides: Slides, outcomes: Outcomes) -> ReportSection:
+def _show_distances(slides: Points, braking: NDArray[np.float64], outcomes: Outcomes) -> ReportSection:
+    """Compare distances with those that follow from Coulomb friction, whose deceleration [m/s²] is given."""
     title = "Whether slides obey Coulomb's law"
     if not len(slides):
         return ReportSection("distance", "Distances", title, "No puck left the tool and came to rest on the table.")
+    # Without friction, nothing comes to rest, so there is no slide.
+    predicted = slides.speed_mps**2 / (2 * braking)
     figure = draw_coloured(
         slides,
         outcomes,
-        columns=("speed_mps", "distance_m", "predicted_m"),
+        (slides.speed_mps, slides.distance_m, predicted),
         hover="left at %{x:.2f} m/s, slid %{y:.3f} m",
         scale_title=None,
     )
     speeds = np.linspace(0.0, float(slides.speed_mps.max()), 50)
-    for braking in {float(slides.braking_mps2.min()), float(slides.braking_mps2.max())}:
-        figure.add_trace(_draw_law(speeds, braking))
+    for braking_mps2 in {float(braking.min()), float(braking.max())}:
+        figure.add_trace(_draw_law(speeds, braking_mps2))
     figure.update_xaxes(title="speed after the push [m/s]").update_yaxes(title="slide distance [m]")
-    off = np.abs(slides.distance_m - slides.predicted_m)
-    varies = "; they vary, so these are the lines of the least and the greatest" if np.ptp(slides.braking_mps2) else ""
+    off = np.abs(slides.distance_m - predicted)
+    varies = "; they vary, so these are the lines of the least and the greatest" if np.ptp(braking) else ""
     text = (
         f"Dashed: v²/(2 µ g), where µ is the product of the frictions of table and puck{varies}. "
         f"Half of the distances differ from it by less than {1000 * np.median(off):.1f} mm, 9 of 10 by less than "

@@ -1,87 +1,69 @@
-"""The sections that the task of throwing adds to a report: landings, releases, single throws and their physics."""
+"""The sections that the task of throwing adds to a report: landings and releases, and those on single flights."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 from typing import cast
 
 import numpy as np
-from markupsafe import Markup
+import plotly.graph_objects as go
+import pyarrow as pa
+from numpy.typing import NDArray
 
-from throwcollect.config.sweep import LANDING_HEIGHT
+from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
+from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throw import Throw
-from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile, format_share
-from throwcollect.report.maps import draw_map
-from throwcollect.report.measured import MOST_POINTS
-from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.throw import throw_figures
-from throwcollect.report.throw.measured import (
-    Coverage,
-    Landings,
-    Residuals,
-    choose_examples,
-    count_throws,
-    measure_residuals,
-    read_landings,
-)
-from throwcollect.robots.description import robot_of
-from throwcollect.robots.quintic_curve import sample_positions
+from throwcollect.report.contents import Panel, ReportSection, TaskReport
+from throwcollect.report.figures import BLUE, SCALE, Points, colour_bar, draw_coloured, draw_map, place_bars
+from throwcollect.report.measured import MOST_POINTS, read_numbers
+from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.throw.flights import choose_examples, measure_residuals, show_examples, show_physics
 from throwcollect.robots.surroundings import BodyLook, looks_of
-from throwcollect.tasks.task import commanded_trajectory, task_of
-from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
+from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_task import ThrowTask
 from throwcollect.wording import format_count
 
 _HEIGHTS = frozenset((LANDING_HEIGHT, "task.bin.height_m", "task.bin.depth_m"))
 """Keys that the height of landings follows from."""
+_FEW = 8
+"""Up to this many throws in a cell, the scale has a mark for each number of throws; plotly would also mark halves."""
+_BINS = 14
+_TITLES = {
+    "distance_m": ("landing distance", "landing distance [m]"),
+    "hit_angle_rad": ("hit angle", "hit angle below the horizontal [°]"),
+    "height_m": ("landing height", "landing height [m]"),
+}
+"""Name of each dimension, and the label of its axis."""
 
 
 def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     """Make the part of a report that only datasets of throws have."""
-    robot = robot_of(dataset.config)
     throws, varies = dataset.throws, not _HEIGHTS.isdisjoint(dataset.plan.keys)
     height_m = None if varies else cast("ThrowTask", task_of(dataset.config)).landing_height_m
-    landings = read_landings(throws, outcomes)
+    landings = Points.read(throws, outcomes, "landing", None, "release_speed_mps")
     planned = landings[outcomes.are(outcomes.success)[landings.row]]
-    coverage = count_throws(planned, throws, target=dataset.config.sweep.target)
     examples = list(dataset.select(choose_examples(dataset, planned, outcomes)))
     configs = [dataset.config_of(throw) for throw in examples] or [dataset.config]
     bodies = tuple(dict.fromkeys(body for config in configs for body in looks_of(config)[:-1]))
+    cells = count_throws(planned, throws, target=dataset.config.sweep.target)
     return TaskReport(
-        subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by {robot.introduction}",
-        tiles=tuple(_show_key_numbers(planned, outcomes)),
+        tiles=planned.show_ranges("landing distance", "release speed"),
         results=(
-            _show_landings(landings, planned, outcomes, coverage, height_m=height_m, bodies=bodies),
-            _show_releases(landings, outcomes),
+            _show_landings(landings, planned, outcomes, cells, height_m=height_m, bodies=bodies),
+            _show_releases(landings, np.degrees(read_numbers(throws, "release_elevation_rad")[landings.row]), outcomes),
         ),
         episodes=(
-            _show_examples(dataset, examples, outcomes, height_m=height_m, bodies=bodies),
-            _show_physics(measure_residuals(dataset)),
+            show_examples(dataset, examples, outcomes, height_m=height_m, bodies=bodies),
+            show_physics(measure_residuals(dataset)),
         ),
     )
 
 
-def _choose_middle(throws: Sequence[Throw], success: str) -> Throw:
-    """Choose, of the throws that succeeded, the one in the middle; the first of all if none did."""
-    landed = [throw for throw in throws if throw.outcome == success]
-    return landed[len(landed) // 2] if landed else throws[0]
-
-
-def _show_key_numbers(landings: Landings, outcomes: Outcomes) -> Iterator[Tile]:
-    trials = len(outcomes.codes)
-    yield Tile(f"{trials:,}", "throws planned")
-    yield Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success))
-    if len(landings):
-        distance, speed = landings.distance_m, landings.speed_mps
-        yield Tile(f"{distance.min():.2f}–{distance.max():.2f} m", "landing distance")
-        yield Tile(f"{speed.min():.2f}–{speed.max():.2f} m/s", "release speed")
-
-
 def _show_landings(
-    landings: Landings,
-    planned: Landings,
+    landings: Points,
+    planned: Points,
     outcomes: Outcomes,
     coverage: Coverage | None,
     *,
@@ -94,7 +76,7 @@ def _show_landings(
         return ReportSection("landing", "Landings", title, f"No ball crossed the {_name_plane(outcomes)}.")
     text = f"{outcomes.succeeded:,} of {len(outcomes.codes):,} throws {outcomes.verbs[1]}"
     if len(planned):
-        if outcomes.success != LANDED:
+        if outcomes.success != "landed":
             text += f"; the balls crossed the {_name_plane(outcomes)}"
         x, y, distance = planned.x_m, planned.y_m, planned.distance_m
         text += (
@@ -104,121 +86,162 @@ def _show_landings(
     others = len(landings) - len(planned)
     text += f". {format_count(others, 'further ball')} crossed the {_name_plane(outcomes)}, too." if others else "."
     # A landing is all that a throw is about, but only a part of what other tasks are about.
-    figure = draw_map(landings, outcomes, bodies, speed="release speed" if outcomes.success == LANDED else None)
+    figure = draw_map(landings, outcomes, bodies, speed="release speed" if outcomes.success == "landed" else None)
     notes = [_say_how_many(landings)]
     if len({body.name for body in bodies}) < len(bodies):
         notes.append("Bodies differ from throw to throw; those of a few throws are drawn.")
     above = Panel("map", "Landings from above", figure, " ".join(filter(None, notes)))
-    return ReportSection("landing", "Landings", title, text, ((above, *_show_targets(coverage, outcomes.verbs[1])),))
+    return ReportSection("landing", "Landings", title, text, ((above, *_show_cells(coverage, outcomes.verbs[1])),))
 
 
-def _show_targets(coverage: Coverage | None, succeeded: str) -> Iterator[Panel]:
+def _show_cells(coverage: Coverage | None, succeeded: str) -> Iterator[Panel]:
     """Show how many throws that succeeded there are in each cell; `succeeded` is what such a throw did, in words."""
     if coverage is None:
         return
-    text = f"{coverage.hit:,} of {coverage.counts.size:,} cells have a throw that {succeeded}, "
-    text += f"at most {coverage.counts.max():,}"
-    if coverage.configured:
-        text += f"; {coverage.throws - int(coverage.counts.sum()):,} landed in no cell"
-    if len(coverage.axes) == 1:
-        figure = throw_figures.draw_coverage_bars(coverage.axes[0], coverage.counts)
-        yield Panel("cells", "Throws by target", figure, f"{text}.")
-    for number, (first, second, counts) in enumerate(coverage.pairs):
-        yield Panel(
-            key=f"cells-{number}",
-            title=f"{'Targets:' if coverage.configured else 'Throws by'} {first.name} and {second.name}",
-            figure=throw_figures.draw_coverage_map(first, second, counts),
-            text="" if number else f"{text}.",
-        )
+    axes, counts = coverage.axes, coverage.counts
+    text = f"{(counts > 0).sum():,} of {counts.size:,} cells have a throw that {succeeded}, at most {counts.max():,}"
+    text += "." if coverage.others is None else f"; {coverage.others:,} landed in no cell."
+    if len(axes) == 1:
+        hover = "near %{x:.3f}: %{y} throws<extra></extra>"
+        figure = go.Figure(go.Bar(**place_bars(axes[0].edges), y=counts, marker_color=BLUE, hovertemplate=hover))
+        figure.update_xaxes(title=axes[0].label, showgrid=False).update_yaxes(title="throws")
+        yield Panel("cells", "Throws by target", figure.update_layout(height=460, bargap=0), text)
+    # Each pair of axes, with the throws summed over the third.
+    for number, (first, second) in enumerate(combinations(range(len(axes)), 2)):
+        over = counts.sum(axis=tuple({*range(len(axes))} - {first, second}))
+        title = f"{'Throws by' if coverage.others is None else 'Targets:'} {axes[first].name} and {axes[second].name}"
+        figure = draw_coverage_map(axes[first], axes[second], over)
+        yield Panel(f"cells-{number}", title, figure, "" if number else text)
 
 
-def _show_releases(landings: Landings, outcomes: Outcomes) -> ReportSection:
+def _show_releases(landings: Points, elevation_deg: NDArray[np.float64], outcomes: Outcomes) -> ReportSection:
+    """Show speed and direction of flight at release, above the horizontal."""
     title = "How the balls are released"
     if not len(landings):
         return ReportSection("release", "Release", title, f"No ball crossed the {_name_plane(outcomes)}.")
-    elevation_deg = np.median(landings.elevation_deg)
+    middle = np.median(elevation_deg)
     text = (
         f"Of the balls that crossed the {_name_plane(outcomes)}, the median speed is "
-        f"{np.median(landings.speed_mps):.2f} m/s, the median direction {abs(elevation_deg):.1f}° "
-        f"{'below' if elevation_deg < 0 else 'above'} the horizontal."
+        f"{np.median(landings.speed_mps):.2f} m/s, the median direction {abs(middle):.1f}° "
+        f"{'below' if middle < 0 else 'above'} the horizontal."
     )
-    figure = throw_figures.draw_release_map(landings, outcomes)
-    panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings))
+    figure = draw_coloured(
+        landings,
+        outcomes,
+        (landings.speed_mps, elevation_deg, landings.distance_m),
+        hover="%{x:.2f} m/s at %{y:.1f}°, landed at %{marker.color:.3f} m",
+        scale_title="landing distance [m]",
+    )
+    figure.update_xaxes(title="release speed [m/s]").update_yaxes(title="release elevation [°]")
+    panel = Panel("map", "Speed and elevation at release", figure.update_layout(height=420), _say_how_many(landings))
     return ReportSection("release", "Release", title, text, ((panel,),))
 
 
-def _say_how_many(landings: Landings) -> str:
+def _say_how_many(landings: Points) -> str:
     count = len(landings)
     return f"{MOST_POINTS:,} of {count:,} throws, chosen at random." if count > MOST_POINTS else ""
 
 
 def _name_plane(outcomes: Outcomes) -> str:
-    return "landing plane" if outcomes.success == LANDED else "plane of the rim"
+    return "landing plane" if outcomes.success == "landed" else "plane of the rim"
 
 
-def _show_examples(
-    dataset: Dataset,
-    throws: Sequence[Throw],
-    outcomes: Outcomes,
-    *,
-    height_m: float | None,
-    bodies: Sequence[BodyLook],
-) -> ReportSection:
-    title = "A few throws"
-    if not throws:
-        return ReportSection("throws", "Throws", title, "No trial has an episode.")
-    text = f"Dotted while the {dataset.config.tool.name} holds the ball; a ring marks the release."
-    if (succeeded := sum(throw.outcome == outcomes.success for throw in throws)) > 1:
-        text = f"{succeeded} throws that {outcomes.verbs[1]}, from the nearest to the farthest. {text}"
-    side, above = throw_figures.draw_ball_views(throws, outcomes, height_m, bodies)
-    views = (
-        Panel("side", "The ball from the side", side),
-        Panel("above", "The ball from above", above),
-    )
-    middle = _choose_middle(throws, outcomes.success)
-    release = middle.events.release
-    trajectory = commanded_trajectory(dataset.config_of(middle), middle.read_samples()[1])
-    note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
-    note += "; the vertical line is the release." if release is not None else "."
-    commanded = dict(zip(trajectory.joints, sample_positions(trajectory, middle.joints.time_s).T, strict=True))
-    sliding = robot_of(dataset.config).sliding
-    scales = {name: (1000.0, " mm") if name in sliding else (math.degrees(1), "°") for name in commanded}
-    errors = {name: np.abs(middle.joints[name].position - goal).max() for name, goal in commanded.items()}
-    joints = tuple(
-        Panel(
-            key=name,
-            title=name,
-            figure=throw_figures.draw_joint(middle.joints[name], goal, release, scale),
-            text=f"Largest tracking error: {scale[0] * errors[name]:.2g}{scale[1]}.",
-            small=True,
-        )
-        for (name, goal), scale in zip(commanded.items(), scales.values(), strict=True)
-    )
-    return ReportSection("throws", "Throws", title, text, (views, note, joints))
+@dataclass(frozen=True)
+class CellAxis:
+    """One dimension of the cells.
+
+    Attributes:
+        name: Its name.
+        label: Label of its axis: the name, how it is measured, and the unit.
+        edges: Edges of its bins, shape ``(n_bins + 1,)``.
+    """
+
+    name: str
+    label: str
+    edges: NDArray[np.float64]
 
 
-def _show_physics(residuals: Residuals) -> ReportSection:
-    title = "Whether flights obey physics"
-    if not len(residuals.finite_m):
-        return ReportSection(
-            "physics", "Physics", title, "No flight was long enough to compare it with ballistic motion."
-        )
-    compared = "All episodes"
-    if residuals.checked < residuals.episodes:
-        compared = f"{residuals.checked:,} of {residuals.episodes:,} episodes, chosen at random,"
-    exact = int((residuals.distance_m == 0).sum())
-    exactly = f", {exact:,} agree to the last bit (drawn at {throw_figures.FLOOR_M:g} m)" if exact else ""
-    text = (
-        f"{compared} were compared, sample by sample, with ballistic motion in steps of the physics, from shortly "
-        f"after their release on: the largest distance is {residuals.finite_m.max():.1e} m{exactly}. "
-    )
-    # NaN counts as a departure, too.
-    above = int((~(residuals.distance_m <= BALLISTIC_TOLERANCE_M)).sum())
-    if above:
-        text += Markup("<b>{:,} depart by more than the tolerance</b>; ").format(above)
-        text += Markup("<code>throwcollect dataset verify</code> names them.")
+@dataclass(frozen=True)
+class Coverage:
+    """Throws that landed, in cells of targets.
+
+    Attributes:
+        axes: One to three dimensions.
+        counts: Number of throws in each cell; an array with one dimension for each axis.
+        others: Number of throws that landed in none of the cells of the configuration; None if the cells are not from
+            there, but span the values of the throws.
+    """
+
+    axes: tuple[CellAxis, ...]
+    counts: NDArray[np.intp]
+    others: int | None
+
+
+def count_throws(landings: Points, throws: pa.Table, *, target: TargetConfig | None) -> Coverage | None:
+    """Count throws that landed in the cells of the configuration's targets; None if none landed.
+
+    Without targets, the cells span the values of the throws. The table is that of all throws.
+    """
+    if not len(landings):
+        return None
+    angle = np.degrees(read_numbers(throws, "hit_angle_rad"))[landings.row]
+    values = {"distance_m": landings.distance_m, "hit_angle_rad": angle}
+    if target is None:
+        edges = {name: _choose_edges(column) for name, column in values.items()}
     else:
-        text += f"None departs by more than the tolerance of {BALLISTIC_TOLERANCE_M:g} m (dashed)."
-    heading = "Largest distance of each flight from ballistic motion"
-    panel = Panel("residuals", heading, throw_figures.draw_residuals(residuals))
-    return ReportSection("physics", "Physics", title, text, ((panel,),))
+        if target.height_m is not None:
+            # The column has the heights of all trials, but only trials with landings matter here.
+            values["height_m"] = read_numbers(throws, column_of(LANDING_HEIGHT))[landings.row]
+        bins = target.dimensions
+        edges = {
+            name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values if name in bins
+        }
+        if "hit_angle_rad" in edges:
+            # The configuration has radians, but the axis and the values above are in degrees.
+            edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
+    counts, _ = np.histogramdd(np.column_stack([values[name] for name in edges]), list(edges.values()))
+    axes = tuple(CellAxis(*_TITLES[name], ends) for name, ends in edges.items())
+    others = None if target is None else len(landings) - int(counts.sum())
+    return Coverage(axes, counts.astype(np.intp), others)
+
+
+def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Choose edges of cells whose width is a round number, which people can quote."""
+    low, high = float(values.min()), float(values.max())
+    width = _round_up((high - low) / _BINS) or 0.1
+    # There is one edge more, so that the largest value lies inside the last cell.
+    first, last = np.floor(low / width), np.floor(high / width) + 1
+    edges: NDArray[np.float64] = np.arange(first, last + 1) * width
+    return edges
+
+
+def _round_up(width: float) -> float:
+    """Round up to 1, 2 or 5 times a power of ten; to 0 if the width is too small to tell values apart."""
+    if width < 1e-9:
+        return 0.0
+    power = 10.0 ** np.floor(np.log10(width))
+    # The factor accepts a width that is a round number except for a rounding error.
+    return float(next(step * power for step in (1, 2, 5, 10) if step * power >= width * (1 - 1e-9)))
+
+
+def draw_coverage_map(x: CellAxis, y: CellAxis, counts: NDArray[np.intp]) -> go.Figure:
+    """Draw the number of throws over two axes of the cells; empty cells are blank."""
+    most = max(int(counts.max()), 1)
+    marks = {"dtick": 1} if most <= _FEW else {}
+    figure = go.Figure(
+        go.Heatmap(
+            x=x.edges,
+            y=y.edges,
+            z=np.where(counts, counts, np.nan).T,
+            colorscale=SCALE,
+            zmin=0,
+            zmax=most,
+            xgap=1,
+            ygap=1,
+            colorbar={**colour_bar("throws"), **marks},
+            hovertemplate="%{x:.3f}, %{y:.3f}<br>%{z} throws<extra></extra>",
+        )
+    )
+    figure.update_xaxes(title=x.label, showgrid=False)
+    figure.update_yaxes(title=y.label, showgrid=False)
+    return figure.update_layout(height=460)
