@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from throwcollect.cli.dataset.info import describe, show_info
+from throwcollect.cli.dataset.info import describe
+from throwcollect.cli.dataset.info import info as show_info
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.episode.episode_message import header_to_json
