@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from throwcollect.members import import_own
 from throwcollect.wording import suggest
@@ -59,14 +58,10 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
     return name
 
 
-Joint = Annotated[str, AfterValidator(_require_joint), WithJsonSchema({"type": "string", "words": "joint"})]
+Joint = Annotated[str, AfterValidator(_require_joint)]
 """Any URDF may name other joints, so the JSON Schema lists none."""
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
-LONGEST_NAME = 64
-NAME_WORDS = f"up to {LONGEST_NAME} lower-case letters, digits, - and _, first a letter or digit"
-Name = Annotated[
-    str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=LONGEST_NAME, json_schema_extra={"words": NAME_WORDS})
-]
+Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
 
 
 def _make_text(value: object) -> object:
@@ -76,24 +71,3 @@ def _make_text(value: object) -> object:
 
 NUMBER_AS_TEXT = BeforeValidator(_make_text)
 """Lets a text be a single whole number without quotes, which YAML reads as a number: the core 0, or 90 minutes."""
-
-
-def match(pattern: str, expected: str) -> AfterValidator:
-    """Check that a text matches a regular expression.
-
-    Args:
-        pattern: The regular expression, for the whole text.
-        expected: Description of such a text, for the message.
-    """
-
-    def check(text: str) -> str:
-        if not re.fullmatch(pattern, text, re.ASCII):
-            raise ValueError(f"should be {expected}, got '{text}'")
-        return text
-
-    return AfterValidator(check)
-
-
-def in_words(words: str) -> WithJsonSchema:
-    """Describe a kind of text in the reference and in messages by some words, instead of the word "text"."""
-    return WithJsonSchema({"type": "string", "words": words})

@@ -145,7 +145,7 @@ class Config(Section):
     """One collection: from the robot to the dataset."""
 
     name: Annotated[Name, Key(Effect.PLAN)] = "throws"
-    """Name of the collection and of its files."""
+    """Name of the collection and of its files: lower-case letters, digits, - and _."""
     seed: Annotated[int, Field(ge=0, lt=2**32), Key(Effect.PLAN)] = 0
     """Root of all randomness."""
     trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN)] = None

@@ -22,7 +22,7 @@ import pyarrow.compute as pc
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.arguments import check_bounds, refuse_argument
-from throwcollect.config.kinds import NAME_WORDS, Name
+from throwcollect.config.kinds import Name
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import compute
 from throwcollect.derive.derivation import Derived, count_without_episode, derive
@@ -193,7 +193,7 @@ def _read_shares(given: str | Mapping[str, float]) -> dict[str, Fraction]:
         try:
             _NAME.validate_python(name)
         except ValidationError:
-            problem = f"{name!r} should be {NAME_WORDS}"
+            problem = f"{name!r} should be lower-case letters, digits, - and _"
     if problem:
         raise refuse_argument("fractions", f"{problem}, got {given!r}")
     return shares

@@ -90,5 +90,5 @@ def test_a_range_whose_width_overflows_is_refused(wide):
     ],
 )
 def test_digits_beyond_ascii_are_refused_in_times_sizes_and_addresses(section, key, value):
-    with pytest.raises(ValidationError, match=f"should be .*, got '{value}'"):
+    with pytest.raises(ValidationError, match="should match pattern"):
         section(**{key: value})
