@@ -11,11 +11,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 
@@ -46,15 +45,8 @@ EXTRA_OF = MappingProxyType(
 """The extra that brings a package, by the name of the package in imports."""
 
 
-@dataclass(frozen=True)
-class EnginePackage:
-    """The package of an engine.
-
-    Attributes:
-        distribution: Name of the package on the package index.
-        module: Name of the package in imports.
-        compiled: Pattern of the name of the compiled file, which lies beside the module.
-    """
+class EnginePackage(NamedTuple):
+    """The package of an engine: its names on the package index and in imports, and a pattern of its compiled file."""
 
     distribution: str
     module: str

@@ -113,7 +113,6 @@ def test_an_unknown_robot_is_an_error_without_complaints_about_joints(with_plugi
 
 BROKEN = """
 from throwcollect.config.task_config import TaskConfig
-from throwcollect.tools.spoon.spoon_config import SpoonConfig
 
 NUMBER = 3
 
@@ -150,11 +149,6 @@ def find_what_is_said(text: str, family: str, value: str, directory: Path, monke
         ("robots", "broken:NUMBER", ": broken:NUMBER should be of throwcollect.robots.robot.Robot, is 3"),
         ("engines", "broken:NUMBER", ": broken:NUMBER should be of throwcollect.engines.engine.Engine, is 3"),
         ("tasks", "broken:Aimless", " cannot be loaded: TypeError: Aimless lacks until"),
-        (
-            "tools",
-            "broken:SpoonConfig",
-            ": broken:SpoonConfig should have the name of its entry point, 'mine', has 'spoon'",
-        ),
     ],
 )
 def test_a_broken_member_is_an_error_that_names_its_package(
