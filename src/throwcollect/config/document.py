@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import stat
+import os
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -17,8 +17,8 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.problems import Location, find_problems, join_key, quote, read_index, split_key
 from throwcollect.config.section import Section
-from throwcollect.errors import ConfigError, Problem
-from throwcollect.files import suggest_path
+from throwcollect.errors import ConfigError, DatasetError, Problem
+from throwcollect.files import read_text, suggest_path
 from throwcollect.wording import command
 
 AnySection = TypeVar("AnySection", bound=Section)
@@ -193,25 +193,13 @@ def explain_yaml_error(error: Exception) -> tuple[str, int | None]:
 
 
 def _read_text(path: Path) -> str:
-    try:
-        if not stat.S_ISREG(kind := path.stat().st_mode):
-            # To read a pipe or a device may block for ever.
-            got = "a directory" if stat.S_ISDIR(kind) else "a pipe or a device"
-            raise ConfigError([Problem(f"should be a YAML file, got {got}", path=path)])
-        with path.open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
-        if len(data) > _MOST_BYTES:
-            raise ConfigError([Problem(f"larger than {_MOST_BYTES} bytes", path=path)])
-        return data.decode("utf-8")
-    except FileNotFoundError as error:
+    if not os.path.exists(path):
         hint = f"{command('init')} writes one to begin with" if path == DEFAULT_CONFIG else None
-        raise ConfigError([Problem(f"no such file{suggest_path(path)}", path=path)], hint=hint) from error
-    except OSError as error:
-        raise ConfigError([Problem(f"cannot be read: {error.strerror}", path=path)]) from error
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
-        raise ConfigError([Problem(sentence, path=path, line=line)]) from error
+        raise ConfigError([Problem(f"no such file{suggest_path(path)}", path=path)], hint=hint)
+    try:
+        return read_text(path.resolve(), most_bytes=_MOST_BYTES)
+    except DatasetError as error:
+        raise ConfigError([Problem(error.problem, path=path)]) from error
 
 
 def _has_item(holder: Any, index: str | int) -> bool:

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from throwcollect.members import import_own
 from throwcollect.wording import suggest
 
 
@@ -21,29 +20,6 @@ class ContradictionError(ValueError):
     def __init__(self, sentences: Mapping[str, str]) -> None:
         self.sentences = dict(sentences)
         super().__init__("; ".join(f"{key}: {sentence}" for key, sentence in self.sentences.items()))
-
-
-def find_robot(section: Any) -> Any:
-    """Find the robot of a section, or of a name: a `throwcollect.robots.robot.Robot`.
-
-    It is imported when it is asked for, because configurations are read without the libraries of simulations.
-    """
-    return import_own("throwcollect.robots.described:find_robot")(section)
-
-
-def complete_robot(section: Any) -> Any:
-    """Complete the section of a robot that only names it or its URDF (see `throwcollect.robots.described.complete`)."""
-    return import_own("throwcollect.robots.described:complete")(section)
-
-
-def complete_motions(*given: Any) -> Any:
-    """Complete the keys of a task whose motions are in a file (see `throwcollect.tasks.motions.complete`)."""
-    return import_own("throwcollect.tasks.motions:complete")(*given)
-
-
-def complete_body(section: Any) -> Any:
-    """Complete the section of a body whose shapes are in a file (see `throwcollect.robots.body_files.complete`)."""
-    return import_own("throwcollect.robots.body_files:complete")(section)
 
 
 def unknown_joint(name: str, robot: Any) -> str:
