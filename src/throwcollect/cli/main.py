@@ -8,7 +8,6 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
-from dataclasses import replace
 from importlib import import_module
 from typing import Annotated, Any, NoReturn
 
@@ -25,8 +24,6 @@ from throwcollect.wording import printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR, errno.ENOENT)
 """System errors that a path from the user may cause."""
-_OPTIONS = {"rate_hz": "--rate"}
-"""Options by the arguments that they set, where the two have different names."""
 
 _COMMANDS = {
     "Commands": "show:init collect:up collect:resume collect:cover collect:join_run cluster_commands:submit "
@@ -139,19 +136,8 @@ def execute(command: Callable[..., Any]) -> NoReturn:
     sys.exit(code)
 
 
-def _name_options(error: ConfigError) -> ConfigError:
-    """Return the same error with the option in place of each argument, as users of commands know options alone."""
-    problems = [
-        replace(each, key=_OPTIONS.get(each.key, f"--{each.key}"), argument=False) if each.argument else each
-        for each in error.problems
-    ]
-    return type(error)(problems, expected=error.expected, hint=error.hint)
-
-
 def _describe(error: Exception) -> tuple[str, int]:
     """Find the message and the exit code of an error."""
-    if isinstance(error, ConfigError):
-        error = _name_options(error)
     if isinstance(error, ThrowcollectError):
         return str(error), error.exit_code
     if isinstance(error, TyperException):

@@ -56,16 +56,9 @@ def unknown_key(name: str, known: Sequence[str]) -> str:
 
 
 def quote(value: Any) -> str:
-    """Show a value in a message as its author would recognise it."""
-    if isinstance(value, str):
-        return repr(value if len(value) <= _LONGEST_QUOTE else value[:_LONGEST_QUOTE] + "…")
-    if isinstance(value, Mapping):
-        return "keys and values" if value else "no keys"
-    if isinstance(value, list):
-        return "a list" if value else "an empty list"
-    if value is None:
-        return "nothing"
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    """Show a value in a message, with its beginning alone if it is long."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 
 def find_problems(error: ValidationError, section: type[Section], values: Any) -> dict[Location, str]:

@@ -11,7 +11,7 @@ import pytest
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.cli.main import assemble, execute
-from throwcollect.errors import ConfigError, NotFoundError, Problem
+from throwcollect.errors import NotFoundError, Problem
 
 
 def describe(error: Exception, capsys: pytest.CaptureFixture[str], *, code: int = 2) -> str:
@@ -26,19 +26,12 @@ def describe(error: Exception, capsys: pytest.CaptureFixture[str], *, code: int 
     return capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("argument", "option"), [("where", "--where"), ("rate_hz", "--rate")])
-def test_an_error_about_an_argument_names_its_command_line_option(
-    argument: str, option: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    error = refuse_argument(argument, "got 'a'", expected="b", hint="c")
-    assert str(error).startswith(f"{argument}: got 'a'")
-    assert describe(error, capsys) == f"throwcollect: {option}: got 'a'\n  expected: b\n  try: c\n"
-
-
-def test_an_error_about_a_configuration_key_names_the_key_unchanged(capsys: pytest.CaptureFixture[str]) -> None:
-    both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed", argument=True)])
-    assert describe(both, capsys) == "throwcollect: task.end: is not there\n--seed: is not there\n"
-    assert describe(ConfigError("no target"), capsys) == "throwcollect: no target\n"
+def test_an_error_about_a_configuration_key_or_an_argument_names_it(capsys: pytest.CaptureFixture[str]) -> None:
+    both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed")])
+    assert describe(both, capsys) == "throwcollect: task.end: is not there\nseed: is not there\n"
+    assert describe(refuse_argument("where", "got 'a'", expected="b", hint="c"), capsys) == (
+        "throwcollect: where: got 'a'\n  expected: b\n  try: c\n"
+    )
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from throwcollect.errors import ConfigError, PlanError, Problem
         ("ball: {mass_kg: heavy}", ["ball.mass_kg: should be a valid number, got 'heavy'"]),
         ("ball: {mass_kg: .nan}", ["ball.mass_kg: should be a finite number, got nan"]),
         ("ball: {mass_kg: 0}", ["ball.mass_kg: should be greater than 0, got 0"]),
-        ("ball:", ["ball: should be keys and values, got nothing"]),
+        ("ball:", ["ball: should be keys and values, got None"]),
         (
             "task: {trajectory: {family: dpm}}",
             ["task.trajectory.family: should be 'minimum_jerk', 'dmp' or 'file', got 'dpm'; did you mean 'dmp'?"],
