@@ -90,10 +90,10 @@ class Document:
             holder = holder[index] if _has_item(holder, index) else None
         return self.problem(location, problem.message)
 
-    def validate(self, section: type[AnySection], context: Any = None) -> AnySection:
+    def validate(self, section: type[AnySection]) -> AnySection:
         """Make a section of the values; the error has all problems, in the order of their lines."""
         try:
-            made = section.model_validate(self.values, strict=True, context=context)
+            made = section.model_validate(self.values, strict=True)
         except ValidationError as error:
             found = find_problems(error, section, self.values)
             problems = [*self.problems, *(self.problem(location, sentence) for location, sentence in found.items())]

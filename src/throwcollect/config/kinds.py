@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic import BeforeValidator, Field
 
 from throwcollect.wording import suggest
 
@@ -27,15 +27,8 @@ def unknown_joint(name: str, robot: Any) -> str:
     return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"
 
 
-def _require_joint(name: str, info: ValidationInfo) -> str:
-    # The context is the robot, which only the loader passes. Without it, `Config` checks the joints later.
-    if info.context is not None and name not in info.context.joints:
-        raise ValueError(unknown_joint(name, info.context))
-    return name
-
-
-Joint = Annotated[str, AfterValidator(_require_joint)]
-"""Any URDF may name other joints, so the JSON Schema lists none."""
+Joint = str
+"""Name of a joint; `Config` checks that the robot has it, as any URDF may name other joints."""
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
 

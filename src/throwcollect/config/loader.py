@@ -62,7 +62,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     robot = _find_robot(document, path.parent)
     _find_motions(document, path.parent, robot)
     _find_bodies(document, path.parent)
-    config = document.validate(Config, context=robot)
+    config = document.validate(Config)
     if wrong := [document.problem(*each) for each in _find_sweep_problems(config)]:
         raise ConfigError(wrong)
     with _placing(document):
@@ -147,7 +147,7 @@ def _find_motions(document: Document, directory: Path, robot: Any) -> None:
     if not all(isinstance(each, dict) for each in (given, start, end)) or given.get("family") != "file":
         return
     with suppress(ValidationError):
-        section = MotionFile.model_validate(given, strict=True, context=robot)
+        section = MotionFile.model_validate(given, strict=True)
         section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
         keys = {"trajectory": section}
         if section.sha256 is None:

@@ -11,11 +11,10 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -66,10 +65,6 @@ class Split:
 
     parts: Mapping[str, SplitPart]
     without_episode: Mapping[str, int]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the same as a dictionary, for JSON."""
-        return asdict(self)
 
 
 def split(

@@ -31,9 +31,9 @@ def test_swept_parameters_with_values_and_with_min_and_max_are_distinguished():
 
 def test_a_contradiction_names_every_key_that_takes_part():
     with pytest.raises(
-        ValidationError, match=r"end\.head_1_joint: start should name .*; end\.head_2_joint: start should name"
+        ValidationError, match=r"end\.head_1_joint: start should name .*; task\.end\.head_2_joint: start should name"
     ):
-        ThrowConfig(end={"head_1_joint": 0.0, "head_2_joint": 0.0})
+        Config(task=ThrowConfig(end={"head_1_joint": 0.0, "head_2_joint": 0.0}))
 
 
 def test_slots_of_trials_do_not_overlap_and_none_starts_at_zero():

@@ -98,7 +98,7 @@ def stats(directory: DatasetArgument, *, json: JsonOption = False) -> None:
 def _show(output: Path, derived: Derived, *, json: bool) -> None:
     counts = f"{derived.trials} of {format_count(derived.offered, 'trial')}"
     lines = [f"{output}: {counts}", f"  digest  {derived.digest}", *_list_left_out(derived.without_episode)]
-    show({"directory": output, **derived.as_dict()}, *lines, json=json)
+    show({"directory": output, **vars(derived)}, *lines, json=json)
 
 
 def _list_left_out(without_episode: Mapping[str, int]) -> list[str]:
