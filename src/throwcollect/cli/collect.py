@@ -223,7 +223,7 @@ def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool
     with display(quiet=json) as shown, count_interruptions() as interruptions:
         collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=interruptions)
     place = slice_directory(directory, slice)
-    show({"slice": slice, "directory": place}, f"{place}: finished", json=json, indent=None)
+    show({"slice": str(slice), "directory": place}, f"{place}: finished", json=json, indent=None)
 
 
 def join_run(token: str, *, simulations: int | None = None) -> None:
