@@ -30,9 +30,9 @@ _INTRODUCTION = """\
 
 A configuration is a YAML 1.2 file. Every key may be left out, unless it is marked as required; `throwcollect config`
 prints all keys with the values that they then have, and `throwcollect config --schema` the JSON Schema for editors.
-Units are part of the names; angles are in radians. A key that does not exist, a value out of bounds and a key that is
-there twice are errors, and all of them are reported at once. Keys that contradict each other, and what a sweep may not
-vary, are reported once these are right.
+Units are part of the names; angles are in radians. A key that does not exist and a value out of bounds are errors, and
+all of them are reported at once. Keys that contradict each other, and what a sweep may not vary, are reported once
+these are right. A key that is there twice is no valid YAML.
 
 `--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
 ball/odometry, clock]'`. The value is read as YAML; later ones win. An item of a list in
@@ -123,7 +123,7 @@ def _find_title(shape: ValueShape) -> str | None:
 
 def _find_own_sentence(shape: ValueShape) -> str:
     """Find the docstring of a section itself, not of the key that holds it."""
-    return str(json_schema()["$defs"][_find_title(shape)]["description"])
+    return str(json_schema(Config)["$defs"][_find_title(shape)]["description"])
 
 
 def _write_table(shape: ValueShape, prefix: str) -> str:

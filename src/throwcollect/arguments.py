@@ -1,7 +1,4 @@
-"""Checks arguments of functions that other programs call; an error names the argument that is wrong.
-
-If a command takes the argument by an option, its message names the option instead.
-"""
+"""Checks arguments of functions that other programs call; an error names the argument that is wrong."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ def refuse_argument(
     argument: str, problem: str, *, expected: str | None = None, hint: str | None = None
 ) -> ConfigError:
     """Make the error that says what is wrong with the argument of a name."""
-    return ConfigError([Problem(problem, argument, argument=True)], expected=expected, hint=hint)
+    return ConfigError([Problem(problem, argument)], expected=expected, hint=hint)
 
 
 def check_bounds(argument: str, given: int, *, least: int, most: int | None = None) -> None:

@@ -1,22 +1,6 @@
 """All errors that throwcollect raises on purpose.
 
-::
-
-    ThrowcollectError                exit 1
-    ├── ConfigError                  exit 2   the request is wrong; nothing has been started
-    │   ├── PlanError                exit 2   the sweep yields no trial that could be run
-    │   ├── NotFoundError            exit 2   the request names something that does not exist
-    │   └── ConflictError            exit 2   the request does not fit the state of the thing that it names
-    ├── MissingExtraError            exit 2   a package that an extra brings is not installed (`throwcollect.extras`)
-    ├── WorkerError                  exit 3   a process of the run could not be started or was lost for good
-    ├── LossError                    exit 5   a dataset is there, but trials of it are lost or doubtful
-    ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
-    │   └── ForeignPlanError         exit 4   a plan was made for another configuration
-    ├── OutputError                  exit 6   everything is done, but the result could not be printed
-    ├── UnreachableError             exit 7   the router of a run does not answer; it may be about to be started again
-    ├── MemberError                  exit 1   a part of another package fails where it is used (`throwcollect.members`)
-    ├── RequestError                 exit 1   a running simulation cannot do what a client asks
-    └── Interrupted                  exit 130 stopped by the user; finished episodes are on disk
+The exit code of a command is that of the class; `throwcollect.extras` has one further error, for a missing package.
 
 A message says, in this order: where the problem is, what is wrong and which value was given; what would be right; the
 evidence; and what to try.
@@ -79,13 +63,11 @@ class Problem:
     message: str
     """Says what is wrong, which value was given and what would be right."""
     key: str = ""
-    """Dotted path of the key."""
+    """Dotted path of the key, or the name of an argument."""
     path: Path | None = None
     """File that holds the key; None when it came from the command line."""
     line: int | None = None
     """Line in that file, counted from 1."""
-    argument: bool = False
-    """Whether the key is an argument of a function, for which commands have an option."""
 
     def __str__(self) -> str:
         where = str(self.path) if self.path else ""

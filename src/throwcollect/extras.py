@@ -11,11 +11,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 
@@ -46,15 +45,8 @@ EXTRA_OF = MappingProxyType(
 """The extra that brings a package, by the name of the package in imports."""
 
 
-@dataclass(frozen=True)
-class EnginePackage:
-    """The package of an engine.
-
-    Attributes:
-        distribution: Name of the package on the package index.
-        module: Name of the package in imports.
-        compiled: Pattern of the name of the compiled file, which lies beside the module.
-    """
+class EnginePackage(NamedTuple):
+    """The package of an engine: its names on the package index and in imports, and a pattern of its compiled file."""
 
     distribution: str
     module: str
@@ -69,11 +61,17 @@ ENGINE_PACKAGES = MappingProxyType(
 )
 """The package of each engine of our own that needs one, by name of the engine."""
 
-_LAST_WITH_BULLET = (3, 11)
-"""The latest Python with a wheel of pybullet. Compiling Bullet would not help, because it would compute other bytes."""
-
-_FIRST_WITH_MUJOCO = (3, 11)
-"""The first Python with a wheel of MuJoCo."""
+_WHEELS = {
+    # Compiling Bullet would not help, because it would compute other bytes. Pictures need Bullet, too.
+    "pybullet": (
+        ((3, 10), (3, 11)),
+        "Python 3.11, such as that of `uv venv --python 3.11`; or `up --runtime docker`; or, instead of the default "
+        "engine bullet, `--set sim.engine=mujoco` (for `dataset replay`: --engine mujoco), whose throws land some "
+        "millimetres elsewhere",
+    ),
+    "mujoco": (((3, 11), (3, 99)), "Python 3.11 or later, or `sim.engine: bullet`"),
+}
+"""The first and the last Python with a wheel of a package, and the hint for all others."""
 
 
 class MissingExtraError(ThrowcollectError, ImportError):
@@ -87,25 +85,14 @@ class MissingExtraError(ThrowcollectError, ImportError):
         problem, hint = f"this needs {package}, which is not installed", install_command(self.extra)
         if not has_wheel(package):
             problem += f" and has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]}"
-            hint = _INSTEAD[package]
+            hint = _WHEELS[package][1]
         super().__init__(problem, hint=hint)
-
-
-_INSTEAD = {
-    "pybullet": "Python 3.11, such as that of `uv venv --python 3.11`; or `up --runtime docker`; or, instead of the "
-    "default engine bullet, `--set sim.engine=mujoco` (for `dataset replay`: --engine mujoco), whose throws land some "
-    "millimetres elsewhere",
-    "mujoco": "Python 3.11 or later, or `sim.engine: bullet`",
-}
-"""The hint if the package of an engine has no wheel for this Python. Pictures need Bullet, too."""
 
 
 def has_wheel(package: str) -> bool:
     """Say whether a package can be installed on this Python without a compiler."""
-    python = sys.version_info[:2]
-    if package == "pybullet":
-        return python <= _LAST_WITH_BULLET
-    return package != "mujoco" or python >= _FIRST_WITH_MUJOCO
+    (first, last), _ = _WHEELS.get(package, (((3, 0), (3, 99)), ""))
+    return first <= sys.version_info[:2] <= last
 
 
 def install_command(extra: str) -> str:

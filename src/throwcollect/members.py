@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import os
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -78,10 +78,7 @@ _KINDS = MappingProxyType(
         "policies": "collections.abc:Callable",
     }
 )
-"""The class of each family: its members are values of this class (see `_VALUES`), or else classes derived from it."""
-
-_VALUES = frozenset({"robots", "exporters", "policies"})
-"""The families whose members are values; members of all other families are classes."""
+"""The class of each family: its members are values of this class, or classes derived from it."""
 
 _DEBUG = "THROWCOLLECT_DEBUG"
 _WAY_OUT = f"mend or uninstall the package that it belongs to; {_DEBUG}=1 shows where it fails"
@@ -109,13 +106,9 @@ def load_member(family: str, name: str) -> Any:
     what, namesakes = _describe(family, name), _find_namesakes(family, name)
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
-    found, kind, where = _import(entry.value, what), _load(_KINDS[family]), f"{what}: {entry.value}"
-    if not (isinstance(found, kind) if family in _VALUES else isinstance(found, type) and issubclass(found, kind)):
-        raise ConfigError(f"{where} should be of {kind.__module__}.{kind.__name__}, is {found!r}")
-    # A section of a configuration has its name as the default of a key; engines, runtimes and exporters have none.
-    key = getattr(found, "model_fields", {}).get("name")
-    if (given := getattr(found, "name", name) if key is None else key.default) != name:
-        raise ConfigError(f"{where} should have the name of its entry point, {name!r}, has {given!r}")
+    found, kind = _import(entry.value, what), _load(_KINDS[family])
+    if not (isinstance(found, kind) or (isinstance(found, type) and issubclass(found, kind))):
+        raise ConfigError(f"{what}: {entry.value} should be of {kind.__module__}.{kind.__name__}, is {found!r}")
     return found
 
 
@@ -236,17 +229,16 @@ def _name_owner(entry: EntryPoint) -> str:
 
 @cache
 def _find_members() -> Mapping[str, Mapping[str, EntryPoint]]:
-    """Find all members, by family and name.
+    """Find all members, by family and name; our own first, then those of other packages, by name.
 
     All families are looked up together, because Python reads the files of all installed packages each time that it
     looks for entry points, which takes 10 ms.
     """
-    select = entry_points().select
-    return MappingProxyType({family: _join_members(family, select(group=f"throwcollect.{family}")) for family in _OWN})
-
-
-def _join_members(family: str, added: Iterable[EntryPoint]) -> Mapping[str, EntryPoint]:
-    own = {name: EntryPoint(name, path, f"throwcollect.{family}") for name, path in _OWN[family].items()}
-    others = {entry.name: entry for entry in sorted(added, key=lambda entry: entry.name)}
-    # No package may replace a member of our own, or a configuration would mean something else where the package is.
-    return MappingProxyType(own | {name: entry for name, entry in others.items() if name not in own})
+    installed, found = entry_points(), {}
+    for family, own in _OWN.items():
+        group = f"throwcollect.{family}"
+        others = {each.name: each for each in sorted(installed.select(group=group), key=lambda each: each.name)}
+        ours = {name: EntryPoint(name, path, group) for name, path in own.items()}
+        # No package may replace a member of our own, or a configuration would mean something else where the package is.
+        found[family] = ours | {name: each for name, each in others.items() if name not in ours}
+    return MappingProxyType(found)

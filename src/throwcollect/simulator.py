@@ -269,12 +269,10 @@ def with_policy(
 def _locate(problem: Problem, index: int, point: Point) -> Problem:
     """Name the point of a list that has a problem: its index and, if the problem names no key, all its values."""
     place = f"points[{index}]"
-    if problem.argument:
-        return replace(problem, key=place)
     if problem.key:
-        return replace(problem, key=f"{place}.{problem.key}", argument=True)
+        return replace(problem, key=f"{place}.{problem.key}")
     values = ", ".join(f"{key}={value}" for key, value in (point or {}).items())
-    return Problem(f"{problem.message} ({values or 'with no value of its own'})", place, argument=True)
+    return Problem(f"{problem.message} ({values or 'with no value of its own'})", place)
 
 
 def _begin(config: Config, source: str) -> Callable[[tuple[int, Point, Point]], Throw]:

@@ -64,8 +64,8 @@ def small(tmp_path: Path) -> Path:
         (["up"], "throwcollect.yaml: no such file"),
         (["up", "none.yaml"], "none.yaml: no such file"),
         (["up", "small.yml"], "small.yml: no such file; did you mean 'small.yaml'?"),
-        (["up", "."], ".: should be a YAML file, got a directory"),
-        (["plan", "binary.yaml"], "binary.yaml:1: should be UTF-8 text, got the byte 0xff"),
+        (["up", "."], ".: cannot be read: not a file"),
+        (["plan", "binary.yaml"], "binary.yaml: cannot be read: no UTF-8 text: byte 0"),
         (["config", "broken.yaml"], "broken.yaml:2: not valid YAML: expected ',' or ']', but got '<stream end>'"),
         (["plan", "empty.yaml"], "empty.yaml: the file is empty"),
         (["plan", "list.yaml"], "list.yaml: the file should hold keys and values"),
@@ -78,7 +78,7 @@ def small(tmp_path: Path) -> Path:
         ),
         (["plan", "huge.yaml"], "huge.yaml:1: sweep.parameters.ball.mass_kg.count: should be less than or equal to 1"),
         (["up", "small.yaml", "--output", "o" * 300], "ooo"),
-        (["up", "pipe"], "pipe: should be a YAML file, got a pipe or a device"),
+        (["up", "pipe"], "pipe: cannot be read: not a file"),
     ],
 )
 def test_a_wrong_command_line_gives_one_message_and_no_files(

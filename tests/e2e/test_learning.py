@@ -154,7 +154,7 @@ def test_a_score_measures_hits_in_the_own_and_in_another_world(place: Path) -> N
         (["fit", "data", "-o", "new", "--where", "trial < 0"], "fulfils 'trial < 0'"),
         (["fit", "data", "-o", "new", "--where", "trial < 5"], "at least 18 for 5 parameters"),
         (["adapt", "model", "model/config.yaml", "-o", "new"], "THROWS: should end in .csv"),
-        (["score", "model", "--targets", "0"], "--targets: got 0"),
+        (["score", "model", "--targets", "0"], "targets: got 0"),
         (["score", "model", "--set", "ball.mass_kg=1"], "--config CONFIG"),
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),
     ],

@@ -40,16 +40,6 @@ for _ in range(2):
     print([read for read, _ in found], os.getpid() in {process for _, process in found})
     threading.Thread(target=time.sleep, args=[600], daemon=True).start()
 """
-DEAD = """
-from work_side_by_side import begin_death
-from throwcollect.errors import WorkerError
-from throwcollect.side_by_side import work_side_by_side
-
-try:
-    list(work_side_by_side(range(40), begin_death, (), processes=2, doing="counts", fork=True))
-except WorkerError as error:
-    print(error.message)
-"""
 
 
 def test_results_come_in_order_from_several_processes() -> None:
@@ -100,9 +90,10 @@ def test_an_exception_in_a_process_reaches_the_caller() -> None:
         list(work_side_by_side(range(4), begin_badly, (), processes=2, doing="counts"))
 
 
-def test_a_process_that_is_killed_is_named() -> None:
+@pytest.mark.parametrize("fork", [False, True])
+def test_a_process_that_is_killed_is_named(fork: bool) -> None:
     with pytest.raises(WorkerError, match="a process that counts was killed"):
-        list(work_side_by_side(range(40), begin_death, (), processes=2, doing="counts"))
+        list(work_side_by_side(range(40), begin_death, (), processes=2, doing="counts", fork=fork))
 
 
 def test_processes_start_before_results_are_read_and_end_with_the_block() -> None:
@@ -154,13 +145,6 @@ def test_processes_do_not_import_the_program(tmp_path: Path) -> None:
         [sys.executable, program], capture_output=True, text=True, env=find_tests(), timeout=60, check=False
     )
     assert (done.stdout, done.stderr) == ("0 3 6 9\n", "")
-
-
-def test_a_process_that_was_forked_off_and_is_killed_is_named() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", DEAD], capture_output=True, text=True, env=find_tests(), timeout=60, check=False
-    )
-    assert (done.stdout, done.stderr) == ("a process that counts was killed\n", "")
 
 
 def find_tests() -> dict[str, str]:

@@ -4,44 +4,43 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import print_json, tell
+from throwcollect.cli.printing import show, tell
 from throwcollect.cli.terminal import display
 from throwcollect.wording import command
 
 
 def submit(
     config: ConfigArgument,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            help="Directory of the dataset, which all nodes see: new, or with nothing but a plan.",
-        ),
-    ],
-    tasks: Annotated[int, typer.Option("--tasks", metavar="N", min=1, help="Number of tasks; each collects a slice.")],
+    *,
+    output: Path,
+    tasks: int,
     settings: SetOption = None,
     trials: TrialsOption = None,
-    mode: Annotated[
-        Literal["array", "live"],
-        typer.Option("--mode", help="array: a task for each slice; live: one run on N nodes, for plans that grow."),
-    ] = "array",
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the batch script, and do nothing else.")] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Follow it until the dataset is finished.")] = False,
+    mode: Literal["array", "live"] = "array",
+    dry_run: bool = False,
+    wait: bool = False,
     json: JsonOption = False,
 ) -> None:
-    """Collect a dataset on a cluster: submit an array of tasks to Slurm, and a job that joins what they collect."""
+    """Collect a dataset on a cluster: submit an array of tasks to Slurm, and a job that joins what they collect.
+
+    Options:
+        output (--output -o DIR): Directory of the dataset, which all nodes see: new, or with nothing but a plan.
+        tasks (N 1..): Number of tasks; each collects a slice.
+        mode: array: a task for each slice; live: one run on N nodes, for plans that grow.
+        dry_run: Print the batch script, and do nothing else.
+        wait: Follow it until the dataset is finished.
+    """
     from throwcollect.cluster.submit import submit as submit_dataset
 
     changes = overrides(settings, trials=trials)
-    shown = display(quiet=json, bar=False)
-    done = submit_dataset(config, output, tasks, overrides=changes, live=mode == "live", dry=dry_run, onlooker=shown)
+    onlooker = display(quiet=json, bar=False)
+    live = mode == "live"
+    done = submit_dataset(config, output, tasks, overrides=changes, live=live, dry=dry_run, onlooker=onlooker)
     if done.job is None:
         typer.echo(done.script, nl=False)
         if mode == "array":
@@ -53,7 +52,7 @@ def submit(
         from throwcollect.cli.cluster_runs import follow_to_the_end
 
         follow_to_the_end(done.directory, as_json=json)
-    elif json:
-        print_json({"directory": str(done.directory), "array": done.job.array, "join": done.job.join})
     else:
-        tell(f"follow it: {command('wait', '--run', done.directory)}   (or ps, logs, stop)")
+        show({"directory": done.directory, "array": done.job.array, "join": done.job.join}, json=json)
+        if not json:
+            tell(f"follow it: {command('wait', '--run', done.directory)}   (or ps, logs, stop)")

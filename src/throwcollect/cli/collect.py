@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as jsonlib
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -12,8 +11,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import print_json, tell
+from throwcollect.cli.options import (
+    ConfigArgument,
+    DatasetArgument,
+    DetachOption,
+    JsonOption,
+    RuntimeOption,
+    SetOption,
+    SimulationsOption,
+    TrialsOption,
+    overrides,
+)
+from throwcollect.cli.printing import show, tell
 from throwcollect.cli.streams import ensure_written
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
@@ -26,65 +35,36 @@ from throwcollect.wording import command, format_count
 if TYPE_CHECKING:
     from throwcollect.runs.prepared_run import PreparedRun
 
-SimulationsOption = Annotated[
-    str | None, typer.Option("-n", metavar="N", help="Number of simulations: run.simulations.")
-]
-RuntimeOption = Annotated[
-    str | None,
-    typer.Option("--runtime", metavar="auto|local|docker|inprocess", help="Where the nodes run: run.runtime."),
-]
-TokenOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--token-file",
-        metavar="FILE",
-        help="With --listen: write the token to FILE, which only you can read, and do not print it.",
-        readable=False,
-    ),
-]
-DetachOption = Annotated[
-    bool, typer.Option("-d", "--detach", help="Print the id of the run as soon as its nodes are started.")
-]
 LockOption = Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]
 
 
 def up(
-    config: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="CONFIG", help="YAML file of the collection; throwcollect.yaml by default.", readable=False
-        ),
-    ] = None,
+    config: Path | None = None,
+    *,
     simulations: SimulationsOption = None,
     settings: SetOption = None,
     runtime: RuntimeOption = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Directory of the dataset; must be new or empty."),
-    ] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option("--resume", metavar="DIR", help="Go on with the dataset in DIR; CONFIG is its own by default."),
-    ] = None,
-    slice: Annotated[
-        str | None,
-        typer.Option(
-            "--slice", metavar="I/N", help="Collect slice I of N, from 0, of the plan that lies in --output DIR."
-        ),
-    ] = None,
-    listen: Annotated[
-        str | None,
-        typer.Option("--listen", metavar="ENDPOINT", help="Let other machines join, at tcp/ADDRESS:PORT: run.listen."),
-    ] = None,
-    token_file: TokenOption = None,
+    output: Path | None = None,
+    resume: Path | None = None,
+    slice: str | None = None,
+    listen: str | None = None,
+    token_file: Path | None = None,
     trials: TrialsOption = None,
     detach: DetachOption = False,
-    view: Annotated[
-        bool, typer.Option("--view", help="Print the address of a page on which the run is seen; starts a server.")
-    ] = False,
+    view: bool = False,
     json: JsonOption = False,
 ) -> None:
-    """Collect a dataset: start the simulations, run all trials, write the files."""
+    """Collect a dataset: start the simulations, run all trials, write the files.
+
+    Options:
+        config (CONFIG): YAML file of the collection; throwcollect.yaml by default.
+        output (--output -o DIR): Directory of the dataset; must be new or empty.
+        resume (DIR): Go on with the dataset in DIR; CONFIG is its own by default.
+        slice (I/N): Collect slice I of N, from 0, of the plan that lies in --output DIR.
+        listen (ENDPOINT): Let other machines join, at tcp/ADDRESS:PORT: run.listen.
+        token_file (FILE): With --listen: write the token to FILE, which only you can read, and do not print it.
+        view: Print the address of a page on which the run is seen; starts a server.
+    """
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime, run__listen=listen)
     if slice is not None:
         unfit = {"CONFIG": config, "--resume": resume, "--token-file": token_file, "--detach": detach, "--view": view}
@@ -123,18 +103,20 @@ def _refuse_submitted(directory: Path) -> None:
 
 def resume(
     directory: DatasetArgument,
+    *,
     simulations: SimulationsOption = None,
     settings: SetOption = None,
     runtime: RuntimeOption = None,
     trials: TrialsOption = None,
-    simulate: Annotated[
-        bool,
-        typer.Option("--simulate/--no-simulate", help="Run missing trials, or finish without them: they are lost."),
-    ] = True,
+    simulate: bool = True,
     detach: DetachOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Go on with a dataset, whatever has ended its collection or damaged its files, or add more trials to it."""
+    """Go on with a dataset, whatever has ended its collection or damaged its files, or add more trials to it.
+
+    Options:
+        simulate (--simulate/--no-simulate): Run missing trials, or finish without them: they are lost.
+    """
     from throwcollect.cluster.submission import is_submitted
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
@@ -172,27 +154,29 @@ def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
 
     submitted = submit_missing(directory, overrides=changes, onlooker=display(quiet=json, bar=False))
     job = submitted.job if submitted is not None else None
-    if json:
-        numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
-        print_json({"directory": str(directory.absolute()), **numbers})
-    elif job is None:
+    numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
+    show({"directory": directory.absolute(), **numbers}, json=json)
+    if job is None and not json:
         tell(f"{directory}: nothing is left to submit")
 
 
 def cover(
     config: ConfigArgument = DEFAULT_CONFIG,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Directory of the datasets, one for each round."),
-    ] = None,
-    rounds: Annotated[int, typer.Option("--rounds", metavar="K", min=2, max=99, help="Number of rounds.")] = 12,
+    *,
+    output: Path | None = None,
+    rounds: int = 12,
     simulations: SimulationsOption = None,
     settings: SetOption = None,
     runtime: RuntimeOption = None,
     trials: TrialsOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Spread throws evenly over the cells of sweep.target: collect, learn, aim, and collect again."""
+    """Spread throws evenly over the cells of sweep.target: collect, learn, aim, and collect again.
+
+    Options:
+        output (--output -o DIR): Directory of the datasets, one for each round.
+        rounds (K 2..99): Number of rounds.
+    """
     from throwcollect.config.loader import load
     from throwcollect.runs.covering import cover as cover_cells
 
@@ -208,11 +192,9 @@ def cover(
             onlooker=shown,
             interruptions=interruptions,
         )
-    if json:
-        print_json([str(each) for each in found])
-        return
-    typer.echo(f"{directory}: {format_count(len(found), 'dataset')}")
-    tell(f"make one of them: {command('dataset', 'merge', *found, directory / 'all')}")
+    show(found, f"{directory}: {format_count(len(found), 'dataset')}", json=json)
+    if not json:
+        tell(f"make one of them: {command('dataset', 'merge', *found, directory / 'all')}")
 
 
 def launch(run: str, lock: LockOption) -> None:
@@ -241,23 +223,16 @@ def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool
     with display(quiet=json) as shown, count_interruptions() as interruptions:
         collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=interruptions)
     place = slice_directory(directory, slice)
-    typer.echo(jsonlib.dumps({"slice": str(slice), "directory": str(place)}) if json else f"{place}: finished")
+    show({"slice": str(slice), "directory": place}, f"{place}: finished", json=json, indent=None)
 
 
-def join_run(
-    token: Annotated[
-        str,
-        typer.Argument(
-            metavar="TOKEN",
-            help="The word that `up --listen` prints; - reads it from standard input, where no other user sees it.",
-        ),
-    ],
-    simulations: Annotated[
-        int | None,
-        typer.Option("-n", metavar="N", min=1, max=256, help="Number of simulations; one a core by default."),
-    ] = None,
-) -> None:
-    """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away."""
+def join_run(token: str, *, simulations: int | None = None) -> None:
+    """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away.
+
+    Options:
+        token (TOKEN): The word that `up --listen` prints; - reads it from standard input, where no other user sees it.
+        simulations (-n N 1..256): Number of simulations; one a core by default.
+    """
     from throwcollect.runs.joining import join_run as join
 
     # Interruptions are counted only afterwards, because a signal that is only counted would not end the wait for input.
@@ -331,10 +306,8 @@ def _start(run: PreparedRun, *, json: bool) -> None:
     """Hand the run over to a process of its own, and print how to follow it."""
     with count_interruptions() as interruptions:
         record = run.start(interruptions=interruptions).record
-    if json:
-        where = {"volume": record.volume} if record.volume else {"directory": record.directory}
-        print_json({"run": record.run, **where})
-    else:
-        typer.echo(record.run)
+    where = {"volume": record.volume} if record.volume else {"directory": record.directory}
+    show({"run": record.run, **where}, record.run, json=json)
+    if not json:
         tell(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)")
     ensure_written(hint=f"run {record.run} goes on; throwcollect ps lists it")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as jsonlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
-from throwcollect.cli.printing import align, print_json, tell
+from throwcollect.cli.printing import align, show, tell
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError, PlanError
 from throwcollect.extras import require
@@ -20,7 +19,6 @@ from throwcollect.wording import command, format_count, join_names
 if TYPE_CHECKING:
     from throwcollect.learning.aiming import Aim
     from throwcollect.learning.model import Model
-    from throwcollect.learning.score import Score
 
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
 ModelOption = Annotated[
@@ -34,29 +32,26 @@ ScatterOption = Annotated[
 
 def fit(
     dataset: DatasetArgument,
+    *,
     output: ModelOption,
-    targets: Annotated[
-        str | None,
-        typer.Option("--targets", metavar="COLUMN,...", help="Where a trial ended; by default, as the task says."),
-    ] = None,
-    parameters: Annotated[
-        str | None,
-        typer.Option("--parameters", metavar="KEY,...", help="What aiming chooses; by default, all of task."),
-    ] = None,
-    given: Annotated[
-        str | None,
-        typer.Option("--given", metavar="KEY,...", help="What is given with a target; by default, as the task says."),
-    ] = None,
-    kind: Annotated[str, typer.Option("--kind", help="local, by the nearest throws, too; or polynomial.")] = "local",
-    where: Annotated[
-        str | None, typer.Option("--where", metavar="CONDITION", help="Learn only from throws that fulfil it.")
-    ] = None,
-    onnx: Annotated[
-        bool, typer.Option("--onnx", help="Write model.onnx, too: target to parameters, for a robot's controller.")
-    ] = False,
+    targets: str | None = None,
+    parameters: str | None = None,
+    given: str | None = None,
+    kind: str = "local",
+    where: str | None = None,
+    onnx: bool = False,
     json: JsonOption = False,
 ) -> None:
-    """Learn from a dataset where throws end, and which parameters lead to a target."""
+    """Learn from a dataset where throws end, and which parameters lead to a target.
+
+    Options:
+        targets (COLUMN,...): Where a trial ended; by default, as the task says.
+        parameters (KEY,...): What aiming chooses; by default, all of task.
+        given (KEY,...): What is given with a target; by default, as the task says.
+        kind: local, by the nearest throws, too; or polynomial.
+        where (CONDITION): Learn only from throws that fulfil it.
+        onnx: Write model.onnx, too: target to parameters, for a robot's controller.
+    """
     from throwcollect.learning.fitting import fit
     from throwcollect.learning.score import format_length
 
@@ -74,40 +69,37 @@ def fit(
         model = model.distil()
     model.save(output)
     trained = model.trained_on
-    if json:
-        typer.echo(model.model_dump_json(include={"kind", "targets", "axes", "trained_on"}, indent=2))
-        return
-    typer.echo(
-        f"learned from {format_count(trained.throws, 'throw')}, {trained.ignored} ignored as they show no target"
-    )
-    typer.echo(f"parameters: {', '.join(model.parameters)}")
+    lines = [
+        f"learned from {format_count(trained.throws, 'throw')}, {trained.ignored} ignored as they show no target",
+        f"parameters: {', '.join(model.parameters)}",
+    ]
     for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
         if names:
-            typer.echo(f"{what}: {', '.join(names)}")
+            lines.append(f"{what}: {', '.join(names)}")
     folds = trained.folds_error.items()
     errors = ", ".join(f"degree {degree}: {format_length(error, model.targets)}" for degree, error in folds)
-    typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
-    typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _write_example(model))}")
+    lines.append(f"error for throws that it was not fitted to, in simulation, median: {errors}")
+    lines.append(f"model: {output}\naim with it: {command('aim', output, '--at', _write_example(model))}")
+    show(model.model_dump(mode="json", include={"kind", "targets", "axes", "trained_on"}), *lines, json=json)
 
 
 def aim(
     directory: ModelArgument,
-    at: Annotated[
-        list[str] | None,
-        typer.Option("--at", metavar="X,Y", help="A target, and what is given with it; may be repeated."),
-    ] = None,
-    targets: Annotated[
-        Path | None, typer.Option("--targets", metavar="FILE", help="CSV file of targets, with a header line.")
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="CSV file to write, for the sampler `list`.")
-    ] = None,
-    choose: Annotated[
-        str, typer.Option("--choose", help="Which of several throws: nearest, least-effort or least-sensitive.")
-    ] = "nearest",
+    *,
+    at: list[str] | None = None,
+    targets: Path | None = None,
+    output: Path | None = None,
+    choose: str = "nearest",
     json: JsonOption = False,
 ) -> None:
-    """Find parameters of throws at targets."""
+    """Find parameters of throws at targets.
+
+    Options:
+        at (X,Y): A target, and what is given with it; may be repeated.
+        targets (FILE): CSV file of targets, with a header line.
+        output (--output -o FILE): CSV file to write, for the sampler `list`.
+        choose: Which of several throws: nearest, least-effort or least-sensitive.
+    """
     from throwcollect.config.loader import load as load_config
     from throwcollect.learning.lists import read_targets, write_aims
     from throwcollect.learning.model import CONFIG, load_model
@@ -115,8 +107,9 @@ def aim(
     model = load_model(directory)
     names = (*model.targets, *model.given)
     given = [_read_target(text, names) for text in at or ()]
+    task = load_config(directory / CONFIG).task
     if targets is not None:
-        given += read_targets(targets, names, load_config(directory / CONFIG).task)
+        given += read_targets(targets, names, task)
     if not given:
         raise ConfigError(
             "no target",
@@ -124,16 +117,11 @@ def aim(
             hint=command("aim", directory, "--at", _write_example(model)),
         )
     aims = model.aim(given, choose=choose)
+    lines = [" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()) for aim in aims]
     if output is not None:
-        task = load_config(directory / CONFIG).task
         write_aims(output, aims, names, task)
-    if json:
-        print_json([aim.as_dict() for aim in aims])
-    elif output is not None:
-        typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
-    else:
-        for aim in aims:
-            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
+        lines = [f"{output}: {format_count(len(aims), task.noun)}"]
+    show([aim.as_dict() for aim in aims], *lines, json=json)
     _print_out_of_reach(model, aims)
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
@@ -141,13 +129,16 @@ def aim(
 
 def throw(
     path: ConfigArgument = DEFAULT_CONFIG,
+    *,
     settings: SetOption = None,
-    points: Annotated[
-        Path | None, typer.Option("--list", metavar="FILE", help="CSV or Parquet file: a throw for each row.")
-    ] = None,
+    points: Path | None = None,
     json: JsonOption = False,
 ) -> None:
-    """Simulate throws in this process, without nodes and files."""
+    """Simulate throws in this process, without nodes and files.
+
+    Options:
+        points (--list FILE): CSV or Parquet file: a throw for each row.
+    """
     from throwcollect.simulator import Simulator
     from throwcollect.sweep.point_file import read_points
 
@@ -168,38 +159,36 @@ def throw(
                 refused += 1
                 tell(f"throw {number}: refused: {error.problems[0]}")
                 continue
-            if json:
-                typer.echo(jsonlib.dumps(found.row, default=str))
-                continue
-            ends = ", ".join(
-                f"{name} {found.row[name]:.6f}" for name in measures if isinstance(found.row.get(name), float)
-            )
-            typer.echo(f"throw {number}: {found.outcome}" + (f": {ends}" if ends else f": {found.reason}"))
+            row = found.row
+            ends = ", ".join(f"{name} {row[name]:.6f}" for name in measures if isinstance(row.get(name), float))
+            show(row, f"throw {number}: {found.outcome}: {ends or found.reason}", json=json, indent=None)
     if refused:
         raise typer.Exit(1)
 
 
 def score(
     directory: ModelArgument,
-    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets for each seed.")] = 40,
-    seed: Annotated[int, typer.Option("--seed", help="First seed; targets are chosen by it.")] = 0,
-    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds; their medians count.")] = 3,
-    world: Annotated[
-        Path | None,
-        typer.Option(
-            "--config", metavar="CONFIG", help="Another world, in which the model is adapted by a few throws."
-        ),
-    ] = None,
+    *,
+    targets: int = 40,
+    seed: int = 0,
+    seeds: int = 3,
+    world: Path | None = None,
     settings: SetOption = None,
     scatter: ScatterOption = 0.0,
-    policy: Annotated[
-        str | None,
-        typer.Option("--policy", metavar="MODULE:FUNCTION", help="Score this policy instead; MODEL may be a dataset."),
-    ] = None,
-    hit: Annotated[float, typer.Option("--hit", help="With --policy: largest miss of a hit, in its unit.")] = 0.1,
+    policy: str | None = None,
+    hit: float = 0.1,
     json: JsonOption = False,
 ) -> None:
-    """Throw at targets in simulation, and note in the model how well it hits."""
+    """Throw at targets in simulation, and note in the model how well it hits.
+
+    Options:
+        targets (N): Number of targets for each seed.
+        seed: First seed; targets are chosen by it.
+        seeds (N): Number of seeds; their medians count.
+        world (--config CONFIG): Another world, in which the model is adapted by a few throws.
+        policy (MODULE:FUNCTION): Score this policy instead; MODEL may be a dataset.
+        hit: With --policy: largest miss of a hit, in its unit.
+    """
     from contextlib import ExitStack
 
     from throwcollect.learning.model import CONFIG, load_model
@@ -220,22 +209,26 @@ def score(
             simulator, targets=targets, seed=seed, seeds=seeds, world=other, scatter=scatter, processes=count_cores()
         )
     model.write_score(directory, found)
-    typer.echo(found.model_dump_json(indent=2) if json else "\n".join(_describe_score(found)))
+    show(
+        found, *_describe_score(f"throws at {_count_targets(found.targets, found.seeds)}", found.list_rows()), json=json
+    )
 
 
 def adapt(
     directory: ModelArgument,
-    throws: Annotated[
-        Path, typer.Argument(metavar="THROWS", help="CSV file with what was thrown and where it ended, or a dataset.")
-    ],
+    throws: Path,
+    *,
     output: ModelOption,
-    method: Annotated[
-        str, typer.Option("--method", help="What the world may differ by: auto, offset, bias, latent or none.")
-    ] = "auto",
+    method: str = "auto",
     scatter: ScatterOption = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Correct a model by a few throws of another robot or simulation."""
+    """Correct a model by a few throws of another robot or simulation.
+
+    Options:
+        throws (THROWS): CSV file with what was thrown and where it ended, or a dataset.
+        method: What the world may differ by: auto, offset, bias, latent or none.
+    """
     from throwcollect.learning.lists import read_rows
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
@@ -254,17 +247,14 @@ def adapt(
     entry = adapted.adaptation
     if entry is None:
         return
-    if json:
-        typer.echo(entry.model_dump_json(indent=2))
-        return
-    typer.echo(f"{format_count(entry.throws, 'throw')}; what differs: {entry.method.value}")
+    lines = [f"{format_count(entry.throws, 'throw')}; what differs: {entry.method.value}"]
     for estimate in entry.found:
-        typer.echo(f"{estimate.name}: {estimate.value:.4g} (standard deviation {estimate.deviation:.2g})")
+        lines.append(f"{estimate.name}: {estimate.value:.4g} (standard deviation {estimate.deviation:.2g})")
     before, after = entry.medians
-    told = f"median miss before: {format_length(before, model.targets)}"
+    lines.append(f"median miss before: {format_length(before, model.targets)}")
     if after is not None:
-        told += f"; after, each by a model of the others: {format_length(after, model.targets)}"
-    typer.echo(told)
+        lines[-1] += f"; after, each by a model of the others: {format_length(after, model.targets)}"
+    show(entry, *lines, json=json)
 
 
 def _split(names: str | None) -> tuple[str, ...]:
@@ -328,7 +318,6 @@ def _score_policy(
     from throwcollect.config.policy import PolicyConfig
     from throwcollect.config.values import with_values
     from throwcollect.learning.fitting import read_ends
-    from throwcollect.learning.score import SCORE_HEAD
     from throwcollect.learning.scoring import score_policy
     from throwcollect.simulator import Simulator
 
@@ -341,21 +330,16 @@ def _score_policy(
             simulator = Simulator(with_values(config, {"task.policy": section}))
             simulators[str(path)] = opened.enter_context(simulator)
         found = score_policy(ends, simulators, count, seeds, hit=hit, processes=count_cores())
-    if json:
-        print_json([each.model_dump() for each in found])
-        return
-    aimed = f"{format_count(count, 'target')} for each of {format_count(len(seeds), 'seed')}"
-    typer.echo(f"{policy} throws at {aimed}, medians of the seeds, in simulation:")
     rows = [(each.world, f"{each.hits:.0%}", *each.errors.cells) for each in found]
-    typer.echo("\n".join(align([("", "hits", *SCORE_HEAD), *rows], numbers=True)))
+    first = f"{policy} throws at {_count_targets(count, len(seeds))}"
+    show(found, *_describe_score(first, rows, "hits"), json=json)
 
 
-def _describe_score(score: Score) -> list[str]:
+def _count_targets(targets: int, seeds: int) -> str:
+    return f"{format_count(targets, 'target')} for each of {format_count(seeds, 'seed')}"
+
+
+def _describe_score(first: str, rows: Sequence[Sequence[str]], *head: str) -> list[str]:
     from throwcollect.learning.score import SCORE_HEAD
 
-    rows = [("", *SCORE_HEAD), *score.list_rows()]
-    return [
-        f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
-        "of the seeds, in simulation:",
-        *align(rows, numbers=True),
-    ]
+    return [f"{first}, medians of the seeds, in simulation:", *align([("", *head, *SCORE_HEAD), *rows], numbers=True)]

@@ -8,13 +8,13 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
-from dataclasses import replace
 from importlib import import_module
 from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.exceptions import TyperException
 
+from throwcollect.cli.options import describe
 from throwcollect.cli.streams import ensure_written
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.extras import explain_missing
@@ -24,8 +24,6 @@ from throwcollect.wording import printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR, errno.ENOENT)
 """System errors that a path from the user may cause."""
-_OPTIONS = {"rate_hz": "--rate"}
-"""Options by the arguments that they set, where the two have different names."""
 
 _COMMANDS = {
     "Commands": "show:init collect:up collect:resume collect:cover collect:join_run cluster_commands:submit "
@@ -36,7 +34,19 @@ _COMMANDS = {
     "": "collect:launch collect:begin",
 }
 """Modules and functions of the commands, by panel of the help; those without a panel are hidden."""
-_GROUPS = {"dataset": "dataset.commands:dataset_app", "ros": "ros.commands:ros_app", "robot": "robot_commands:app"}
+_GROUPS = {
+    "dataset": (
+        "Look into datasets, and make others from them.",
+        "dataset.info:info dataset.info:verify dataset.info:digest dataset.writing:export dataset.derive:merge "
+        "dataset.derive:filter_ dataset.derive:sample dataset.derive:split dataset.derive:stats dataset.writing:report "
+        "dataset.writing:view dataset.writing:render dataset.replay:replay",
+    ),
+    "robot": (
+        "Import, check and list robots.",
+        "robot_commands:import_ robot_commands:check robot_commands:list_",
+    ),
+}
+"""Help and commands of each group."""
 
 
 def _print_version(wanted: bool) -> None:
@@ -53,8 +63,8 @@ def _options(
     pass
 
 
-def assemble(first_word: str | None = None) -> typer.Typer:
-    """Assemble the whole command line, or only the command or group with a name.
+def assemble(*words: str) -> typer.Typer:
+    """Assemble the command line: the command that the first words name, or all commands if they name none.
 
     To import and to assemble all commands takes 0.1 s of processor time, a quarter of what a command takes to start.
     """
@@ -66,26 +76,38 @@ def assemble(first_word: str | None = None) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_options)
-    panels = {place: panel for panel, places in _COMMANDS.items() for place in places.split()}
-    names = {place: typer.main.get_command_name(place.partition(":")[2]) for place in panels}
-    is_known = first_word in _GROUPS or first_word in names.values()
-    for place, panel in panels.items():
-        if not is_known or names[place] == first_word:
-            app.command(rich_help_panel=panel, hidden=not panel)(_load(place))
-    for name, place in _GROUPS.items():
-        if not is_known or name == first_word:
-            app.add_typer(_load(place), name=name)
+    first, second = (*words, "", "")[:2]
+    is_known = first in (*_GROUPS, "ros") or any(
+        first == _name(place) for place in " ".join(_COMMANDS.values()).split()
+    )
+    for panel, places in _COMMANDS.items():
+        _add(app, places, first, is_known=is_known, rich_help_panel=panel, hidden=not panel)
+    for name, (text, places) in _GROUPS.items():
+        if not is_known or name == first:
+            group = typer.Typer(help=text, no_args_is_help=True)
+            _add(group, places, second, is_known=any(second == _name(place) for place in places.split()))
+            app.add_typer(group, name=name)
+    if not is_known or first == "ros":
+        app.add_typer(import_module("throwcollect.cli.ros.commands").ros_app, name="ros")
     return app
 
 
-def _load(place: str) -> Any:
-    module, _, name = place.partition(":")
-    return getattr(import_module(f"throwcollect.cli.{module}"), name)
+def _name(place: str) -> str:
+    return place.partition(":")[2].strip("_").replace("_", "-")
+
+
+def _add(app: typer.Typer, places: str, word: str, *, is_known: bool, **facts: Any) -> None:
+    """Add the command of a name to a group; all commands if it has none of that name."""
+    for place in places.split():
+        if not is_known or _name(place) == word:
+            module, _, name = place.partition(":")
+            function = getattr(import_module(f"throwcollect.cli.{module}"), name)
+            app.command(_name(place), help=describe(function), **facts)(function)
 
 
 def main() -> NoReturn:
     """Run the command that the command line asks for, and exit with its code."""
-    execute(typer.main.get_command(assemble(*sys.argv[1:2])))
+    execute(typer.main.get_command(assemble(*sys.argv[1:3])))
 
 
 def execute(command: Callable[..., Any]) -> NoReturn:
@@ -113,19 +135,8 @@ def execute(command: Callable[..., Any]) -> NoReturn:
     sys.exit(code)
 
 
-def _name_options(error: ConfigError) -> ConfigError:
-    """Return the same error with the option in place of each argument, as users of commands know options alone."""
-    problems = [
-        replace(each, key=_OPTIONS.get(each.key, f"--{each.key}"), argument=False) if each.argument else each
-        for each in error.problems
-    ]
-    return type(error)(problems, expected=error.expected, hint=error.hint)
-
-
 def _describe(error: Exception) -> tuple[str, int]:
     """Find the message and the exit code of an error."""
-    if isinstance(error, ConfigError):
-        error = _name_options(error)
     if isinstance(error, ThrowcollectError):
         return str(error), error.exit_code
     if isinstance(error, TyperException):

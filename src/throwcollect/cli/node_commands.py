@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -12,21 +11,13 @@ from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import LossError
 
 
-def router(
-    listen: Annotated[
-        str, typer.Option("--listen", metavar="ENDPOINT", help="Zenoh endpoint to listen on.")
-    ] = "tcp/127.0.0.1:7447",
-    key: Annotated[
-        Path | None,
-        typer.Option(
-            "--key",
-            metavar="DIR",
-            help="Key that clients of tls/... need; made if DIR has none. By default, that of THROWCOLLECT_KEY.",
-            readable=False,
-        ),
-    ] = None,
-) -> None:
-    """Run the router that all nodes connect to."""
+def router(*, listen: str = "tcp/127.0.0.1:7447", key: Path | None = None) -> None:
+    """Run the router that all nodes connect to.
+
+    Options:
+        listen (ENDPOINT): Zenoh endpoint to listen on.
+        key (DIR): Key that clients of tls/... need; made if DIR has none. By default, that of THROWCOLLECT_KEY.
+    """
     from throwcollect.ros.router import serve
 
     serve(listen, key)
@@ -34,19 +25,18 @@ def router(
 
 def sim(
     config: ConfigArgument = DEFAULT_CONFIG,
-    name: Annotated[
-        str | None, typer.Option("--name", help="Name of the node, and of its namespace; sim_<host name> by default.")
-    ] = None,
-    namespace: Annotated[
-        str | None,
-        typer.Option("--namespace", help="Namespace; /<name> by default. / is where nodes of the real robot look."),
-    ] = None,
-    record: Annotated[
-        Path | None,
-        typer.Option("--record", metavar="DIR", help="Dataset that clients record into, by the service `record`."),
-    ] = None,
+    *,
+    name: str | None = None,
+    namespace: str | None = None,
+    record: Path | None = None,
 ) -> None:
-    """Run one simulation."""
+    """Run one simulation.
+
+    Options:
+        name: Name of the node, and of its namespace; sim_<host name> by default.
+        namespace: Namespace; /<name> by default. / is where nodes of the real robot look.
+        record (DIR): Dataset that clients record into, by the service `record`.
+    """
     from socket import gethostname
 
     from throwcollect.ros.nodes.simulation.process import run
@@ -55,14 +45,12 @@ def sim(
     run(config, name=name or simulation_name_of(gethostname()), namespace=namespace, record=record)
 
 
-def coordinator(
-    directory: DatasetArgument,
-    config: Annotated[
-        Path | None,
-        typer.Option("--config", metavar="CONFIG", help="Make the plan of this YAML file first.", readable=False),
-    ] = None,
-) -> None:
-    """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
+def coordinator(directory: DatasetArgument, *, config: Path | None = None) -> None:
+    """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config.
+
+    Options:
+        config (CONFIG): Make the plan of this YAML file first.
+    """
     from throwcollect.ros.nodes.coordinator.node import run
 
     if config is None:

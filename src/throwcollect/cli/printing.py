@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import asdict, is_dataclass
+from datetime import datetime
 from functools import partial
 from typing import Any
 
@@ -24,9 +26,24 @@ def print_progress(wanted: bool = True) -> None:
     logger.handlers = [logging.StreamHandler()] if wanted else []
 
 
-def print_json(document: object, *, default: Callable[[Any], object] | None = None) -> None:
-    """Print a JSON document; `default` is as for `json.dumps`."""
-    typer.echo(jsonlib.dumps(document, indent=2, default=default))
+def show(result: object, *lines: str, json: bool, indent: int | None = 2) -> None:
+    """Print the result of a command: as a JSON document for programs, or as lines for people.
+
+    Values in the result may also be dataclasses, models of pydantic, paths and instants. Without `indent`, the document
+    is one line.
+    """
+    if json:
+        typer.echo(jsonlib.dumps(result, indent=indent, default=_make_plain))
+    elif lines:
+        typer.echo("\n".join(lines))
+
+
+def _make_plain(value: Any) -> object:
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    if isinstance(value, datetime):
+        return value.isoformat(timespec="milliseconds")
+    return value.model_dump(mode="json") if hasattr(value, "model_dump") else str(value)
 
 
 def format_number(number: float | None) -> str:
@@ -39,11 +56,3 @@ def align(rows: Sequence[Sequence[str]], *, numbers: bool = False) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     fill = str.rjust if numbers else str.ljust
     return ["  ".join([row[0].ljust(widths[0]), *map(fill, row[1:], widths[1:])]).rstrip() for row in rows]
-
-
-def print_result(document: object, text: str, *, json: bool) -> None:
-    """Print a result: as a JSON document for programs, or as text for people."""
-    if json:
-        print_json(document)
-    else:
-        typer.echo(text)

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from throwcollect.cli.options import JsonOption
-from throwcollect.cli.printing import print_result
+from throwcollect.cli.printing import show
 from throwcollect.errors import ConfigError
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.config.robot_config import RobotConfig
-
-app = typer.Typer(no_args_is_help=True, help="Import, check and list robots.")
 
 RobotArgument = Annotated[
     str,
@@ -31,16 +29,14 @@ KeysOption = Annotated[
 ]
 
 
-@app.command("import")
 def import_(
-    robot: RobotArgument,
-    flange: FlangeOption = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory to write; robots/NAME by default.")
-    ] = None,
-    settings: KeysOption = None,
+    robot: RobotArgument, *, flange: FlangeOption = None, output: Path | None = None, settings: KeysOption = None
 ) -> None:
-    """Write a directory with a cleaned URDF, an SRDF, meshes, and a robot.yaml that says where each value came from."""
+    """Write a directory with a cleaned URDF, an SRDF, meshes, and a robot.yaml that says where each value came from.
+
+    Options:
+        output (-o --output DIR): Directory to write; robots/NAME by default.
+    """
     from throwcollect.robots.imported import list_files
     from throwcollect.robots.importing import SECTION
 
@@ -59,27 +55,22 @@ def import_(
     typer.echo(f"  {command('init', '--robot', directory)}")
 
 
-@app.command()
 def check(
-    robot: RobotArgument, flange: FlangeOption = None, settings: KeysOption = None, json: JsonOption = False
+    robot: RobotArgument, *, flange: FlangeOption = None, settings: KeysOption = None, json: JsonOption = False
 ) -> None:
     """List what is odd about a robot: limits, masses, inertias, meshes, its posture at rest, its reach."""
     section = read_robot(robot, flange, settings)
     found = _list_oddities(section)
-    print_result(found, "\n".join(found) if found else f"{section.name}: nothing is odd", json=json)
+    show(found, *(found or [f"{section.name}: nothing is odd"]), json=json)
 
 
-@app.command("list")
-def list_(json: JsonOption = False) -> None:
+def list_(*, json: JsonOption = False) -> None:
     """List the robots that are installed."""
     from throwcollect.members import load_member, usable_names
 
     found = {name: load_member("robots", name).controllers for name in usable_names("robots")}
-    text = "\n".join(
-        f"{name:<12} {sum(map(len, controllers.values()))} joints: {', '.join(controllers)}"
-        for name, controllers in found.items()
-    )
-    print_result({name: dict(controllers) for name, controllers in found.items()}, text, json=json)
+    lines = [f"{name:<12} {sum(map(len, each.values()))} joints: {', '.join(each)}" for name, each in found.items()]
+    show({name: dict(each) for name, each in found.items()}, *lines, json=json)
 
 
 def read_robot(robot: str, flange: str | None = None, settings: list[str] | None = None) -> RobotConfig:

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from throwcollect.cli.options import JsonOption, RunOption
-from throwcollect.cli.printing import align, print_json, tell
+from throwcollect.cli.printing import align, show, tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
@@ -28,11 +28,12 @@ _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
 
 
-def ps(
-    everything: Annotated[bool, typer.Option("-a", "--all", help="Runs that have ended, too.")] = False,
-    json: JsonOption = False,
-) -> None:
-    """List the runs of this machine, with their nodes, and the server."""
+def ps(*, everything: bool = False, json: JsonOption = False) -> None:
+    """List the runs of this machine, with their nodes, and the server.
+
+    Options:
+        everything (-a --all): Runs that have ended, too.
+    """
     from throwcollect.cluster.submission import find_queued
     from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_held_runs
@@ -63,8 +64,7 @@ def ps(
             documents.append(
                 {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
             )
-        # Times are written as in events.
-        print_json(documents, default=lambda time: time.isoformat(timespec="milliseconds"))
+        show(documents, json=True)
         return
     rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
@@ -109,12 +109,13 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
         raise error
 
 
-def logs(
-    nodes: Annotated[list[str] | None, typer.Argument(metavar="NODE", help="Names of nodes; all if none.")] = None,
-    follow: Annotated[bool, typer.Option("-f", "--follow", help="Go on until the run ends.")] = False,
-    run: RunOption = None,
-) -> None:
-    """Print what the nodes of a run print, or the tasks of one on a cluster."""
+def logs(nodes: list[str] | None = None, *, follow: bool = False, run: RunOption = None) -> None:
+    """Print what the nodes of a run print, or the tasks of one on a cluster.
+
+    Options:
+        nodes (NODE): Names of nodes; all if none.
+        follow (-f --follow): Go on until the run ends.
+    """
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import print_logs
 
@@ -141,11 +142,12 @@ def events(run: RunOption = None, json: JsonOption = False) -> None:
         typer.echo(line if json else f"{event.time}  {event}")
 
 
-def scale(
-    simulations: Annotated[int, typer.Argument(metavar="N", min=0, max=256, help="Number of simulations.")],
-    run: RunOption = None,
-) -> None:
-    """Change the number of simulations of a run."""
+def scale(simulations: int, *, run: RunOption = None) -> None:
+    """Change the number of simulations of a run.
+
+    Options:
+        simulations (N 0..256): Number of simulations.
+    """
     from throwcollect.runs import control
     from throwcollect.runs.run_selection import find_run_to_change
 
@@ -185,13 +187,12 @@ def stop(run: RunOption = None) -> None:
     typer.echo(f"{found.id}: stopped; the dataset {complete}: {found.place.dataset}")
 
 
-def down(
-    volumes: Annotated[
-        bool, typer.Option("-v", "--volumes", help="Remove the volume that holds the dataset, too.")
-    ] = False,
-    run: RunOption = None,
-) -> None:
-    """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
+def down(*, volumes: bool = False, run: RunOption = None) -> None:
+    """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset.
+
+    Options:
+        volumes (-v --volumes): Remove the volume that holds the dataset, too.
+    """
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import end
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json as jsonlib
 import os
 import sys
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from throwcollect.cli.options import JsonOption, RunOption
-from throwcollect.cli.printing import tell
+from throwcollect.cli.printing import show, tell
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 
@@ -23,46 +20,33 @@ _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def serve(
-    catalogue: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="CATALOG",
-            help="YAML file with components, or a configuration; throwcollect.yaml by default.",
-            readable=False,
-        ),
-    ] = None,
-    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1",
-    port: Annotated[
-        int | None,
-        typer.Option("--port", min=0, max=65535, help="Port; by default 8080, or a free one if that is taken."),
-    ] = None,
-    datasets: Annotated[
-        Path,
-        typer.Option("--datasets", metavar="DIR", file_okay=False, help="Directory in which instances write datasets."),
-    ] = Path("datasets"),
-    models: Annotated[
-        Path,
-        typer.Option(
-            "--models", metavar="DIR", file_okay=False, help="Directory of models, each in a directory of its own."
-        ),
-    ] = Path("models"),
-    certificate: Annotated[
-        Path | None, typer.Option("--tls-cert", metavar="FILE", help="Certificate in PEM: speak HTTPS.")
-    ] = None,
-    key: Annotated[Path | None, typer.Option("--tls-key", metavar="FILE", help="Its key in PEM.")] = None,
-    in_the_clear: Annotated[
-        bool, typer.Option("--in-the-clear", help="Serve other machines without TLS, where the network is trusted.")
-    ] = False,
-    origins: Annotated[
-        list[str] | None,
-        typer.Option("--allow-origin", metavar="URL", help="Origin of pages served elsewhere that may connect."),
-    ] = None,
-    names: Annotated[
-        list[str] | None, typer.Option("--name", metavar="NAME", help="Host name by which clients know this machine.")
-    ] = None,
+    catalogue: Path | None = None,
+    *,
+    host: str = "127.0.0.1",
+    port: int | None = None,
+    datasets: Path = Path("datasets"),
+    models: Path = Path("models"),
+    certificate: Path | None = None,
+    key: Path | None = None,
+    in_the_clear: bool = False,
+    origins: list[str] | None = None,
+    names: list[str] | None = None,
     json: JsonOption = False,
 ) -> None:
-    """Serve a page, REST, the state of all runs and rosbridge on one port, until it is stopped."""
+    """Serve a page, REST, the state of all runs and rosbridge on one port, until it is stopped.
+
+    Options:
+        catalogue (CATALOG): YAML file with components, or a configuration; throwcollect.yaml by default.
+        host (ADDRESS): Address to listen at.
+        port (0..65535): Port; by default 8080, or a free one if that is taken.
+        datasets (DIR): Directory in which instances write datasets.
+        models (DIR): Directory of models, each in a directory of its own.
+        certificate (--tls-cert FILE): Certificate in PEM: speak HTTPS.
+        key (--tls-key FILE): Its key in PEM.
+        in_the_clear: Serve other machines without TLS, where the network is trusted.
+        origins (--allow-origin URL): Origin of pages served elsewhere that may connect.
+        names (--name NAME): Host name by which clients know this machine.
+    """
     from throwcollect.serve.catalogue import Catalogue
     from throwcollect.serve.instances import Instances
     from throwcollect.serve.models import Models
@@ -71,6 +55,9 @@ def serve(
 
     if (certificate is None) != (key is None):
         raise ConfigError("--tls-cert and --tls-key: should be given together")
+    for option, directory in {"--datasets": datasets, "--models": models}.items():
+        if directory.exists() and not directory.is_dir():
+            raise ConfigError(f"{option} {directory}: should be a directory, is a file")
     if host not in _LOOPBACK and certificate is None and not in_the_clear:
         raise ConfigError(
             f"--host {host}: anybody on that network could read the token while it is sent",
@@ -79,10 +66,9 @@ def serve(
     tls = None if certificate is None or key is None else Tls(certificate, key)
 
     def show_address(address: Address, code: str) -> None:
-        if json:
-            typer.echo(jsonlib.dumps({"url": address.url, "page": address.page(code), "pid": address.pid}))
-        else:
-            typer.echo(f"open {address.page(code)}")
+        page = address.page(code)
+        show({"url": address.url, "page": page, "pid": address.pid}, f"open {page}", json=json, indent=None)
+        if not json:
             tell(write_tunnel(address))
 
     serve_all(
@@ -102,13 +88,12 @@ def view(run: RunOption = None, json: JsonOption = False) -> None:
     from throwcollect.runs.run_selection import find_run_to_watch
     from throwcollect.serve.finding import ensure_server, make_page_address
 
-    shown = find_run_to_watch(run).id if run is not None else None
+    watched = find_run_to_watch(run).id if run is not None else None
     address = ensure_server()
-    page = make_page_address(address, shown)
+    page = make_page_address(address, watched)
+    show({"url": address.url, "page": page}, page, json=json, indent=None)
     if json:
-        typer.echo(jsonlib.dumps({"url": address.url, "page": page}))
         return
-    typer.echo(page)
     tell(write_tunnel(address))
     if sys.stdout.isatty() and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         webbrowser.open(page)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import format_number, print_json, print_result, tell
+from throwcollect.cli.printing import format_number, show, tell
 from throwcollect.cli.robot_commands import FlangeOption, read_robot, write_robot
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
@@ -22,22 +22,15 @@ if TYPE_CHECKING:
     from throwcollect.tasks.starter import Beginning
 
 
-def init(
-    robot: Annotated[
-        str,
-        typer.Option(
-            "--robot", metavar="ROBOT", help="The robot: its name, a robot.yaml or its directory, or a URDF (--flange)."
-        ),
-    ] = "talos",
-    flange: FlangeOption = None,
-    task: Annotated[str, typer.Option("--task", metavar="NAME", help="What it does: task.name.")] = "throw",
-    sampler: Annotated[
-        str, typer.Option("--sampler", metavar="NAME", help="How trials are drawn: sweep.sampler.")
-    ] = "sobol",
-) -> None:
+def init(*, robot: str = "talos", flange: FlangeOption = None, task: str = "throw", sampler: str = "sobol") -> None:
     """Write a commented throwcollect.yaml, for `throwcollect up`.
 
     For a robot without a default motion, it searches a throw that lands.
+
+    Options:
+        robot (ROBOT): The robot: its name, a robot.yaml or its directory, or a URDF (--flange).
+        task (NAME): What it does: task.name.
+        sampler (NAME): How trials are drawn: sweep.sampler.
     """
     from throwcollect.files import write_file
     from throwcollect.tasks.starter import begin_at_default, check_choices, make_starter
@@ -66,30 +59,29 @@ def _search_beginning(robot: str, section: RobotConfig, task: str) -> Beginning:
 
 
 def config(
-    path: ConfigArgument = DEFAULT_CONFIG,
-    settings: SetOption = None,
-    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema instead.")] = False,
-    json: JsonOption = False,
+    path: ConfigArgument = DEFAULT_CONFIG, *, settings: SetOption = None, schema: bool = False, json: JsonOption = False
 ) -> None:
-    """Print the resolved configuration."""
+    """Print the resolved configuration.
+
+    Options:
+        schema: Print the JSON Schema instead.
+    """
     from throwcollect.config.loader import dump_yaml, load
     from throwcollect.config.shape import root
 
     if schema:
-        print_json(root().node)
+        show(root().node, json=True)
         return
     found = load(path, overrides(settings))
     typer.echo(found.model_dump_json(indent=2) if json else dump_yaml(found), nl=json)
 
 
-def fit_dmp(
-    path: ConfigArgument = DEFAULT_CONFIG,
-    settings: SetOption = None,
-    basis_functions: Annotated[
-        int, typer.Option("--basis-functions", metavar="N", min=2, max=500, help="Basis functions of each joint.")
-    ] = 25,
-) -> None:
-    """Print a section `task` that follows the motion of a configuration, such as one of a file, by DMPs."""
+def fit_dmp(path: ConfigArgument = DEFAULT_CONFIG, *, settings: SetOption = None, basis_functions: int = 25) -> None:
+    """Print a section `task` that follows the motion of a configuration, such as one of a file, by DMPs.
+
+    Options:
+        basis_functions (N 2..500): Basis functions of each joint.
+    """
     from throwcollect.config.loader import dump_yaml, load
     from throwcollect.robots.description import robot_of
     from throwcollect.robots.quintic_curve import sample_positions
@@ -97,53 +89,50 @@ def fit_dmp(
     from throwcollect.tasks.task import trajectory_of
 
     config = load(path, overrides(settings))
-    shown = trajectory_of(config)
-    (family,) = fit_motions([shown], basis_functions=basis_functions)
-    default, times = type(config.task).model_fields["points_hz"].default, shown.times
+    motion = trajectory_of(config)
+    (family,) = fit_motions([motion], basis_functions=basis_functions)
+    default, times = type(config.task).model_fields["points_hz"].default, motion.times
     keys = {"trajectory": family, "duration_s": float(times[-1]), "points_hz": default}
     fitted = config.model_copy(update={"task": config.task.model_copy(update=keys)})
-    misses = abs(sample_positions(trajectory_of(fitted), times) - shown.positions).max(axis=0).tolist()
-    miss, joint = max(zip(misses, shown.joints, strict=True))
+    misses = abs(sample_positions(trajectory_of(fitted), times) - motion.positions).max(axis=0).tolist()
+    miss, joint = max(zip(misses, motion.joints, strict=True))
     typer.echo(dump_yaml(fitted, "task"), nl=False)
     tell(f"the DMP stays within {miss:.2g} {robot_of(config).unit_of(joint)} of the motion; farthest is {joint}")
 
 
 def plan(
     path: ConfigArgument = DEFAULT_CONFIG,
+    *,
     settings: SetOption = None,
     trials: TrialsOption = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="DIR", help="Freeze the plan in DIR, for `up --slice`, instead of printing it."
-        ),
-    ] = None,
+    output: Path | None = None,
     json: JsonOption = False,
 ) -> None:
-    """Print the trials without running them."""
+    """Print the trials without running them.
+
+    Options:
+        output (--output -o DIR): Freeze the plan in DIR, for `up --slice`, instead of printing it.
+    """
     from throwcollect.config.loader import load_locating_errors
     from throwcollect.coordinator.prepare import count_trials, draw_plan, prepare
 
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
-        shown = display(quiet=json, bar=False)
+        onlooker = display(quiet=json, bar=False)
         if output is None:
-            found = draw_plan(config, directory=path.parent, processes=count_cores(), onlooker=shown)
+            found = draw_plan(config, directory=path.parent, processes=count_cores(), onlooker=onlooker)
         else:
-            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=shown)
+            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=onlooker)
     _load_world(found)
     if json:
-        print_json(
+        facts = ("seed", "digest", "refused")
+        targets = found.trials.points.target_names
+        show(
             [
-                {
-                    "trial": trial.number,
-                    "values": dict(trial.values),
-                    "seed": trial.seed,
-                    "digest": trial.digest,
-                    "refused": trial.refused,
-                    **({"target": dict(trial.target)} if found.trials.points.target_names else {}),
-                }
-                for trial in found.trials
-            ]
+                {"trial": each.number, "values": dict(each.values), **{name: getattr(each, name) for name in facts}}
+                | ({"target": dict(each.target)} if targets else {})
+                for each in found.trials
+            ],
+            json=True,
         )
         return
     if output is None:
@@ -153,7 +142,7 @@ def plan(
             values = {**trial.values, **trial.target}
             numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
             note = f"  refused: {trial.refused}" if trial.refused else ""
-            typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
+            typer.echo("  ".join([f"{trial.number:5}", *numbers]) + note)
     tell(f"{count_trials(found)}; {len(found.trials.refused)} refused")
 
 
@@ -169,13 +158,13 @@ def _load_world(plan: Plan) -> None:
         tell(f"whether the engine takes the robot is not known: {error.one_line}")
 
 
-def doctor(json: JsonOption = False) -> None:
+def doctor(*, json: JsonOption = False) -> None:
     """Check what this machine can do."""
     from throwcollect.runs.doctor import examine
 
     checks = examine(Path.cwd())
     width = max(len(check.name) for check in checks)
     lines = [f"{check.status:8}{check.name:{width}}  {check.finding}" for check in checks]
-    print_result([vars(check) for check in checks], "\n".join(lines), json=json)
+    show(checks, *lines, json=json)
     if any(check.status == "problem" for check in checks):
         raise typer.Exit(1)

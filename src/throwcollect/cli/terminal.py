@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 _LINE_EVERY_S = 2.0
 """Least time between two lines."""
-_TEXT_COLUMNS = 72
-"""Columns of the terminal that everything beside the bar takes."""
 
 
 def display(*, quiet: bool, bar: bool = True) -> _Lines | _Bar:
@@ -63,21 +61,18 @@ class _Bar(Onlooker):
         from rich.text import Text
 
         class Counts(progress.ProgressColumn):
-            """The outcomes in words, which are cut in a narrow terminal so that the numbers beside them are not."""
+            """The outcomes in words, which are cut in a narrow terminal so that the numbers are not."""
 
             def render(self, task: progress.Task) -> Text:
                 return Text(task.description, no_wrap=True, overflow="ellipsis")
 
-        console = Console(stderr=True)
-        self._bar = progress.BarColumn()
-        whole = Column(no_wrap=True, overflow="ellipsis")
         self._progress = progress.Progress(
-            self._bar,
-            progress.MofNCompleteColumn(table_column=whole),
+            progress.MofNCompleteColumn(table_column=Column(no_wrap=True)),
             Counts(),
-            progress.TextColumn("ETA", table_column=whole.copy()),
-            progress.TimeRemainingColumn(compact=True, table_column=whole.copy()),
-            console=console,
+            progress.TextColumn("ETA"),
+            progress.TimeRemainingColumn(compact=True, table_column=Column(no_wrap=True)),
+            progress.BarColumn(bar_width=20, table_column=Column(no_wrap=True)),
+            console=Console(stderr=True),
         )
         self._task = self._progress.add_task("waiting for simulations", total=None)
 
@@ -90,8 +85,6 @@ class _Bar(Onlooker):
 
     def update(self, progress: Progress) -> None:
         completed, total = progress.steps
-        # The user may have changed the width of the terminal.
-        self._bar.bar_width = min(max(self._progress.console.width - _TEXT_COLUMNS, 4), 40)
         self._progress.update(self._task, total=total, completed=completed, description=progress.counts)
 
     def say(self, line: str) -> None:

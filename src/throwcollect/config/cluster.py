@@ -4,40 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, PositiveInt
+from pydantic import Field, PositiveInt
 
-from throwcollect.config.kinds import NUMBER_AS_TEXT, in_words, match
+from throwcollect.config.kinds import NUMBER_AS_TEXT
 from throwcollect.config.section import Section
 
-
-def _require_line(text: str) -> str:
-    if not text.isprintable():
-        raise ValueError(f"should be one line of printable characters, got {text!r}")
-    return text
-
-
-_TIME = r"\d+|\d+:\d{1,2}(:\d{1,2})?|\d+-\d{1,2}(:\d{1,2}){0,2}"
-Time = Annotated[
-    str,
-    NUMBER_AS_TEXT,
-    match(_TIME, "minutes, HOURS:MINUTES:SECONDS or DAYS-HOURS, such as 4:00:00"),
-    in_words("a time such as 4:00:00"),
-]
-Memory = Annotated[
-    str, match(r"[1-9]\d*[KMGT]", "a number and K, M, G or T, such as 4G"), in_words("a size such as 4G")
-]
-Word = Annotated[str, match(r"[!-~]+", "one word without blanks"), in_words("one word")]
-Line = Annotated[str, AfterValidator(_require_line)]
-Scratch = Annotated[
-    str,
-    match(r"[/$][A-Za-z0-9_./${}-]*", "an absolute path or begin with a variable, such as $TMPDIR"),
-    in_words("a directory such as `$TMPDIR`"),
-]
-Bind = Annotated[
-    Line,
-    match(r"/[^:,]*(:/[^:,]*(:r[ow])?)?", "DIRECTORY or DIRECTORY:INSIDE[:ro] with absolute paths"),
-    in_words("DIRECTORY[:INSIDE[:ro]]"),
-]
+_TIME = r"^([0-9]+|[0-9]+:[0-9]{1,2}(:[0-9]{1,2})?|[0-9]+-[0-9]{1,2}(:[0-9]{1,2}){0,2})$"
+Time = Annotated[str, NUMBER_AS_TEXT, Field(pattern=_TIME)]
+Memory = Annotated[str, Field(pattern=r"^[1-9][0-9]*[KMGT]$")]
+Word = Annotated[str, Field(pattern=r"^[!-~]+$")]
+Line = Annotated[str, Field(pattern=r"^[^\p{Cc}\p{Zl}\p{Zp}]*$")]
+Scratch = Annotated[str, Field(pattern=r"^[/$][A-Za-z0-9_./${}-]*$")]
+Bind = Annotated[Line, Field(pattern=r"^/[^:,]*(:/[^:,]*(:r[ow])?)?$")]
 
 
 class ClusterConfig(Section):
@@ -52,9 +30,10 @@ class ClusterConfig(Section):
     constraint: Word | None = None
     """Features that a node must have."""
     time: Time | None = None
-    """Time limit of a task; shortly before it, the task shuts down properly, and is queued again (`requeue`)."""
+    """Time limit of a task, such as `4:00:00`; shortly before it, the task shuts down properly, and is queued again
+    (`requeue`)."""
     memory: Memory | None = None
-    """Memory of a task."""
+    """Memory of a task, such as `4G`."""
     cores: Annotated[int, Field(ge=1, le=256)] = 1
     """Cores of a task, which runs one simulation on each."""
     at_once: PositiveInt | None = None
@@ -67,7 +46,8 @@ class ClusterConfig(Section):
     """Image of Apptainer that tasks run in (`make sif`); null takes the Python environment from which
     the collection is submitted, which all nodes have to see."""
     binds: list[Bind] = []
-    """Further directories that tasks see inside the image; they always see the directory of the dataset."""
+    """Further directories that tasks see inside the image, as DIRECTORY[:INSIDE[:ro]]; they always see the directory of
+    the dataset."""
     scratch: Scratch | None = None
     """Directory on a disk of the node, such as `$TMPDIR`, in which a task collects before it hands its slice over."""
     requeue: Annotated[int, Field(ge=0, le=1000)] = 10

@@ -1,10 +1,10 @@
-"""Reads a YAML file into plain values, keeps the line of each, replaces values by overrides, and validates them."""
+"""Reads a YAML file into plain values, replaces values by overrides, and finds the lines of what is wrong in it."""
 
 from __future__ import annotations
 
-import stat
+import os
 from collections.abc import Callable, Mapping
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,13 +12,13 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.problems import Location, find_problems, join_key, quote, read_index, split_key
 from throwcollect.config.section import Section
-from throwcollect.errors import ConfigError, Problem
-from throwcollect.files import suggest_path
+from throwcollect.errors import ConfigError, DatasetError, Problem
+from throwcollect.files import read_text, suggest_path
 from throwcollect.wording import command
 
 AnySection = TypeVar("AnySection", bound=Section)
@@ -26,9 +26,6 @@ AnySection = TypeVar("AnySection", bound=Section)
 Plain = bool | float | str | list[float] | None
 """A value in a mapping of a configuration."""
 
-_TAG = "tag:yaml.org,2002:"
-_TEXT_TAGS = ("timestamp", "merge", "value")
-"""Tags of scalars that are strings here, although YAML 1.1 and ruamel give them another meaning."""
 _MOST_BYTES = 1_000_000
 _MOST_VALUES = 30_000
 """Most values: more than 500 weights for each of 32 joints. Aliases of aliases can make a short file far larger."""
@@ -36,45 +33,50 @@ _UNREADABLE = (YAMLError, RecursionError, ValueError, LookupError, OverflowError
 """What ruamel raises: besides errors of its own, those of Python for scalars that their tags do not fit."""
 
 
+class _Constructor(SafeConstructor):
+    """Makes plain values, and leaves dates as they are written."""
+
+
+_Constructor.add_constructor("tag:yaml.org,2002:timestamp", SafeConstructor.construct_yaml_str)
+
+
 class Document:
-    """Values of a configuration file and of overrides, with the line of each.
+    """Values of a configuration file and of overrides.
 
     Args:
         path: The file; None if there are only overrides.
 
     Attributes:
         values: Plain dictionaries, lists, strings, numbers, truth values and None.
-        problems: Keys that are there twice, and wrong overrides.
+        problems: Wrong overrides.
     """
 
     def __init__(self, path: Path | None) -> None:
         self.problems: list[Problem] = []
+        self.values: dict[str, Any] = {}
         self._path = path
-        self._count = 0
-        self._in_file = True
-        self._lines: dict[Location, int | None] = {}
+        self._overridden: list[Location] = []
+        self._node: Node | None = None
         if path is None:
-            self.values: dict[str, Any] = {}
-            self._in_file = False
             return
         try:
-            node = compose(_read_text(path))
-            self.values = {} if node is None else self._make_plain(node, ())
+            self._node = _compose(_read_text(path))
+            self.values = _construct(self._node)
         except _UNREADABLE as error:
             reason, line = explain_yaml_error(error)
             raise ConfigError([Problem(f"not valid YAML: {reason}", path=path, line=line)]) from error
-        if not isinstance(self.values, dict) or node is None:
-            wrong = "the file is empty" if node is None else "the file should hold keys and values"
+        if not isinstance(self.values, dict):
+            wrong = "the file is empty" if self._node is None else "the file should hold keys and values"
             raise ConfigError([Problem(wrong, path=path)], expected="keys such as task and sweep")
-        self._in_file = False  # all further values are those of overrides
 
     def problem(self, location: Location, sentence: str) -> Problem:
         """Make a problem with the value or the key at a location, with the line in which it stands."""
-        for length in range(len(location), 0, -1):
-            if location[:length] in self._lines:
-                line = self._lines[location[:length]]
-                return Problem(sentence, join_key(location), self._path if line else None, line)
-        return Problem(sentence, join_key(location), self._path)
+        lines = _find_lines(self._node, location)
+        is_whole = len(lines) == len(location)
+        for each in self._overridden:
+            if each == location[: len(each)] or (each[: len(location)] == location and not is_whole):
+                return Problem(sentence, join_key(location))
+        return Problem(sentence, join_key(location), self._path, lines[-1] if lines else None)
 
     def place(self, problem: Problem) -> Problem:
         """Return a problem with the file and the line of its key, if it has a key but no file yet."""
@@ -88,10 +90,10 @@ class Document:
             holder = holder[index] if _has_item(holder, index) else None
         return self.problem(location, problem.message)
 
-    def validate(self, section: type[AnySection], context: Any = None) -> AnySection:
+    def validate(self, section: type[AnySection]) -> AnySection:
         """Make a section of the values; the error has all problems, in the order of their lines."""
         try:
-            made = section.model_validate(self.values, strict=True, context=context)
+            made = section.model_validate(self.values, strict=True)
         except ValidationError as error:
             found = find_problems(error, section, self.values)
             problems = [*self.problems, *(self.problem(location, sentence) for location, sentence in found.items())]
@@ -124,65 +126,60 @@ class Document:
             # A mapping that the file leaves out gets its default, so that the override changes only one key of it.
             if isinstance(holder, dict) and holder.get(part) is None:
                 holder[part] = dict(find_default(location))
-                self._lines[location] = None
             holder = holder[index] if _has_item(holder, index) else None
         index = read_index(holder, last)
         if not isinstance(holder, dict) and not _has_item(holder, index):
             self.problems.append(Problem(f"nothing of this name can be set; got {quote(text)}", key))
             return
-        location = (*location, index)
-        # The override replaces these values, so they do not stand in lines of the file any more.
-        self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
-        self._lines[location] = None
+        self._overridden.append((*location, index))
         try:
-            node = compose(text)
-            holder[index] = None if node is None else self._make_plain(node, location)
+            holder[index] = _construct(_compose(text))
         except _UNREADABLE as error:
             self.problems.append(Problem(f"not valid YAML: {explain_yaml_error(error)[0]}; got {quote(text)}", key))
 
-    def _make_plain(self, node: Node, location: Location) -> Any:
-        self._count += 1
-        if self._count > _MOST_VALUES:
-            raise ValueError(f"there are more than {_MOST_VALUES} values")
-        kind = str(node.tag).removeprefix(_TAG)
-        if isinstance(node, MappingNode) and kind == "map":
-            return self._make_mapping(node, location)
-        if isinstance(node, SequenceNode) and kind == "seq":
-            items = []
-            for index, item in enumerate(node.value):
-                self._lines[(*location, index)] = self._find_line(item)
-                items.append(self._make_plain(item, (*location, index)))
-            return items
-        if isinstance(node, ScalarNode) and kind in _TEXT_TAGS:
-            return node.value
-        return _make_constructor().construct_object(node)
-
-    def _make_mapping(self, node: MappingNode, location: Location) -> dict[str, Any]:
-        values: dict[str, Any] = {}
-        for key_node, value_node in node.value:
-            name = str(key_node.value)
-            if name in values:
-                first = f", first in line {self._lines[(*location, name)]}" if self._in_file else ""
-                path = self._path if self._in_file else None
-                problem = f"the key is here twice{first}"
-                self.problems.append(Problem(problem, join_key((*location, name)), path, self._find_line(key_node)))
-                continue
-            self._lines[(*location, name)] = self._find_line(key_node)
-            values[name] = self._make_plain(value_node, (*location, name))
-        return values
-
-    def _find_line(self, node: Node) -> int | None:
-        return node.start_mark.line + 1 if self._in_file else None
-
 
 @lru_cache(maxsize=8)
-def compose(text: str) -> Node | None:
+def _compose(text: str) -> Node | None:
     """Parse a YAML text into a node, which nobody may change; None if the text is empty.
 
     It remembers the last texts, because one command reads the configuration of a dataset several times.
     """
     node: Node | None = YAML(typ="safe", pure=True).compose(text)
     return node
+
+
+def _construct(node: Node | None) -> Any:
+    if node is None:
+        return None
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Constructor = _Constructor
+    return _copy(yaml.constructor.construct_document(node), [_MOST_VALUES])
+
+
+def _copy(value: Any, left: list[int]) -> Any:
+    """Copy values, so that aliases of one anchor can be changed each on its own; keys become strings."""
+    left[0] -= 1
+    if left[0] < 0:
+        raise ValueError(f"there are more than {_MOST_VALUES} values")
+    if isinstance(value, dict):
+        return {str(key): _copy(each, left) for key, each in value.items()}
+    return [_copy(each, left) for each in value] if isinstance(value, list) else value
+
+
+def _find_lines(node: Node | None, location: Location) -> list[int]:
+    """Find the lines, counted from 1, of the keys and items on the way to a location, as far as they exist."""
+    lines = []
+    for part in location:
+        found: list[tuple[Node, Node]] = []
+        if isinstance(node, MappingNode):
+            found = [(key, value) for key, value in node.value if str(key.value) == part]
+        elif isinstance(node, SequenceNode) and isinstance(part, int):
+            found = [(item, item) for item in node.value[part : part + 1]]
+        if not found:
+            break
+        lines.append(found[0][0].start_mark.line + 1)
+        node = found[0][1]
+    return lines
 
 
 def explain_yaml_error(error: Exception) -> tuple[str, int | None]:
@@ -196,31 +193,13 @@ def explain_yaml_error(error: Exception) -> tuple[str, int | None]:
 
 
 def _read_text(path: Path) -> str:
-    try:
-        if not stat.S_ISREG(kind := path.stat().st_mode):
-            # To read a pipe or a device may block for ever.
-            got = "a directory" if stat.S_ISDIR(kind) else "a pipe or a device"
-            raise ConfigError([Problem(f"should be a YAML file, got {got}", path=path)])
-        with path.open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
-        if len(data) > _MOST_BYTES:
-            raise ConfigError([Problem(f"larger than {_MOST_BYTES} bytes", path=path)])
-        return data.decode("utf-8")
-    except FileNotFoundError as error:
+    if not os.path.exists(path):
         hint = f"{command('init')} writes one to begin with" if path == DEFAULT_CONFIG else None
-        raise ConfigError([Problem(f"no such file{suggest_path(path)}", path=path)], hint=hint) from error
-    except OSError as error:
-        raise ConfigError([Problem(f"cannot be read: {error.strerror}", path=path)]) from error
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
-        raise ConfigError([Problem(sentence, path=path, line=line)]) from error
-
-
-@cache
-def _make_constructor() -> SafeConstructor:
-    constructor: SafeConstructor = YAML(typ="safe", pure=True).constructor
-    return constructor
+        raise ConfigError([Problem(f"no such file{suggest_path(path)}", path=path)], hint=hint)
+    try:
+        return read_text(path.resolve(), most_bytes=_MOST_BYTES)
+    except DatasetError as error:
+        raise ConfigError([Problem(error.problem, path=path)]) from error
 
 
 def _has_item(holder: Any, index: str | int) -> bool:

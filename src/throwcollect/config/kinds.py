@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic import BeforeValidator, Field
 
-from throwcollect.members import import_own
 from throwcollect.wording import suggest
 
 
@@ -24,49 +22,15 @@ class ContradictionError(ValueError):
         super().__init__("; ".join(f"{key}: {sentence}" for key, sentence in self.sentences.items()))
 
 
-def find_robot(section: Any) -> Any:
-    """Find the robot of a section, or of a name: a `throwcollect.robots.robot.Robot`.
-
-    It is imported when it is asked for, because configurations are read without the libraries of simulations.
-    """
-    return import_own("throwcollect.robots.described:find_robot")(section)
-
-
-def complete_robot(section: Any) -> Any:
-    """Complete the section of a robot that only names it or its URDF (see `throwcollect.robots.described.complete`)."""
-    return import_own("throwcollect.robots.described:complete")(section)
-
-
-def complete_motions(*given: Any) -> Any:
-    """Complete the keys of a task whose motions are in a file (see `throwcollect.tasks.motions.complete`)."""
-    return import_own("throwcollect.tasks.motions:complete")(*given)
-
-
-def complete_body(section: Any) -> Any:
-    """Complete the section of a body whose shapes are in a file (see `throwcollect.robots.body_files.complete`)."""
-    return import_own("throwcollect.robots.body_files:complete")(section)
-
-
 def unknown_joint(name: str, robot: Any) -> str:
     """Make the sentence for a name that is no joint of a robot."""
     return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"
 
 
-def _require_joint(name: str, info: ValidationInfo) -> str:
-    # The context is the robot, which only the loader passes. Without it, `Config` checks the joints later.
-    if info.context is not None and name not in info.context.joints:
-        raise ValueError(unknown_joint(name, info.context))
-    return name
-
-
-Joint = Annotated[str, AfterValidator(_require_joint), WithJsonSchema({"type": "string", "words": "joint"})]
-"""Any URDF may name other joints, so the JSON Schema lists none."""
+Joint = str
+"""Name of a joint; `Config` checks that the robot has it, as any URDF may name other joints."""
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
-LONGEST_NAME = 64
-NAME_WORDS = f"up to {LONGEST_NAME} lower-case letters, digits, - and _, first a letter or digit"
-Name = Annotated[
-    str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=LONGEST_NAME, json_schema_extra={"words": NAME_WORDS})
-]
+Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
 
 
 def _make_text(value: object) -> object:
@@ -76,24 +40,3 @@ def _make_text(value: object) -> object:
 
 NUMBER_AS_TEXT = BeforeValidator(_make_text)
 """Lets a text be a single whole number without quotes, which YAML reads as a number: the core 0, or 90 minutes."""
-
-
-def match(pattern: str, expected: str) -> AfterValidator:
-    """Check that a text matches a regular expression.
-
-    Args:
-        pattern: The regular expression, for the whole text.
-        expected: Description of such a text, for the message.
-    """
-
-    def check(text: str) -> str:
-        if not re.fullmatch(pattern, text, re.ASCII):
-            raise ValueError(f"should be {expected}, got '{text}'")
-        return text
-
-    return AfterValidator(check)
-
-
-def in_words(words: str) -> WithJsonSchema:
-    """Describe a kind of text in the reference and in messages by some words, instead of the word "text"."""
-    return WithJsonSchema({"type": "string", "words": words})

@@ -14,7 +14,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from throwcollect.config.document import Document, Plain
-from throwcollect.config.kinds import complete_body, complete_motions, complete_robot
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.problems import PARAMETERS, Location
 from throwcollect.config.robot_config import AnyRobot, DescribedRobotConfig, RobotConfig
@@ -24,6 +23,7 @@ from throwcollect.config.section import Section
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
 from throwcollect.files import StrPath
+from throwcollect.members import import_own
 
 _PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 # Without quotes, these words are no text: the first three in YAML 1.2, the others for readers of YAML 1.1.
@@ -62,7 +62,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     robot = _find_robot(document, path.parent)
     _find_motions(document, path.parent, robot)
     _find_bodies(document, path.parent)
-    config = document.validate(Config, context=robot)
+    config = document.validate(Config)
     if wrong := [document.problem(*each) for each in _find_sweep_problems(config)]:
         raise ConfigError(wrong)
     with _placing(document):
@@ -107,15 +107,13 @@ def _escape_character(character: str) -> str:
 
 def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Plain]:
     """Find the default of a mapping that is no section, such as ``task.end``; empty if there is no such mapping."""
+    section = values.get(str(location[0]))
+    name = section.get("name") if isinstance(section, dict) else None
     holder: Any = None
-    if len(location) > 1:  # keys of the first level are sections or single values
-        # Other keys may be wrong; then the section alone says what its defaults are.
-        name = _read_name(values, str(location[0]))
-        alone = {} if name is None else {location[0]: {"name": name}}
-        for given in (values, alone):
-            with suppress(ValidationError):
-                holder = Config.model_validate(given, strict=True)
-                break
+    # Keys of the first level are sections or single values. Of a section, its name alone decides what the defaults are.
+    with suppress(ValidationError):
+        if len(location) > 1:
+            holder = Config.model_validate({} if name is None else {location[0]: {"name": name}}, strict=True)
     for part in location:
         holder = getattr(holder, str(part), None)
     return holder if isinstance(holder, dict) else {}
@@ -134,7 +132,7 @@ def _find_robot(document: Document, directory: Path) -> Any:
     if isinstance(section, DescribedRobotConfig):
         section = section.below(directory)
     with _placing(document, "robot"):
-        section = complete_robot(section)
+        section = import_own("throwcollect.robots.described:complete")(section)
     if isinstance(section, DescribedRobotConfig):
         document.values["robot"] = section
     return section.find()
@@ -149,12 +147,12 @@ def _find_motions(document: Document, directory: Path, robot: Any) -> None:
     if not all(isinstance(each, dict) for each in (given, start, end)) or given.get("family") != "file":
         return
     with suppress(ValidationError):
-        section = MotionFile.model_validate(given, strict=True, context=robot)
+        section = MotionFile.model_validate(given, strict=True)
         section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
         keys = {"trajectory": section}
         if section.sha256 is None:
             with _placing(document):
-                keys = complete_motions(section, robot, start, end)
+                keys = import_own("throwcollect.tasks.motions:complete")(section, robot, start, end)
             # Joints that the file does not move start where they do without it.
             default = {} if "start" in task else _find_default(document.values, ("task", "start"))
             keys["start"] = {joint: default[joint] for joint in default if joint in robot.joints} | keys["start"]
@@ -173,7 +171,7 @@ def _find_bodies(document: Document, directory: Path) -> None:
             if isinstance(section, FileBodyConfig):
                 section = section.model_copy(update={"file": str(directory.absolute() / section.file)})
                 with _placing(document, f"scene.bodies.{name}.file"):
-                    bodies[name] = complete_body(section)
+                    bodies[name] = import_own("throwcollect.robots.body_files:complete")(section)
 
 
 def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> RobotConfig:
@@ -197,11 +195,6 @@ class _RobotOnly(Section):
 
 class _BodyOnly(Section):
     body: AnyBody
-
-
-def _read_name(values: dict[str, Any], section: str) -> Any:
-    holder = values.get(section)
-    return holder.get("name") if isinstance(holder, dict) else None
 
 
 def _find_sweep_problems(config: Config) -> Iterator[tuple[Location, str]]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, get_args, get_origin
+from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
-from typing_extensions import get_type_hints, is_typeddict
 
 from throwcollect.config.kinds import ContradictionError
-from throwcollect.config.section import Section, list_kinds
+from throwcollect.config.section import Section
+from throwcollect.config.shape import root
 from throwcollect.wording import find_near, join_names, suggest
 
 _LONGEST_QUOTE = 60
@@ -56,16 +56,9 @@ def unknown_key(name: str, known: Sequence[str]) -> str:
 
 
 def quote(value: Any) -> str:
-    """Show a value in a message as its author would recognise it."""
-    if isinstance(value, str):
-        return repr(value if len(value) <= _LONGEST_QUOTE else value[:_LONGEST_QUOTE] + "…")
-    if isinstance(value, Mapping):
-        return "keys and values" if value else "no keys"
-    if isinstance(value, list):
-        return "a list" if value else "an empty list"
-    if value is None:
-        return "nothing"
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    """Show a value in a message, with its beginning alone if it is long."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 
 def find_problems(error: ValidationError, section: type[Section], values: Any) -> dict[Location, str]:
@@ -105,58 +98,32 @@ def _locate(details: ErrorDetails, values: Any) -> Location:
 def _describe(details: ErrorDetails, location: Location, section: type[Section]) -> Iterator[tuple[Location, str]]:
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
-    if kind == "extra_forbidden":
-        name = str(location[-1])
-        yield location, unknown_key(name, [each for each in _list_keys(section, location[:-1]) if each != name])
-    elif isinstance(cause, ContradictionError):
+    words: Sequence[str] = ()
+    message = details["msg"].replace("Input should", "should", 1).replace("String should", "should", 1)
+    if isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
             # The keys are relative to the section, but only whole ones can be split.
             yield (*location, *split_key(join_key((*location, key)))[len(location) :]), sentence
-    elif cause is not None:
-        yield location, str(cause)
+        return
+    if cause is not None:
+        message = str(cause)
+    elif kind == "extra_forbidden":
+        # A key may be one of another section that is possible there.
+        known = [name for name in root(section).child(*location[:-1]).keys if name != location[-1]]
+        message = unknown_key(str(location[-1]), known)
     elif kind == "missing":
-        yield location, "missing"
+        message = kind
     elif kind == "union_tag_not_found" and isinstance(value, Mapping):
         # The key that chooses between sections takes a word of each.
         tag = next((each for each in ("family", "shape") if each in value), "name")
+        kinds = root(section).child(*location).alternatives
         # Sections of several tasks have the same motions.
-        words = list(dict.fromkeys(word for each in _list_kinds(section, (*location, tag)) for word in get_args(each)))
-        expected = join_names([repr(word) for word in words], "or")
-        yield (*location, tag), _write_expectation(f"should be {expected}", value.get(tag), words)
+        words = list(dict.fromkeys(word for each in kinds for word in each.child(tag).choices))
+        location, value = (*location, tag), value.get(tag)
+        message = f"should be {join_names([repr(word) for word in words], 'or')}, got {quote(value)}"
     elif kind in _NO_KEYS:
-        yield location, f"should be keys and values, got {quote(value)}"
+        message = f"should be keys and values, got {quote(value)}"
     else:
         words = details.get("ctx", {}).get("expected", "").split("'")[1::2] if kind == "literal_error" else []
-        message = details["msg"].replace("Input should", "should", 1)
-        yield location, _write_expectation(message, value, words)
-
-
-def _write_expectation(message: str, value: Any, words: Sequence[str]) -> str:
-    return f"{message}, got {quote(value)}{suggest(value, words) if find_near(value, words) else ''}"
-
-
-def _list_keys(section: type[Section], location: Location) -> list[str]:
-    """List the keys that a section at a location may have."""
-    return list(dict.fromkeys(name for each in _list_kinds(section, location) for name in _list_fields(each)))
-
-
-def _list_kinds(section: type[Section], location: Location) -> list[Any]:
-    """List the types that a value at a location may have."""
-    kinds: list[Any] = [section]
-    for part in location:
-        inner: list[Any] = []
-        for kind in kinds:
-            inner += list_kinds(_list_fields(kind).get(str(part), _find_item(kind)))
-        kinds = inner
-    return kinds
-
-
-def _list_fields(kind: Any) -> dict[str, Any]:
-    """Map the keys of a section or a typed dictionary to the types of their values; empty for any other type."""
-    if isinstance(kind, type) and issubclass(kind, Section):
-        return {name: field.annotation for name, field in kind.model_fields.items()}
-    return get_type_hints(kind, include_extras=True) if is_typeddict(kind) else {}
-
-
-def _find_item(kind: Any) -> Any:
-    return get_args(kind)[-1] if get_origin(kind) in (dict, list) else None
+        message += f", got {quote(value)}"
+    yield location, message + (suggest(value, words) if find_near(value, words) else "")

@@ -10,9 +10,9 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 from typing_extensions import Self
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, Joint, Name, find_robot
+from throwcollect.config.kinds import Angle, Joint, Name
 from throwcollect.config.section import Section, any_of
-from throwcollect.members import names_of
+from throwcollect.members import import_own, names_of
 from throwcollect.wording import suggest
 
 
@@ -62,8 +62,8 @@ class RobotConfig(Section):
         return self
 
     def find(self) -> Any:
-        """Find the robot, a `throwcollect.robots.robot.Robot`."""
-        return find_robot(self)
+        """Find the robot, a `throwcollect.robots.robot.Robot`, which only simulations import when they start."""
+        return import_own("throwcollect.robots.described:find_robot")(self)
 
 
 class ToolPose(Section):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, PositiveFloat
+from pydantic import Field, PositiveFloat
 
-from throwcollect.config.kinds import in_words
 from throwcollect.config.section import Section
 from throwcollect.members import names_of
 
@@ -19,14 +17,7 @@ else:
     RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
-def _check_listen_address(text: str) -> str:
-    found = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9][0-9]{0,4})", text)
-    if found is None or int(found[2]) > 65535:
-        raise ValueError(f"should be tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447, got '{text}'")
-    return text
-
-
-ListenAddress = Annotated[str, AfterValidator(_check_listen_address), in_words("tcp/ADDRESS:PORT")]
+ListenAddress = Annotated[str, Field(pattern=r"^tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):[1-9][0-9]{0,4}$")]
 
 
 class RunConfig(Section):

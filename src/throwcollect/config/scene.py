@@ -10,7 +10,7 @@ from pydantic import Field
 from typing_extensions import Self
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, match
+from throwcollect.config.kinds import Angle
 from throwcollect.config.section import Section, any_of
 
 BALL = "ball"
@@ -19,8 +19,8 @@ BALL = "ball"
 _Length = Annotated[float, Field(ge=0.001, le=20)]
 _Factor = Annotated[float, Field(ge=1e-6, le=1e6)]
 _Triple = Annotated[list[Annotated[float, Field(ge=-20, le=20)]], Field(min_length=3, max_length=3)]
-_Color = Annotated[str, match(r"#[0-9a-fA-F]{6}", "# and six hexadecimal digits, such as #8a6f4d")]
-BodyName = Annotated[str, match(r"[a-z][a-z0-9_]{0,31}", "up to 32 lower-case letters, digits and _, first a letter")]
+_Color = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
+BodyName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 
 
 class BallConfig(Section):
@@ -65,7 +65,7 @@ class BodyConfig(Section):
     """Lever arm with which a surface resists the rolling of a body that moves; it is multiplied with the friction of
     that surface."""
     color: Annotated[_Color, Key(Effect.APPEARANCE, swept=False)] = "#8a6f4d"
-    """Color in pictures."""
+    """Color in pictures: # and six hexadecimal digits."""
 
 
 class BoxConfig(BodyConfig):

@@ -145,7 +145,7 @@ class Config(Section):
     """One collection: from the robot to the dataset."""
 
     name: Annotated[Name, Key(Effect.PLAN)] = "throws"
-    """Name of the collection and of its files."""
+    """Name of the collection and of its files: lower-case letters, digits, - and _."""
     seed: Annotated[int, Field(ge=0, lt=2**32), Key(Effect.PLAN)] = 0
     """Root of all randomness."""
     trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN)] = None
@@ -266,8 +266,11 @@ class Config(Section):
                 init = f"throwcollect init --robot {which}"
                 yield section, f"missing, and the default has joints that {robot.title} lacks; `{init}` writes one"
                 continue
-            for joint in unknown:
-                yield f"{section}.{joint}", unknown_joint(joint, robot)
+            for joint in joints:
+                if joint in unknown:
+                    yield f"{section}.{joint}", unknown_joint(joint, robot)
+                elif section == "task.end" and joint not in self.task.start:
+                    yield f"{section}.{joint}", "start should name this joint, too"
 
     def without_run(self) -> Config:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""

@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache, reduce
 from itertools import pairwise
 from operator import or_
-from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
 from pydantic_core import CoreSchema
@@ -76,17 +75,6 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
         return _make_tag(sections[name]) if isinstance(name, str) and name in sections else None
 
     return Annotated[reduce(or_, [Annotated[kind, Tag(_make_tag(kind))] for kind in kinds]), Discriminator(find_tag)]
-
-
-def list_kinds(kind: Any) -> Iterator[Any]:
-    """List the types that a value of some type may have: those of a union, without their annotations."""
-    if get_origin(kind) is Annotated:
-        yield from list_kinds(get_args(kind)[0])
-    elif get_origin(kind) in (Union, UnionType):
-        for each in get_args(kind):
-            yield from list_kinds(each)
-    else:
-        yield kind
 
 
 def _make_tag(section: type[Section]) -> str:

@@ -1,22 +1,22 @@
-"""What a key may hold, by the JSON Schema of the models, for the reference and for descriptions of parameters."""
+"""What a key may hold, by the JSON Schema of the models: for messages, the reference and descriptions of parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from throwcollect.config.schema import Config
+from throwcollect.config.section import Section
 from throwcollect.units import unit_of_name
 
-_BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+_FACTS = {"minimum": "≥ ", "exclusiveMinimum": "> ", "maximum": "≤ ", "exclusiveMaximum": "< "}
 
 
 @cache
-def json_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a configuration file, for editors."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Config.model_json_schema()}
+def json_schema(section: type[Section]) -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a section or a whole file, for editors."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **section.model_json_schema()}
 
 
 @dataclass(frozen=True)
@@ -25,19 +25,19 @@ class ValueShape:
 
     Attributes:
         node: Part of the JSON Schema, without references.
+        section: The section to whose schema it belongs.
         unit: Unit of the numbers; empty when they have none.
     """
 
     node: dict[str, Any]
+    section: type[Section]
     unit: str = ""
 
     @property
     def alternatives(self) -> list[ValueShape]:
         """The shapes that a union allows; only the shape itself when it is no union."""
         nodes = self.node.get("oneOf") or self.node.get("anyOf")
-        if not nodes:
-            return [self]
-        return [each for node in nodes for each in ValueShape(_resolve(node), self.unit).alternatives]
+        return [each for node in nodes for each in self._make(node, self.unit).alternatives] if nodes else [self]
 
     @property
     def keys(self) -> dict[str, ValueShape]:
@@ -47,11 +47,14 @@ class ValueShape:
     @property
     def choices(self) -> list[str]:
         """The words that are allowed; empty if any text is."""
-        words = [word for shape in self.alternatives for word in _list_words(shape.node)]
-        return list(dict.fromkeys(words))
+        nodes = [shape.node for shape in self.alternatives]
+        return list(dict.fromkeys(word for node in nodes for word in node.get("enum", [node.get("const")]) if word))
 
-    def child(self, part: str | int) -> ValueShape:
-        """Find the shape of the value under a key or an index; it allows anything if there should be no value."""
+    def child(self, *parts: str | int) -> ValueShape:
+        """Find the shape of the value under keys and indices; it allows anything if there should be no value."""
+        if not parts:
+            return self
+        part, *below = parts
         for shape in self.alternatives:
             # A mapping whose keys match a pattern has its values below this pattern.
             values = [*shape.node.get("patternProperties", {}).values(), shape.node.get("additionalProperties")]
@@ -59,61 +62,46 @@ class ValueShape:
             if node := shape.node.get("properties", {}).get(part) or rest:
                 # The numbers of a mapping or a list have the unit of the key that holds it, such as angles by joint.
                 inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
-                return ValueShape(_resolve(node), node.get("unit") or unit_of_name(str(part)) or inherited)
-        return ValueShape({})
+                return self._make(node, node.get("unit") or unit_of_name(str(part)) or inherited).child(*below)
+        return ValueShape({}, self.section)
 
     def __str__(self) -> str:
-        return " or ".join(dict.fromkeys(_describe(shape) for shape in self.alternatives))
+        return " or ".join(dict.fromkeys(shape._describe() for shape in self.alternatives))
+
+    def _make(self, node: dict[str, Any], unit: str) -> ValueShape:
+        if "$ref" in node:
+            # What stands beside a reference belongs to the key, such as its default, and wins.
+            node = {**json_schema(self.section)["$defs"][node["$ref"].rpartition("/")[2]], **node}
+        return ValueShape({key: value for key, value in node.items() if key != "$ref"}, self.section, unit)
+
+    def _describe(self) -> str:
+        if self.choices:
+            return " or ".join(f"'{word}'" for word in self.choices)
+        kind = str(self.node.get("type", "anything"))
+        if kind == "array":
+            return f"list of {self.child(0)}"
+        if kind == "object" and (item := self.child("")).node:
+            return f"mapping to {item}"
+        if kind == "object":
+            required = ", ".join(f"{key}: …" for key in self.node.get("required", ()))
+            return f"{{{required}}}" if required else "keys and values"
+        facts = ", ".join(f"{sign}{self.node[fact]}" for fact, sign in _FACTS.items() if fact in self.node)
+        return " ".join(filter(None, [kind, facts, self.unit if kind in ("number", "integer") else ""]))
 
 
-def root() -> ValueShape:
-    """Make the shape of a whole configuration."""
-    return ValueShape(json_schema())
+def root(section: type[Section] = Config) -> ValueShape:
+    """Make the shape of a section, or of a whole configuration."""
+    return ValueShape(json_schema(section), section)
+
+
+def shape_of(key: str) -> ValueShape:
+    """Find the shape of the value of a dotted key of a configuration, in which an index is a part of its own."""
+    return root().child(*(int(part) if part.isdecimal() else part for part in key.split(".")))
 
 
 def unit_of_key(key: str) -> str:
     """Find the unit of the numbers of a dotted key: the unit of its field, or else the one that the key ends with.
 
-    Args:
-        key: Dotted key, in which an index is a part of its own; a name that is no key is allowed.
+    A name that is no key is allowed.
     """
-    return shape_of([int(part) if part.isdecimal() else part for part in key.split(".")]).unit or unit_of_name(key)
-
-
-def shape_of(parts: Sequence[str | int]) -> ValueShape:
-    """Find the shape of the value of a key of a configuration."""
-    shape = root()
-    for part in parts:
-        shape = shape.child(part)
-    return shape
-
-
-def _resolve(node: dict[str, Any]) -> dict[str, Any]:
-    if "$ref" not in node:
-        return node
-    target = json_schema()["$defs"][node["$ref"].rpartition("/")[2]]
-    # What stands beside a reference belongs to the key, such as its default, and wins.
-    return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
-
-
-def _list_words(node: dict[str, Any]) -> list[str]:
-    return [node["const"]] if "const" in node else list(node.get("enum", []))
-
-
-def _describe(shape: ValueShape) -> str:
-    node = shape.node
-    if own := node.get("words"):
-        return str(own)
-    if words := _list_words(node):
-        return " or ".join(f"'{word}'" for word in words)
-    kind = str(node.get("type", "anything"))
-    if kind == "array":
-        return f"list of {shape.child(0)}"
-    if kind == "object":
-        if required := node.get("required"):
-            return "{" + ", ".join(f"{key}: …" for key in required) + "}"
-        if "properties" in node:
-            return "keys and values"
-        return f"mapping from {node.get('propertyNames', {}).get('words', 'key')} to {shape.child('')}"
-    bounds = ", ".join(f"{sign} {node[bound]}" for bound, sign in _BOUNDS.items() if bound in node)
-    return " ".join(filter(None, [kind, bounds, shape.unit if kind in ("number", "integer") else ""]))
+    return shape_of(key).unit or unit_of_name(key)

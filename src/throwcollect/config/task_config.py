@@ -158,9 +158,6 @@ class TaskConfig(Section):
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if not self.end:
             yield "end", "names no joint, so nothing would move"
-        for joint in self.end:
-            if joint not in self.start:
-                yield f"end.{joint}", "start should name this joint, too"
         if isinstance(self.trajectory, DynamicMovementPrimitive):
             for joint in self.trajectory.weights:
                 if joint not in self.end:

@@ -6,14 +6,15 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import ValidationError
 
 from throwcollect.config.key import Effect, Key, key_of_field, overlay
 from throwcollect.config.problems import Location, find_problems, join_key, read_index, unknown_key
 from throwcollect.config.schema import Config
-from throwcollect.config.section import Section, list_kinds
+from throwcollect.config.section import Section
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.wording import suggest
 
@@ -134,21 +135,17 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
     return None
 
 
-def _find_operator_keys(section: type[Section]) -> Iterator[str]:
-    for name, field in section.model_fields.items():
-        if key_of_field(section, name).operator:
-            yield name
-            continue
-        # Sections of members may have the same key. In a mapping, any name may have such a section.
-        kinds = dict.fromkeys(list_kinds(field.annotation), "")
-        for kind in [each for each in kinds if get_origin(each) is dict]:
-            kinds |= dict.fromkeys(list_kinds(get_args(kind)[1]), "*.")
-        sections = {
-            each: above for each, above in kinds.items() if isinstance(each, type) and issubclass(each, Section)
-        }
-        yield from dict.fromkeys(
-            f"{name}.{above}{key}" for each, above in sections.items() for key in _find_operator_keys(each)
-        )
+def _find_operator_keys(kind: Any) -> Iterator[str]:
+    """List the keys of a section, or of all sections that a type allows; a name in a mapping is ``*``."""
+    if isinstance(kind, type) and issubclass(kind, Section):
+        for name, field in kind.model_fields.items():
+            below = dict.fromkeys(_find_operator_keys(field.annotation))
+            yield from [name] if key_of_field(kind, name).operator else (f"{name}.{key}" for key in below)
+    elif get_origin(kind) is dict:
+        yield from (f"*.{key}" for key in _find_operator_keys(get_args(kind)[1]))
+    elif get_origin(kind) in (Annotated, Union, UnionType):
+        for each in get_args(kind):
+            yield from _find_operator_keys(each)
 
 
 def _list_leaves(value: Any, location: Location, key: Key) -> Iterator[Leaf]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -54,10 +54,6 @@ class Derived:
     offered: int
     without_episode: Mapping[str, int]
     digest: str
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the same as a dictionary, for JSON."""
-        return asdict(self)
 
 
 class Copy(NamedTuple):

@@ -11,18 +11,17 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.arguments import check_bounds, refuse_argument
-from throwcollect.config.kinds import NAME_WORDS, Name
+from throwcollect.config.kinds import Name
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import compute
 from throwcollect.derive.derivation import Derived, count_without_episode, derive
@@ -66,10 +65,6 @@ class Split:
 
     parts: Mapping[str, SplitPart]
     without_episode: Mapping[str, int]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the same as a dictionary, for JSON."""
-        return asdict(self)
 
 
 def split(
@@ -193,7 +188,7 @@ def _read_shares(given: str | Mapping[str, float]) -> dict[str, Fraction]:
         try:
             _NAME.validate_python(name)
         except ValidationError:
-            problem = f"{name!r} should be {NAME_WORDS}"
+            problem = f"{name!r} should be lower-case letters, digits, - and _"
     if problem:
         raise refuse_argument("fractions", f"{problem}, got {given!r}")
     return shares

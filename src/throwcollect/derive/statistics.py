@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import islice
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -83,10 +82,6 @@ class Statistics:
     samples: int
     samples_not_finite: int
     signals: Mapping[str, Mapping[str, SignalStatistics]]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the same as a dictionary, for JSON."""
-        return asdict(self)
 
 
 def statistics(directory: StrPath) -> Statistics:

@@ -196,7 +196,7 @@ class _Search:
             "end": {self._joints[index]: ends[self._joints[index]] for index in sorted(moving)},
             "duration_s": duration_s,
         }
-        return Config.model_validate({**self._keys, "task": task}, context=self._robot)
+        return Config.model_validate({**self._keys, "task": task})
 
     def _name(self, posture: NDArray[np.float64]) -> dict[str, float]:
         return dict(zip(self._joints, np.round(posture, 4).tolist(), strict=True))

@@ -16,7 +16,6 @@ from throwcollect.config.containers import (
     ContainerSpec,
     HostPort,
     Mount,
-    Network,
     NodeContainerConfig,
     Size,
     Variable,
@@ -68,7 +67,7 @@ class ComponentSection(Section):
     """Further environment variables."""
     volumes: list[Mount] = Field(default_factory=list)
     """Directories and files of the host that are mounted into the container; not below /data or /key."""
-    networks: list[Network] = Field(default_factory=list)
+    networks: list[str] = Field(default_factory=list)
     """Networks of the engine that the container joins."""
     ports: dict[ContainerPort, HostPort] = Field(default_factory=dict)
     """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""

@@ -157,7 +157,7 @@ def _describe_motion(robot: str, task: str, **motion: Mapping[str, float]) -> Co
     """Make the configuration of a motion; whatever is not given is the default of the task."""
     tool = load_member("tasks", task).tool
     values = {"name": "throws", "robot": {"name": robot}, "tool": {"name": tool}, "task": {"name": task, **motion}}
-    return Config.model_validate(values, context=find_robot(robot))
+    return Config.model_validate(values)
 
 
 def _find_short_motion(name: str, task: str) -> TaskConfig:

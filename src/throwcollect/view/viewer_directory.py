@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +50,6 @@ class View:
     duration_s: float
     recording_bytes: int
     mesh_bytes: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
-        return {**asdict(self), "recording": str(self.recording), "layout": str(self.layout)}
 
 
 def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> View:

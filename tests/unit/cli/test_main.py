@@ -8,11 +8,10 @@ import subprocess
 import sys
 
 import pytest
-import typer
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.cli.main import assemble, execute
-from throwcollect.errors import ConfigError, NotFoundError, Problem
+from throwcollect.errors import NotFoundError, Problem
 
 
 def describe(error: Exception, capsys: pytest.CaptureFixture[str], *, code: int = 2) -> str:
@@ -27,19 +26,12 @@ def describe(error: Exception, capsys: pytest.CaptureFixture[str], *, code: int 
     return capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("argument", "option"), [("where", "--where"), ("rate_hz", "--rate")])
-def test_an_error_about_an_argument_names_its_command_line_option(
-    argument: str, option: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    error = refuse_argument(argument, "got 'a'", expected="b", hint="c")
-    assert str(error).startswith(f"{argument}: got 'a'")
-    assert describe(error, capsys) == f"throwcollect: {option}: got 'a'\n  expected: b\n  try: c\n"
-
-
-def test_an_error_about_a_configuration_key_names_the_key_unchanged(capsys: pytest.CaptureFixture[str]) -> None:
-    both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed", argument=True)])
-    assert describe(both, capsys) == "throwcollect: task.end: is not there\n--seed: is not there\n"
-    assert describe(ConfigError("no target"), capsys) == "throwcollect: no target\n"
+def test_an_error_about_a_configuration_key_or_an_argument_names_it(capsys: pytest.CaptureFixture[str]) -> None:
+    both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed")])
+    assert describe(both, capsys) == "throwcollect: task.end: is not there\nseed: is not there\n"
+    assert describe(refuse_argument("where", "got 'a'", expected="b", hint="c"), capsys) == (
+        "throwcollect: where: got 'a'\n  expected: b\n  try: c\n"
+    )
 
 
 @pytest.mark.parametrize(
@@ -68,13 +60,10 @@ def test_a_signal_after_the_end_of_a_command_changes_nothing(number: signal.Sign
 
 
 def test_a_command_is_assembled_alone_and_an_unknown_word_gives_all() -> None:
-    def list_names(word: str | None) -> list[str]:
-        app = assemble(word)
-        names = [
-            typer.main.get_command_name(each.callback.__name__) for each in app.registered_commands if each.callback
-        ]
-        return names + [str(each.name) for each in app.registered_groups]
+    def list_names(*words: str) -> list[str]:
+        app = assemble(*words)
+        return [str(each.name) for each in [*app.registered_commands, *app.registered_groups]]
 
     assert [list_names(word) for word in ("join-run", "ros")] == [["join-run"], ["ros"]]
-    assert list_names("nosuch") == list_names(None)
-    assert {"up", "throw", "robot"} < set(list_names(None))
+    assert list_names("nosuch") == list_names()
+    assert {"up", "throw", "robot"} < set(list_names())

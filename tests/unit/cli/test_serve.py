@@ -21,4 +21,4 @@ def test_a_file_in_place_of_a_directory_is_refused(
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
-    assert f"throwcollect: Invalid value for '{option}': dir '{tmp_path}/file' is a file." in capsys.readouterr().err
+    assert f"throwcollect: {option} {tmp_path}/file: should be a directory, is a file" in capsys.readouterr().err

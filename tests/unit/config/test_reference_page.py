@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from tests.with_plugins import run_with_plugins
 
+from throwcollect.config.schema import Config
 from throwcollect.config.shape import json_schema
 
 ROOT = Path(__file__).parents[3]
-MODELS = {"Config": json_schema(), **json_schema()["$defs"]}
+MODELS = {"Config": json_schema(Config), **json_schema(Config)["$defs"]}
 KEYS = [(model, key) for model, schema in MODELS.items() for key in schema["properties"]]
 
 

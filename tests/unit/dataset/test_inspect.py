@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from throwcollect.cli.dataset.info import show_info
+from throwcollect.cli.dataset.info import info as show_info
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.episode.episode_message import header_to_json
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples

@@ -1,5 +1,5 @@
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +64,7 @@ def test_statistics_count_and_leave_out_samples_that_are_not_finite(collection: 
     efforts = np.concatenate([each.effort[np.isfinite(each.effort).all(axis=1), 3] for each in whole])
     signal = found.signals["effort_nm"][TALOS.joints[3]]
     assert (signal.min, signal.max) == (efforts.min(), efforts.max())
-    json.dumps(found.as_dict(), allow_nan=False)
+    json.dumps(asdict(found), allow_nan=False)
 
 
 def test_statistics_of_a_dataset_without_episodes_have_no_signals(collection: Collection, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from plotly.offline import get_plotlyjs
 from tests.unit.report.page_parser import Page
 from typer.testing import CliRunner
 
-from throwcollect.cli.dataset.commands import dataset_app
+from throwcollect.cli.main import assemble
 from throwcollect.dataset.directory import METADATA, PROVENANCE
 from throwcollect.dataset.provenance import read_provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
@@ -172,11 +172,11 @@ def test_a_report_without_plotly_says_what_to_install(
 
 
 def test_the_report_command_writes_beside_the_dataset_and_prints_a_summary(dataset: Path, tmp_path: Path) -> None:
-    printed = CliRunner().invoke(dataset_app, ["report", str(dataset), "--json"])
+    printed = CliRunner().invoke(assemble(), ["dataset", "report", str(dataset), "--json"])
     assert printed.exit_code == 0, printed.output
     page = tmp_path / "dataset.html"
     assert json.loads(printed.output) == {"page": str(page), "size_bytes": page.stat().st_size}
-    named = CliRunner().invoke(dataset_app, ["report", str(dataset), "-o", str(tmp_path / "named.html")])
+    named = CliRunner().invoke(assemble(), ["dataset", "report", str(dataset), "-o", str(tmp_path / "named.html")])
     assert named.exit_code == 0, named.output
     assert (tmp_path / "named.html").read_bytes() == page.read_bytes()
 

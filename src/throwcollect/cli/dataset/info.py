@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json as jsonlib
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
-from throwcollect.cli.printing import print_progress, print_result
+from throwcollect.cli.printing import print_progress, show
 from throwcollect.cli.streams import ensure_written
-from throwcollect.config.policy import SESSION
 from throwcollect.errors import DatasetError
 from throwcollect.extras import MissingExtraError, install_command, require, require_engine
 from throwcollect.side_by_side import count_cores
@@ -24,50 +22,43 @@ if TYPE_CHECKING:
     from throwcollect.dataset.summary import Info, MissSummary
 
 
-def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
+def info(directory: DatasetArgument, *, json: JsonOption = False) -> None:
     """Say what a dataset holds."""
     from throwcollect.dataset.inspect import check_recordings_are_there, summary
     from throwcollect.dataset.reader import Dataset
 
     dataset = Dataset.open(directory)
     found = summary(dataset)
-    print_result(asdict(found), describe(found), json=json)
+    show(found, describe(found), json=json)
     # The summary needs only the tables, so it is printed even if recordings are missing.
     check_recordings_are_there(dataset)
 
 
-def show_digest(directory: DatasetArgument) -> None:
+def digest(directory: DatasetArgument) -> None:
     """Print the digest of all episodes in trial order."""
-    from throwcollect.dataset.inspect import digest
+    from throwcollect.dataset.inspect import digest as compute_digest
 
     print_progress()
-    typer.echo(digest(directory))
+    typer.echo(compute_digest(directory))
 
 
-def verify_dataset(
-    directory: DatasetArgument,
-    replay: Annotated[
-        int | None,
-        typer.Option(
-            "--replay",
-            metavar="N",
-            min=0,
-            help="Simulate N throws again, chosen by the seed; 10 by default, where engine and libraries are the same.",
-        ),
-    ] = None,
-    json: JsonOption = False,
-) -> None:
-    """Check a dataset against itself and against physics; exit code 4 if anything is wrong."""
+def verify(directory: DatasetArgument, *, replay: int | None = None, json: JsonOption = False) -> None:
+    """Check a dataset against itself and against physics; exit code 4 if anything is wrong.
+
+    Options:
+        replay (N 0..): Simulate N throws again, chosen by the seed; 10 by default, where engine and libraries are the
+            same.
+    """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.verify import find_unchecked
-    from throwcollect.replay.audit import verify_dataset as verify
+    from throwcollect.replay.audit import verify_dataset
 
-    findings = verify(directory, replay=replay, processes=count_cores())
+    findings = verify_dataset(directory, replay=replay, processes=count_cores())
     if findings:
-        print_result([asdict(finding) for finding in findings], "\n".join(map(str, findings)), json=json)
+        show(findings, *map(str, findings), json=json)
         raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")
     dataset = Dataset.open(directory)
-    print_result([], f"{directory}: nothing wrong\n{_describe_replay(dataset, replay)}", json=json)
+    show([], f"{directory}: nothing wrong", _describe_replay(dataset, replay), json=json)
     if left_out := find_unchecked(dataset.config):
         typer.echo(f"not checked without the extra collect: {', '.join(left_out)}", err=json)
         typer.echo(f"  try: {install_command('collect')}", err=json)
@@ -75,6 +66,7 @@ def verify_dataset(
 
 def _describe_replay(dataset: Dataset, replay: int | None) -> str:
     """Say how many throws were simulated again in a dataset in which nothing is wrong, and how to simulate more."""
+    from throwcollect.config.policy import SESSION
     from throwcollect.replay.audit import count_replayed
 
     if (policy := dataset.config.task.policy) is not None and policy.use == SESSION:
@@ -103,7 +95,7 @@ def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint:
 
 def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None:
     """Print the summary of a collection, and how to look into its dataset, unless that is in a volume."""
-    print_result(asdict(found), describe(found), json=as_json)
+    show(found, describe(found), json=as_json)
     look = command("dataset", "info", directory) if directory is not None else None
     if look is not None and not as_json:
         typer.echo(f"look into it: {look}   (or open the .mcap files in Foxglove)")

@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
-from throwcollect.cli.printing import print_json
+from throwcollect.cli.printing import align, show
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.wording import format_count
 
 
-def replay_dataset(
+def replay(
     directory: DatasetArgument,
-    trials: Annotated[
-        list[int] | None, typer.Option("--trial", metavar="K", help="Number of a trial; may be repeated.")
-    ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All trials.")] = False,
-    sample: Annotated[
-        int | None, typer.Option("--sample", metavar="N", min=1, help="With --all: N of them, chosen at random.")
-    ] = None,
-    engine: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Simulate them with another engine: how much differs?")
-    ] = None,
+    *,
+    trials: list[int] | None = None,
+    everything: bool = False,
+    sample: int | None = None,
+    engine: str | None = None,
     json: JsonOption = False,
 ) -> None:
-    """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs."""
+    """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs.
+
+    Options:
+        trials (--trial K): Number of a trial; may be repeated.
+        everything (--all): All trials.
+        sample (N 1..): With --all: N of them, chosen at random.
+        engine (NAME): Simulate them with another engine: how much differs?
+    """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.replay.audit import replay_throws, select_trials
 
@@ -48,21 +46,15 @@ def replay_dataset(
     if engine is not None:
         _compare_engines(directory, engine, chosen, json=json)
         return
-    comparisons = []
-    for comparison in replay_throws(directory, chosen):
-        comparisons.append(comparison)
-        if comparison.differences and not json:
-            typer.echo(f"trial {comparison.trial}: {'; '.join(comparison.differences)}")
-    if json:
-        print_json([asdict(comparison) for comparison in comparisons])
-    differ = sum(bool(comparison.differences) for comparison in comparisons)
-    if differ:
+    comparisons = list(replay_throws(directory, chosen))
+    wrong = [f"trial {each.trial}: {'; '.join(each.differences)}" for each in comparisons if each.differences]
+    throws = format_count(len(comparisons), "throw")
+    show(comparisons, *(wrong or [f"{directory}: {throws} replayed, the same bit for bit"]), json=json)
+    if wrong:
         raise DatasetError(
-            f"{directory}: {differ} of {format_count(len(comparisons), 'throw')} came out differently",
+            f"{directory}: {len(wrong)} of {throws} came out differently",
             hint="its README.md says with which processor and versions it was made",
         )
-    if not json:
-        typer.echo(f"{directory}: {format_count(len(comparisons), 'throw')} replayed, the same bit for bit")
 
 
 def _compare_engines(directory: Path, engine: str, trials: Sequence[int], *, json: bool) -> None:
@@ -72,12 +64,8 @@ def _compare_engines(directory: Path, engine: str, trials: Sequence[int], *, jso
     deviations = list(simulate_with(directory, engine, trials))
     found = distributions(deviations)
     differ = sum(each.stored != each.again for each in deviations)
-    if json:
-        print_json({"throws": [asdict(each) for each in deviations], "columns": [asdict(each) for each in found]})
-        return
-    width = max(len(each.column) for each in found)
-    typer.echo(f"{'by ' + engine + ', above stored':{width}}  throws       mean        rms     median    largest")
-    for each in found:
-        numbers = "".join(f"{value:11.3g}" for value in (each.mean, each.rms, each.median, each.largest))
-        typer.echo(f"{each.column:{width}}  {each.throws:6}{numbers}")
-    typer.echo(f"{directory}: {format_count(len(deviations), 'throw')} by {engine}; {differ} with another outcome")
+    columns = ("throws", "mean", "rms", "median", "largest")
+    rows = [(each.column, *(f"{getattr(each, name):.3g}" for name in columns)) for each in found]
+    counts = f"{directory}: {format_count(len(deviations), 'throw')} by {engine}; {differ} with another outcome"
+    lines = [*align([(f"by {engine}, above stored", *columns), *rows], numbers=True), counts]
+    show({"throws": deviations, "columns": found}, *lines, json=json)

@@ -4,77 +4,63 @@ from __future__ import annotations
 
 import re
 import shlex
-from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
-from throwcollect.cli.printing import print_result
+from throwcollect.cli.printing import show
 from throwcollect.errors import ConfigError
 from throwcollect.wording import format_count
 
 
-def export_dataset(
-    directory: DatasetArgument,
-    output: OutputArgument,
-    to: Annotated[
-        str,
-        typer.Option("--to", metavar="FORMAT", help="parquet, npz, lerobot, hdf5, mat, or one of another package."),
-    ],
-    rate: Annotated[
-        int | None, typer.Option("--rate", metavar="HZ", help="Samples per second; as recorded if not given.")
-    ] = None,
-    json: JsonOption = False,
+def export(
+    directory: DatasetArgument, output: OutputArgument, *, to: str, rate: int | None = None, json: JsonOption = False
 ) -> None:
-    """Write a dataset in another format, with a data card."""
-    from throwcollect.export.export import export
+    """Write a dataset in another format, with a data card.
 
-    exported = export(directory, output, to=to, rate_hz=rate)
+    Options:
+        to (FORMAT): parquet, npz, lerobot, hdf5, mat, or one of another package.
+        rate (HZ): Samples per second; as recorded if not given.
+    """
+    from throwcollect.export.export import export as export_dataset
+
+    exported = export_dataset(directory, output, to=to, rate_hz=rate)
     text = (
         f"{exported.directory}: {format_count(exported.episodes, 'throw')} "
         f"of {format_count(exported.trials, 'trial')}, "
         f"{format_count(exported.samples, 'sample')} at {exported.rate_hz} Hz, {exported.size_bytes / 1e6:.1f} MB"
     )
-    print_result(asdict(exported), text, json=json)
+    show(exported, text, json=json)
 
 
-def report_dataset(
-    directory: DatasetArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="HTML file to write; DIR.html beside the dataset if not given."
-        ),
-    ] = None,
-    model: Annotated[
-        Path | None, typer.Option("--model", metavar="MODEL", help="Also show a model of the dataset, and how it hits.")
-    ] = None,
-    json: JsonOption = False,
+def report(
+    directory: DatasetArgument, *, output: Path | None = None, model: Path | None = None, json: JsonOption = False
 ) -> None:
-    """Write a page that shows what a dataset holds."""
+    """Write a page that shows what a dataset holds.
+
+    Options:
+        output (--output -o FILE): HTML file to write; DIR.html beside the dataset if not given.
+        model (MODEL): Also show a model of the dataset, and how it hits.
+    """
     from throwcollect.report.sections import write_report
 
     resolved = directory.resolve()
     page = output or resolved.with_name(f"{resolved.name}.html")
     write_report(directory, page, model=model)
     size = page.stat().st_size
-    print_result({"page": str(page), "size_bytes": size}, f"{page}: {size / 1e6:.1f} MB", json=json)
+    show({"page": page, "size_bytes": size}, f"{page}: {size / 1e6:.1f} MB", json=json)
 
 
-def view_dataset(
-    directory: DatasetArgument,
-    output: OutputArgument,
-    trials: Annotated[
-        str | None, typer.Option("--trials", metavar="3,5,7-9", help="Trials to show; all if not given.")
-    ] = None,
-    json: JsonOption = False,
+def view(
+    directory: DatasetArgument, output: OutputArgument, *, trials: str | None = None, json: JsonOption = False
 ) -> None:
-    """Write throws with frames, meshes, markers and a layout, for Foxglove, Rerun and RViz."""
-    from throwcollect.view.viewer_directory import view
+    """Write throws with frames, meshes, markers and a layout, for Foxglove, Rerun and RViz.
 
-    written = view(directory, output, None if trials is None else read_trials(trials))
+    Options:
+        trials (3,5,7-9): Trials to show; all if not given.
+    """
+    from throwcollect.view.viewer_directory import view as write_view
+
+    written = write_view(directory, output, None if trials is None else read_trials(trials))
     text = (
         f"{written.recording}: {format_count(written.throws, 'throw')}, {written.duration_s:.0f} s, "
         f"{written.recording_bytes / 1e6:.1f} MB; meshes beside it: {written.mesh_bytes / 1e6:.1f} MB\n"
@@ -82,7 +68,7 @@ def view_dataset(
         f"Rerun     ROS_PACKAGE_PATH={shlex.quote(str(output.absolute()))} "
         f"rerun {shlex.quote(str(written.recording))}"
     )
-    print_result(written.as_dict(), text, json=json)
+    show(written, text, json=json)
 
 
 def read_trials(text: str) -> list[int]:
@@ -97,24 +83,21 @@ def read_trials(text: str) -> list[int]:
     return list(dict.fromkeys(chosen))
 
 
-def render_dataset(
-    directory: DatasetArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="Picture to write: .webp or .gif.")],
-    trial: Annotated[
-        int | None,
-        typer.Option("--trial", metavar="K", help="Number of the trial; the first recorded one if not given."),
-    ] = None,
-    slow: Annotated[
-        float, typer.Option("--slow", metavar="FACTOR", min=0.5, max=20, help="How many times slower than it was.")
-    ] = 1.0,
-    json: JsonOption = False,
+def render(
+    directory: DatasetArgument, *, output: Path, trial: int | None = None, slow: float = 1.0, json: JsonOption = False
 ) -> None:
-    """Draw a throw as an animated picture, from what was recorded."""
-    from throwcollect.view.animation import render
+    """Draw a throw as an animated picture, from what was recorded.
 
-    written = render(directory, output, trial=trial, slow=slow)
+    Options:
+        output (-o --output FILE): Picture to write: .webp or .gif.
+        trial (K): Number of the trial; the first recorded one if not given.
+        slow (FACTOR 0.5..20): How many times slower than it was.
+    """
+    from throwcollect.view.animation import render as render_throw
+
+    written = render_throw(directory, output, trial=trial, slow=slow)
     text = (
         f"{written.file}: trial {written.trial}, {written.pictures} pictures, {written.duration_s:.1f} s, "
         f"{written.size_bytes / 1e6:.2f} MB"
     )
-    print_result({**vars(written), "file": str(written.file)}, text, json=json)
+    show(written, text, json=json)

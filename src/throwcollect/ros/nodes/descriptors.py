@@ -34,10 +34,9 @@ def integer_range(low: int | None, high: int | None) -> IntegerRange:
 
 def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDescriptor:
     """Make the descriptor of the parameter that shows a dotted key; the type of its value decides the kind of range."""
-    parts = [int(part) if part.isdecimal() else part for part in key.split(".")]
-    shape = shape_of(parts)
+    shape = shape_of(key)
     descriptor = ParameterDescriptor(
-        description=_find_description(parts), additional_constraints=str(shape), read_only=read_only
+        description=_find_description(key), additional_constraints=str(shape), read_only=read_only
     )
     for option in shape.alternatives:
         node = option.node
@@ -51,9 +50,10 @@ def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDesc
     return descriptor
 
 
-def _find_description(parts: list[str | int]) -> str:
+def _find_description(key: str) -> str:
     """Find the description of a key; keys without one, such as those of single joints, get that of the key above."""
-    for length in range(len(parts), 0, -1):
-        if text := shape_of(parts[:length]).node.get("description"):
+    while key:
+        if text := shape_of(key).node.get("description"):
             return re.sub(r"\s+", " ", text)
+        key = key.rpartition(".")[0]
     return ""

@@ -10,7 +10,6 @@ from docker.client import DockerClient
 from docker.errors import ImageNotFound
 
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
-from throwcollect.config.host_paths import DEVICES, is_allowed_device, refusal
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.ros.router_endpoint import reserve_port
@@ -23,6 +22,7 @@ from throwcollect.runtimes.docker.container_options import (
     section_of,
 )
 from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors
+from throwcollect.runtimes.docker.host_paths import DEVICES, is_allowed_device, refusal
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
 from throwcollect.state_directory import state_directory
 
@@ -55,7 +55,8 @@ def _check(
     client: DockerClient, name: str, sections: Mapping[str, NodeContainerConfig], *, mounts: str = "mounts"
 ) -> str:
     with engine_errors("the Docker engine cannot be asked"):
-        networks = {each["Name"] for each in client.api.networks()}
+        # The network of the host, and none at all, are in the list of every engine.
+        networks = {each["Name"] for each in client.api.networks()} - {"host", "none"}
         root = os.path.realpath(client.api.info()["DockerRootDir"])
         try:
             image_id = str(client.images.get(name).id)
@@ -90,6 +91,8 @@ def _wrong_mount(source: Path, root: str) -> str | None:
     if not source.exists():
         return f"{source} does not exist on this machine"
     real = source.resolve()
+    if real.is_socket():
+        return f"{source} is refused, as it is a socket; mounts are for data"
     kind, _, address = engine_address().partition("://")
     # The keys of all runs lie in the directory of the state.
     more = [root, str(state_directory().resolve()), *([os.path.realpath(address)] if kind == "unix" else [])]

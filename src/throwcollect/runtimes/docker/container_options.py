@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from docker.types import EndpointConfig, LogConfig, Mount, Ulimit
+from docker.types import DeviceRequest, EndpointConfig, LogConfig, Mount, Ulimit
 
 from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
@@ -188,6 +188,8 @@ def container_options(
     """
     general = confine(place, image)
     options: dict[str, Any] = dict(section.options)
+    if "gpus" in options:
+        options["device_requests"] = [DeviceRequest(count=options.pop("gpus"), capabilities=[["gpu"]])]
     chosen = {key: str(value) for key, value in section.environment.items()}
     return {
         **general,

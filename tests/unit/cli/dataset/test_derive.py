@@ -8,13 +8,13 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
-from throwcollect.cli.dataset.commands import dataset_app
+from throwcollect.cli.main import assemble
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.split import assign
 
 
 def run(*arguments: str | Path) -> str:
-    done = CliRunner().invoke(dataset_app, list(map(str, arguments)), catch_exceptions=False)
+    done = CliRunner().invoke(assemble(), ["dataset", *map(str, arguments)], catch_exceptions=False)
     assert done.exit_code == 0, done.output
     return done.output
 
@@ -41,7 +41,7 @@ def test_commands_say_how_many_trials_without_an_episode_were_left_out(source: P
         text,
     )
     run("filter", source, tmp_path / "b", "--where", "trial == 6")
-    merged = CliRunner().invoke(dataset_app, ["merge", *(str(tmp_path / each) for each in "abc"), "--json"])
+    merged = CliRunner().invoke(assemble(), ["dataset", "merge", *(str(tmp_path / each) for each in "abc"), "--json"])
     found = json.loads(merged.stdout)
     assert found.pop("digest")
     assert found == {"directory": str(tmp_path / "c"), "trials": 5, "offered": 5, "without_episode": {}}

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pyarrow as pa
 import pytest
 
-from throwcollect.cli.dataset.replay import replay_dataset
+from throwcollect.cli.dataset.replay import replay
 from throwcollect.dataset import reader
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay import audit
@@ -43,7 +43,7 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_replay_counts_the_throws_that_are_the_same_again(
     chosen: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    replay_dataset(Path("data"), [4, 7, 4], everything=False, sample=None, json=False)
+    replay(Path("data"), trials=[4, 7, 4], everything=False, sample=None, json=False)
     assert chosen == [4, 7]
     assert capsys.readouterr().out == "data: 2 throws replayed, the same bit for bit\n"
 
@@ -52,19 +52,19 @@ def test_a_throw_that_replays_differently_is_an_error_and_its_differences_are_pr
     chosen: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(DatasetError, match="data: 1 of 2 throws came out differently"):
-        replay_dataset(Path("data"), [4, 5], everything=False, sample=None, json=False)
+        replay(Path("data"), trials=[4, 5], everything=False, sample=None, json=False)
     assert capsys.readouterr().out == f"trial 5: {'; '.join(DIFFERENT.differences)}\n"
 
 
 @pytest.mark.usefixtures("chosen")
 def test_replaying_a_trial_that_does_not_exist_is_refused() -> None:
     with pytest.raises(ConfigError, match="data: no trial 20\n  expected: trials from 0 to 19"):
-        replay_dataset(Path("data"), [20], everything=False, sample=None, json=False)
+        replay(Path("data"), trials=[20], everything=False, sample=None, json=False)
 
 
 def test_replay_with_json_prints_every_comparison(chosen: list[int], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(DatasetError, match="1 of 19 throws"):
-        replay_dataset(Path("data"), [], everything=True, sample=None, json=True)
+        replay(Path("data"), trials=[], everything=True, sample=None, json=True)
     found = json.loads(capsys.readouterr().out)
     assert [each["trial"] for each in found] == chosen == [trial for trial in range(20) if trial != 3]
     assert found[4]["differences"] == list(DIFFERENT.differences)
@@ -72,7 +72,7 @@ def test_replay_with_json_prints_every_comparison(chosen: list[int], capsys: pyt
 
 def test_replay_draws_the_same_sample_each_time(chosen: list[int]) -> None:
     for _ in range(2):
-        replay_dataset(Path("data"), [], everything=True, sample=4, json=True)
+        replay(Path("data"), trials=[], everything=True, sample=4, json=True)
     assert len(set(chosen)) == 4
     assert chosen[:4] == chosen[4:] == sorted(chosen[:4])
 
@@ -89,4 +89,4 @@ def test_replay_refuses_options_that_leave_unclear_which_throws_are_meant(
     trials: list[int], everything: bool, sample: int | None, message: str
 ) -> None:
     with pytest.raises(ConfigError, match=message):
-        replay_dataset(Path("data"), trials, everything=everything, sample=sample, json=False)
+        replay(Path("data"), trials=trials, everything=everything, sample=sample, json=False)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.cli.dataset.info import verify_dataset
+from throwcollect.cli.dataset.info import verify
 from throwcollect.errors import DatasetError
 from throwcollect.extras import MissingExtraError
 from throwcollect.replay.audit import Comparison
@@ -45,7 +45,7 @@ def test_verify_replays_the_same_sample_each_time_and_names_the_command_that_rep
 ) -> None:
     monkeypatch.setattr("throwcollect.replay.audit.SAMPLE", 2)
     for _ in range(2):
-        verify_dataset(source, replay=None, json=False)
+        verify(source, replay=None, json=False)
     assert len(replays) == 4
     assert replays[:2] == replays[2:]
     first, second, *_ = capsys.readouterr().out.splitlines()
@@ -59,11 +59,11 @@ def test_without_an_engine_verify_replays_nothing_and_names_the_missing_package(
     source: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("throwcollect.extras.is_installed", lambda package: package != "pybullet")
-    verify_dataset(source, replay=None, json=False)
+    verify(source, replay=None, json=False)
     _, second = capsys.readouterr().out.splitlines()
     assert second.startswith("replayed: 0 of 3 throws (this needs pybullet, which is not installed")
     with pytest.raises(MissingExtraError):
-        verify_dataset(source, replay=3, json=False)
+        verify(source, replay=3, json=False)
 
 
 def test_a_throw_that_replays_differently_is_a_finding_of_verify(
@@ -71,7 +71,7 @@ def test_a_throw_that_replays_differently_is_a_finding_of_verify(
 ) -> None:
     differing.add(1)
     with pytest.raises(DatasetError, match="1 finding"):
-        verify_dataset(source, replay=3, json=True)
+        verify(source, replay=3, json=True)
     assert replays == [0, 1, 2]
     assert json.loads(capsys.readouterr().out) == [
         {"file": "quick_00000.mcap", "place": "trial 1", "problem": "comes out differently: effort: otherwise"}
@@ -83,6 +83,6 @@ def test_verify_reports_a_dataset_that_cannot_be_opened_for_a_replay(
 ) -> None:
     (source / "throws.parquet").unlink()
     with suppress(DatasetError):
-        verify_dataset(source, replay=3, json=False)
+        verify(source, replay=3, json=False)
     assert "throws.parquet: is missing" in capsys.readouterr().out
     assert replays == []

@@ -65,7 +65,7 @@ def test_mounting_the_engine_secrets_or_missing_directories_is_refused(
     monkeypatch.setenv("HOME", str(tmp_path / "homes" / "me"))
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path / "state"))
     homes = ["homes", "homes/me", "homes/me/data"]
-    wanted = ["none", "engine", "engine/volumes", "run", "", *homes, "state/runs", "other"]
+    wanted = ["none", "engine", "engine/volumes", "run", "", *homes, "state/runs", "other", "run/engine.sock"]
     system = f"is refused, as {tmp_path}/{{}} belongs to the system; mounts are for data"
     assert problems(mounts=[f"{tmp_path}/{name}:/x{index}" for index, name in enumerate(wanted)]) == [
         f"mounts.0: {tmp_path}/none does not exist on this machine",
@@ -76,7 +76,12 @@ def test_mounting_the_engine_secrets_or_missing_directories_is_refused(
         f"mounts.5: {tmp_path}/homes is refused, as a home directory holds secrets; mounts are for data",
         f"mounts.6: {tmp_path}/homes/me is refused, as a home directory holds secrets; mounts are for data",
         f"mounts.8: {tmp_path}/state/runs {system.format('state')}",
+        f"mounts.10: {tmp_path}/run/engine.sock is refused, as it is a socket; mounts are for data",
     ]
+
+
+def test_the_network_of_the_host_is_refused(problems: Check) -> None:
+    assert problems(networks=["host"]) == ["networks.0: the Docker engine has no network host; create it first"]
 
 
 def test_a_device_link_to_a_device_that_is_not_allowed_is_refused(

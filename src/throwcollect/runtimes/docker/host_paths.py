@@ -26,30 +26,24 @@ _DEVICE = re.compile(r"/dev/(dri(/.+)?|nvidia[^/]*|nvidia-caps(/.+)?|kfd|dxg)")
 DEVICES = "graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg"
 
 
-def normal_path(text: str) -> str:
-    """Write an absolute path without repeated and trailing slashes."""
-    # `PurePosixPath` itself keeps two slashes at the beginning, which POSIX lets mean something else.
-    return str(PurePosixPath(re.sub("/+", "/", text)))
-
-
 def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
     """Say why a directory or file of the host must not be mounted; None if it may be.
 
     Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets. The
-    path is absolute; `more` are further directories of the system, such as those of the engine.
+    path is absolute and leads through no links; `more` are further directories of the system, such as those of the
+    engine.
     """
-    plain = normal_path(path)
-    if plain in _SHARED:
-        return f"is refused, as all users of the machine share {plain}; mounts are for data"
+    if path in _SHARED:
+        return f"is refused, as all users of the machine share {path}; mounts are for data"
     for place in (*_SYSTEM, *more):
-        if os.path.commonpath([plain, place]) in (plain, place):
+        if os.path.commonpath([path, place]) in (path, place):
             return f"is refused, as {place} belongs to the system; mounts are for data"
-    if _HOME.fullmatch(plain):
+    if _HOME.fullmatch(path):
         return "is refused, as a home directory holds secrets; mounts are for data"
-    hidden = next((part for part in PurePosixPath(plain).parts if part.startswith(".")), None)
+    hidden = next((part for part in PurePosixPath(path).parts if part.startswith(".")), None)
     return None if hidden is None else f"is refused, as {hidden} may hold secrets of programs; mounts are for data"
 
 
 def is_allowed_device(path: str) -> bool:
-    """Whether a device file, or a directory of them, may be handed over to a container."""
-    return _DEVICE.fullmatch(normal_path(path)) is not None and ".." not in path.split("/")
+    """Whether a device file, or a directory of them, may be handed over to a container; the path has no links."""
+    return _DEVICE.fullmatch(path) is not None
