@@ -116,10 +116,8 @@ def place_of(run: str, dataset: Path, key: RunKey, *, volume: str | None = None)
 
 
 @contextmanager
-def collecting(
-    client: DockerClient, directory: Path, *overrides: str, run: str | None = None, found: tuple[str, ...] = ()
-) -> Iterator[Collection]:
-    """Start the nodes of a collection, or take over those of a run; nothing of it is left afterwards."""
+def collecting(client: DockerClient, directory: Path, *overrides: str, run: str | None = None) -> Iterator[Collection]:
+    """Start the nodes of a collection; nothing of it is left afterwards."""
     run = run or new_run()
     config = config_for(directory, *overrides)
     dataset = directory / "dataset"
@@ -128,8 +126,8 @@ def collecting(
     runtime = DockerNodes(place_of(run, dataset, key_in(directory)), config, client=client)
     try:
         with Supervisor(runtime, config.run, roster(runtime, config.run.simulations)) as supervisor:
-            assert sorted(runtime.open()) == sorted(found)
-            supervisor.start(found=found)
+            runtime.open()
+            supervisor.start()
             yield Collection(runtime, supervisor, dataset)
     finally:
         remove(client, run, volumes=True)

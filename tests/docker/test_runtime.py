@@ -267,7 +267,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
     return line
 
 
-@pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused\n"), ("clog", "")])
+@pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused\n"), ("clog", "no answer in time\n")])
 def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     monkeypatch: pytest.MonkeyPatch,
     line: CutLine,
@@ -277,8 +277,8 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.watch.SILENCE_S", 3.0)
-    runtime = bare(through=connect())
+    monkeypatch.setattr("throwcollect.runtimes.docker.containers.SILENCE_S", 3.0)
+    runtime = bare(through=connect(timeout_s=1.0))
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.logs.tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)

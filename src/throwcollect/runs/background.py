@@ -193,9 +193,6 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
             end = datetime.now(timezone.utc)
             opened.update(ended=end, exit_code=error.exit_code, failure=RunFailure.of(error), planning=None)
             raise
-        if prepared.record.run != opened.run:
-            # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
-            opened.forget()
         prepared.collect(interruptions=interruptions)
 
 

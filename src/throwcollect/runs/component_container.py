@@ -62,12 +62,14 @@ def launch_container(
         from throwcollect.runtimes.docker.component import ComponentContainer
 
         joining = None if order.joins is None else _wait_for_router(order.joins, order.spec, interruptions)
-        return ComponentContainer(place, order.component, order.spec, joining, goes_on=_goes_on, warn=onlooker.warn)
+        return ComponentContainer(
+            place, order.component, order.spec, joining, is_running=_is_running, warn=onlooker.warn
+        )
 
     launch_host(run, host, onlooker=onlooker, interruptions=interruptions)
 
 
-def _goes_on(run: str) -> bool:
+def _is_running(run: str) -> bool:
     try:
         return Records().get(run).status == "running"
     except ConfigError:

@@ -38,7 +38,7 @@ def launch(
     onlooker: Onlooker,
     interruptions: Callable[[], int],
 ) -> Summary | None:
-    """Launch a prepared run until its last trial has ended, or go on with a run whose launcher died.
+    """Launch a prepared run until its last trial has ended.
 
     A run that collects no dataset goes on until the user stops it. This function writes the end of the run into its
     record, and closes the run. `interruptions` tells how often the user has asked to stop: the first time, running
@@ -76,8 +76,7 @@ def launch_host(
     try:
         host = make_host(place)
         with hold_lock(place.directory, alone=False):
-            # The nodes and the endpoint in the record may be those of an earlier launcher, and are outdated.
-            run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
+            run.update(launcher=os.getpid())
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
         lost = None if summary is None else explain_loss(summary.outcomes, hint=place.way_on)
@@ -91,8 +90,7 @@ def launch_host(
         code, failure = Interrupted.exit_code, RunFailure("interrupted")
         raise
     finally:
-        # Without a host, nobody has looked for containers of an earlier launcher, so `left` in the record still holds.
-        left = run.record.left if host is None else not host.cleared
+        left = host is not None and not host.cleared
         if left:
             onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
         # The end is written into the record before the lock is released; otherwise the run would look dead in between.
@@ -124,9 +122,6 @@ class _Session:
         self._write(lambda: self._events.run_event(event, **details))
         if event == "stopping":
             self._write(lambda: self._run.update(stopping=True))
-
-    def take_over(self, states: Sequence[NodeState]) -> None:
-        self._states = list(states)
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
         if states != self._states:

@@ -14,17 +14,16 @@ from throwcollect.arguments import check_bounds
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
-from throwcollect.dataset.configuration import read_config, reading_config
+from throwcollect.dataset.configuration import reading_config
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.errors import ConfigError, Problem
+from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Origin, RunRecord
-from throwcollect.runs.run_selection import busy_error, find_left_in
-from throwcollect.runtimes.registry import RuntimeChoice, choose
-from throwcollect.wording import command
+from throwcollect.runs.run_selection import busy_error
+from throwcollect.runtimes.registry import RuntimeChoice, choose, get_runtime
 
 if TYPE_CHECKING:
     # This import takes long, and errors in the configuration need none of it.
@@ -81,8 +80,8 @@ def prepare(
     with load_locating_errors(file, overrides) as read:
         directory = named or _name_directory(read.name)
         records = Records()
-        if (run := _take_over(records, directory, read, onlooker)) is not None:
-            return run
+        if (busy := next((run for run in records.into(directory) if run.status == "running"), None)) is not None:
+            raise busy_error(busy.record)
         request = RunRequest(read, file.parent, directory, started, processes=processes)
         return prepare_run(records, request, onlooker)
 
@@ -130,9 +129,7 @@ def resume(
             finish_without_simulating(read, directory, sweep_directory=sweep_directory, onlooker=onlooker)
             return None
         records = Records()
-        own = None if run is None else run.run
-        if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
-            return left
+        clear(records, directory, onlooker, own=None if run is None else run.run)
         request = RunRequest(
             read,
             sweep_directory,
@@ -180,32 +177,27 @@ def _choose_runtime(request: RunRequest, onlooker: Onlooker) -> RunRequest:
     return replace(request, choice=choice)
 
 
-def _take_over(
-    records: Records, directory: Path, config: Config, onlooker: Onlooker, *, own: str | None = None
-) -> PreparedRun | None:
-    """Take over the run whose containers collect into a directory without a launcher; None if there is no such run.
+def clear(records: Records, directory: Path, onlooker: Onlooker, *, own: str | None = None) -> None:
+    """Refuse a directory into which a run collects, and end containers that do so although their launcher has ended.
 
-    The run keeps its own configuration.
+    The run that this process prepares, whose id is `own`, is left alone.
     """
-    if (left := find_left_in(records, directory, own=own)) is None:
-        return None
-    from throwcollect.coordinator.prepare import make_self_contained
-
-    kept = read_config(left.place.directory)
-    # In a dataset's configuration, `sweep.file` names the copy of the list of trials that lies in the dataset.
-    if kept.without_run() != make_self_contained(config).without_run():
-        raise ConfigError(
-            f"{left.record.directory}: run {left.id} collects into it, with another configuration",
-            hint=f"{command('down', '--run', left.id)} ends that run",
-        )
-    run = records.take(left.id)
-    if run is None:
-        raise busy_error(left.record)
-    # `left` is true from now on: if this launcher dies, too, the containers still exist.
-    run.update(ended=None, exit_code=None, failure=None, left=True)
-    fate = "died" if left.status == "died" else "given up"
-    onlooker.say(f"run {run.run}: its launcher had {fate}; the run goes on with its containers")
-    return PreparedRun(records, run, kept, directory, onlooker=onlooker)
+    for run in records.into(directory):
+        if run.id == own:
+            continue
+        if run.status == "running":
+            raise busy_error(run.record)
+        if run.status == "ended" or not run.record.runtime:
+            continue
+        try:
+            removed = get_runtime(run.record.runtime).remove(run.id, volumes=False)
+        except WorkerError as error:
+            raise WorkerError(
+                f"{directory.absolute()}: containers of run {run.id} may still collect into it: {error.message}",
+                hint=error.hint,
+            ) from error
+        if removed:
+            onlooker.say(f"run {run.id}: its launcher had ended before its containers; they are ended now")
 
 
 def prepare_run(

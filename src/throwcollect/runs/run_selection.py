@@ -1,4 +1,4 @@
-"""Finds the run that a user names, and runs whose nodes still exist although their launcher has died."""
+"""Finds the run that a user names, and checks what can be done with it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from throwcollect.files import StrPath
 from throwcollect.members import names_of
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runtimes.registry import find_runtime, get_runtime
+from throwcollect.runtimes.registry import find_runtime
 from throwcollect.runtimes.runtime import HeldRun
 from throwcollect.wording import command, suggest
 
@@ -64,29 +64,6 @@ def id_of(records: Records, named: StrPath) -> str:
     return matches[0]
 
 
-def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
-    """Find a run that collects, or has collected, into a directory, and whose nodes still exist without a launcher.
-
-    The run that this process prepares, whose id is `own`, is left out.
-    """
-    for run in reversed(records.into(directory)):
-        if run.id == own:
-            continue
-        if run.status == "running":
-            raise busy_error(run.record)
-        if run.status not in ("died", "abandoned"):
-            continue
-        try:
-            if run.record.runtime and get_runtime(run.record.runtime).is_left(run.id):
-                return run
-        except WorkerError as error:
-            raise WorkerError(
-                f"{directory.absolute()}: containers of run {run.id} may still collect into it: {error.message}",
-                hint=error.hint,
-            ) from error
-    return None
-
-
 def busy_error(record: RunRecord) -> ConflictError:
     """The error that a run already collects into the directory."""
     return ConflictError(
@@ -108,7 +85,7 @@ def describe_death(run: Run) -> WorkerError:
     if run.record.kind == "collection" and is_planned:
         what = f"{what}; finished throws are in {run.place.dataset}"
         if again := run.place.way_on:
-            hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
+            hint = f"{again} goes on where it ended; {hint}"
     return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
 
 

@@ -70,7 +70,6 @@ class LocalNodes(NodeHost):
         self.config = config
         self.data = str(place.directory)
         self.logs = NodeLogs(place.logs)
-        self.logs.skip_earlier()
         self._reserved: socket.socket | None = None
         if elsewhere is not None:
             self.listen = self._endpoint = elsewhere

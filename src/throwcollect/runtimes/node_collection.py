@@ -88,10 +88,9 @@ class NodeCollection:
     def run_to_the_end(self) -> Info | None:
         """See `runtime.Host.collect`."""
         with self._supervisor, self._listener:
-            found = self._host.open()
-            self._session.event("adopted" if found else "started", simulations=self._simulations)
-            self._supervisor.start(found=found)
-            self._session.take_over([state for state in self._supervisor.states() if state.name in found])
+            self._host.open()
+            self._session.event("started", simulations=self._simulations)
+            self._supervisor.start()
             end = self._follow()
             if not self._host.place.collects:
                 return None

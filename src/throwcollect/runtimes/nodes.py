@@ -142,13 +142,9 @@ class NodeHost(ABC):
             return None
         return Connection(endpoint, self.place.key, self.config.run.domain_id, self.place.middleware)
 
-    def open(self) -> tuple[str, ...]:
-        """Make everything that the nodes need, such as a network.
-
-        Returns:
-            Names of the nodes of a launcher that died, which run on as nodes of this launcher.
-        """
-        return ()
+    def open(self) -> None:
+        """Make everything that the nodes need, such as a network, and skip what earlier runs have logged."""
+        self.logs.skip_earlier()
 
     def info(self) -> Info:
         """Read the summary of the finished dataset."""

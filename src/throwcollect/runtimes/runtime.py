@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from throwcollect.coordinator.progress import Progress
     from throwcollect.dataset.summary import Info
 
-RunEvent = Literal["started", "adopted", "scaled", "stopping", "finished", "stopped", "failed"]
+RunEvent = Literal["started", "scaled", "stopping", "finished", "stopped", "failed"]
 Status = Literal["starting", "running", "frozen", "restarting", "lost"]
 
 
@@ -150,9 +150,6 @@ class Session(Protocol):
     def event(self, event: RunEvent, *, simulations: int | None = None) -> None:
         """Write an event of the run."""
 
-    def take_over(self, states: Sequence[NodeState]) -> None:
-        """Take over nodes whose events an earlier launcher has written."""
-
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
         """Write the states of the nodes, the endpoint of the router, and how many simulations there are to be."""
 
@@ -244,21 +241,16 @@ class Runtime(ABC):
         """Find the runs of which the runtime holds something; none if it does not answer quickly."""
         return []
 
-    def is_left(self, run: str) -> bool:
-        """Whether the runtime holds nodes of a run whose launcher has ended.
-
-        Raises:
-            WorkerError: If the runtime does not answer in time.
-        """
-        return False
-
     def remove(self, run: str, *, volumes: bool) -> list[str]:
         """Remove everything that the runtime holds of a run, but a volume with its dataset only if `volumes` is true.
+
+        A runtime that has ended holds nothing.
 
         Returns:
             Names of the containers, networks and volumes that were removed.
 
         Raises:
-            WorkerError: If something could not be removed; everything else is removed first.
+            WorkerError: If the runtime does not answer in time, or something could not be removed; everything else is
+                removed first.
         """
         return []

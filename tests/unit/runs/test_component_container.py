@@ -22,8 +22,7 @@ from throwcollect.runs.component_container import ContainerOrder, launch_contain
 from throwcollect.runs.control import down
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Kind, Origin, RunRecord
-from throwcollect.runtimes.docker import component, docker_engine
-from throwcollect.runtimes.docker import watch as docker_watch
+from throwcollect.runtimes.docker import component, containers, docker_engine
 from throwcollect.runtimes.docker.component import find_join_options
 from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
 from throwcollect.state_directory import STATE_VARIABLE
@@ -36,7 +35,7 @@ ORDER = ContainerOrder("ear", SPEC)
 def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
+    monkeypatch.setattr(containers, "_POLL_S", 0.05)
     monkeypatch.setattr(component, "_OVER_S", 0.5)
     with engine_at(tmp_path / "engine.sock") as engine:
         yield engine

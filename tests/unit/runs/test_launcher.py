@@ -13,13 +13,11 @@ from tests.unit.runtimes.docker.engine import Engine, engine_at
 from throwcollect.cli.runs import ps
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
-from throwcollect.errors import DatasetError, WorkerError
+from throwcollect.errors import WorkerError
 from throwcollect.runs.launcher import launch
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runtimes.docker import watch as docker_watch
-from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
-from throwcollect.runtimes.nodes import COORDINATOR
+from throwcollect.runtimes.docker import containers, docker_nodes
 from throwcollect.state_directory import STATE_VARIABLE
 
 CONFIG = Config.model_validate({"containers": {"image": "image"}, "run": {"simulations": 1}})
@@ -45,8 +43,9 @@ class Onlooker:
 def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
-    monkeypatch.setattr(docker_watch, "SILENCE_S", 1.0)
+    monkeypatch.setattr(containers, "_POLL_S", 0.05)
+    monkeypatch.setattr(containers, "SILENCE_S", 1.0)
+    monkeypatch.setattr(docker_nodes, "ANSWER_S", 0.5)
     with engine_at(tmp_path / "engine.sock") as engine:
         yield engine
 
@@ -104,16 +103,3 @@ def test_a_launcher_that_gives_up_says_that_containers_are_left(
     told = capsys.readouterr().out
     assert re.search(rf"{run.run} +docker .* abandoned \d+ s ago, exit code 3", told)
     assert re.search(r"  sim_0 +running +container ", told)
-
-
-def test_a_new_launch_removes_left_containers_after_the_coordinator_finished(engine: Engine, run: OpenRun) -> None:
-    for name in ("router", "sim_0", COORDINATOR):
-        key = engine.create(f"throwcollect-{run.run}-{name}", {RUN_LABEL: run.run, NODE_LABEL: name})
-        engine.answer("POST", f"/containers/{key}/start", {}, None)
-    engine.end(f"throwcollect-{run.run}-{COORDINATOR}", 0)
-    run.update(left=True)
-    # There is no dataset here, which becomes an error once the coordinator has ended well.
-    with pytest.raises(DatasetError, match=r"/data: "):
-        launch_run(run)
-    assert engine.names() == []
-    assert status(run) == "ended"

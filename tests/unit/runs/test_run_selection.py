@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 from tests.unit.runtimes.docker.engine import Engine, engine_at
 
+from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runs.control import down
+from throwcollect.runs.preparation import clear
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunFailure, RunRecord
 from throwcollect.runs.run_selection import (
     find_held_runs,
-    find_left_in,
     find_run_to_change,
     find_run_to_watch,
     require_living,
@@ -158,8 +160,9 @@ def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
 def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:
     make("a", "lives")
     with pytest.raises(ConfigError, match=r"/a: run a-0123 collects into it\n  try: throwcollect wait --run a-0123"):
-        find_left_in(records, tmp_path / "a")
-    assert find_left_in(records, tmp_path / "b") is None
+        clear(records, tmp_path / "a", SILENT)
+    clear(records, tmp_path / "a", SILENT, own="a-0123")
+    clear(records, tmp_path / "b", SILENT)
 
 
 @pytest.fixture
@@ -170,33 +173,22 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
 
 
 @pytest.mark.parametrize(
-    ("fields", "nodes", "left"),
+    ("fields", "ends"),
     [
-        ({"runtime": "docker"}, ["router", "coordinator"], True),
-        ({"runtime": "docker"}, ["sim_0"], True),
-        ({"runtime": "docker"}, [], False),
-        ({"runtime": "local"}, ["coordinator"], False),
-        ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
+        ({"runtime": "docker"}, True),
+        ({"runtime": "local"}, False),
+        ({"runtime": "docker", "ended": NOW}, False),
         # The launcher gave up and could not remove the containers.
-        ({"runtime": "docker", "ended": NOW, "left": True}, ["sim_0"], True),
-        ({"runtime": "docker", "ended": NOW, "left": True}, [], False),
+        ({"runtime": "docker", "ended": NOW, "left": True}, True),
     ],
 )
-def test_a_dead_run_counts_as_left_only_if_containers_of_it_remain(
-    fields: dict[str, object],
-    nodes: list[str],
-    left: bool,
-    records: Records,
-    make: Make,
-    tmp_path: Path,
-    engine: Engine,
+def test_containers_of_a_dead_launcher_are_ended_before_another_run_uses_its_directory(
+    fields: dict[str, object], ends: bool, records: Records, make: Make, tmp_path: Path, engine: Engine
 ) -> None:
-    record = make("a", "died", **fields)
-    for name in nodes:
-        engine.create(f"throwcollect-a-0123-{name}", {RUN_LABEL: "a-0123", NODE_LABEL: name})
-    run = find_left_in(records, tmp_path / "a")
-    assert (run is not None) == left
-    assert run is None or run.record == record
+    make("a", "died", **fields)
+    engine.create("throwcollect-a-0123-sim_0", {RUN_LABEL: "a-0123", NODE_LABEL: "sim_0"})
+    clear(records, tmp_path / "a", SILENT)
+    assert (engine.names() == []) == ends
 
 
 def test_the_directory_of_a_dead_docker_run_is_refused_if_the_engine_is_silent(
@@ -208,7 +200,7 @@ def test_the_directory_of_a_dead_docker_run_is_refused_if_the_engine_is_silent(
     with pytest.raises(
         WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
     ):
-        find_left_in(records, tmp_path / "a")
+        clear(records, tmp_path / "a", SILENT)
 
 
 def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
@@ -216,7 +208,8 @@ def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
 ) -> None:
     make("a", "died", runtime="docker")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    assert find_left_in(records, tmp_path / "a") is None
+    clear(records, tmp_path / "a", SILENT)
+    assert down("a") == ("a-0123", [])
 
 
 def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(

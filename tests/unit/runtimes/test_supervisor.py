@@ -1,6 +1,6 @@
 import math
 import signal
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,10 +127,10 @@ def runtime() -> FakeRuntime:
     return FakeRuntime()
 
 
-def supervise(runtime: FakeRuntime, *, found: Collection[str] = (), simulations: int = 2, **run: int) -> Supervisor:
+def supervise(runtime: FakeRuntime, *, simulations: int = 2, **run: int) -> Supervisor:
     """A supervisor whose simulations are ready."""
     supervisor = Supervisor(runtime, RunConfig(**run), roster(runtime, simulations))
-    supervisor.start(found=found)
+    supervisor.start()
     runtime.logs.ready_ones |= set(SIMULATIONS)
     supervisor.poll()
     return supervisor

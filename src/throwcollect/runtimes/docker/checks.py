@@ -16,8 +16,6 @@ from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runtimes.docker.address import engine_address
 from throwcollect.runtimes.docker.container_options import (
-    RUN_LABEL,
-    RunPlace,
     image,
     mount_source,
     section_of,
@@ -29,18 +27,15 @@ from throwcollect.state_directory import state_directory
 _NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
 
 
-def check(client: DockerClient, place: RunPlace, config: Config) -> str:
+def check(client: DockerClient, config: Config) -> str:
     """Check the image, the mounts, the networks, and the router's port of a run.
 
     Returns:
         Id of the image, which is a SHA-256 of its content.
     """
-    with engine_errors("the Docker engine cannot be asked"):
-        # If a launcher died, its router still occupies the port. This run takes over that router, and its port.
-        begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
     sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
     image_id = _check(client, image(config), sections)
-    if config.run.router_port and not begun:
+    if config.run.router_port:
         # The engine binds the port later; trying it here gives an error that names the key of the configuration.
         reserve_port(config.run).close()
     return image_id

@@ -31,8 +31,6 @@ KEY_LABEL = "throwcollect.key"
 """Marks the volume that holds the key of a run."""
 JOINED_LABEL = "throwcollect.joined"
 """Label with the id of the run that a component's container has joined, and with which it ends."""
-LOG_LABEL = "throwcollect.log-offset"
-"""Size of a node's log file when this container began to write to it [bytes]."""
 
 ROUTER_PORT = 7447
 

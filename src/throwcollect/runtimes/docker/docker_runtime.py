@@ -97,25 +97,18 @@ class DockerRuntime(Runtime):
         except WorkerError:
             return []
 
-    def is_left(self, run: str) -> bool:
-        """Whether the engine holds containers of a run; false if the engine has ended, which ends its containers."""
-        from throwcollect.runtimes.docker.docker_engine import connect, timed_out
-        from throwcollect.runtimes.docker.held_runs import find_held_runs
-
-        try:
-            with closing(connect()) as client:
-                return any(found.nodes for found in find_held_runs(client) if found.run_id == run)
-        except WorkerError as error:
-            if error.__cause__ is None or not timed_out(error.__cause__):
-                return False
-            raise WorkerError(error.message, hint="try again once the Docker engine answers") from error
-
     def remove(self, run: str, *, volumes: bool) -> list[str]:
         """Remove containers, network, key and, if asked for, the dataset's volume; see `Runtime.remove`."""
-        from throwcollect.runtimes.docker.docker_engine import connect
+        from throwcollect.runtimes.docker.docker_engine import connect, timed_out
         from throwcollect.runtimes.docker.held_runs import remove
 
-        with closing(connect()) as client:
+        try:
+            client = connect()
+        except WorkerError as error:
+            if error.__cause__ is None or not timed_out(error.__cause__):
+                return []
+            raise WorkerError(error.message, hint="try again once the Docker engine answers") from error
+        with closing(client):
             return remove(client, run, volumes=volumes)
 
 
