@@ -34,7 +34,7 @@ _COMMANDS = {
     "From a dataset to a throw": "learning:fit learning:aim learning:throw learning:score learning:adapt",
     "Nodes, as `up` starts them": "node_commands:router node_commands:sim node_commands:coordinator "
     "node_commands:health",
-    "": "collect:launch collect:begin",
+    "": "collect:begin",
 }
 """Modules and functions of the commands, by panel of the help; those without a panel are hidden."""
 _GROUPS = {"dataset": "dataset.commands:dataset_app", "ros": "ros.commands:ros_app", "robot": "robot_commands:app"}

@@ -15,16 +15,14 @@ if TYPE_CHECKING:
     from throwcollect.runs.following import wait as wait
     from throwcollect.runs.preparation import prepare as prepare
     from throwcollect.runs.preparation import resume as resume
-    from throwcollect.runs.prepared_run import PreparedRun as PreparedRun
-    from throwcollect.runs.records import Run as Run
+    from throwcollect.runs.run import Run as Run
     from throwcollect.runs.run_record import Summary as Summary
     from throwcollect.runs.run_selection import find as find
 else:
     _PLACES = {
         "Look": "runs.following:Look",
         "Onlooker": "coordinator.onlooker:Onlooker",
-        "PreparedRun": "runs.prepared_run:PreparedRun",
-        "Run": "runs.records:Run",
+        "Run": "runs.run:Run",
         "Summary": "runs.run_record:Summary",
         "down": "runs.control:down",
         "find": "runs.run_selection:find",

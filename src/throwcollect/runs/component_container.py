@@ -14,7 +14,8 @@ from throwcollect.config.containers import ContainerSpec
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
-from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_selection import require_living
 from throwcollect.runtimes.runtime import Host, Place
 
@@ -51,9 +52,7 @@ def check_order(order: ContainerOrder) -> None:
         check_container(client, order.spec, order.component)
 
 
-def launch_container(
-    run: OpenRun, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]
-) -> None:
+def launch_container(run: Run, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run."""
     # `serve` imports this module for `check_order`, and should not wait for the launcher's imports.
     from throwcollect.runs.launcher import launch_host

@@ -10,7 +10,7 @@ from pathlib import Path
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import ConfigError
 from throwcollect.runs.events import EVENTS, Event, parse
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Summary
 from throwcollect.runs.run_selection import describe_death
 from throwcollect.runtimes.node_logs import NodeLogs, Tail

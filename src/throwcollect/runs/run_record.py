@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Literal
 
@@ -131,6 +132,23 @@ class RunRecord:
     planning: Planning | None = None
     recordings: str | None = None
     version: Literal[1] = VERSION
+
+    @classmethod
+    def begin(
+        cls,
+        run: str,
+        name: str,
+        directory: Path,
+        *,
+        logs: Path,
+        runtime: str = "",
+        kind: Kind = "collection",
+        origin: Origin | None = None,
+    ) -> RunRecord:
+        """Make the record of a run for which no runtime is chosen and which this process launches."""
+        now = datetime.now(timezone.utc)
+        place = os.path.realpath(directory)
+        return cls(run, name, runtime, place, None, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
 
     def place(self, key: RunKey) -> Place:
         """The place of the run, which has this key."""

@@ -8,11 +8,9 @@ from pathlib import Path
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import StrPath
-from throwcollect.members import names_of
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runtimes.registry import find_runtime
-from throwcollect.runtimes.runtime import HeldRun
 from throwcollect.wording import command, suggest
 
 
@@ -64,12 +62,16 @@ def id_of(records: Records, named: StrPath) -> str:
     return matches[0]
 
 
-def busy_error(record: RunRecord) -> ConflictError:
-    """The error that a run already collects into the directory."""
-    return ConflictError(
-        f"{record.directory}: run {record.run} collects into it",
-        hint=f"{command('wait', '--run', record.run)} follows it",
-    )
+def refuse_busy(directory: Path, *, own: Run | None = None) -> list[Run]:
+    """Refuse a directory into which a run collects, unless it is `own`; return the runs that have collected into it."""
+    others = [run for run in Records().into(directory) if own is None or run.id != own.id]
+    for run in others:
+        if run.status == "running":
+            raise ConflictError(
+                f"{run.record.directory}: run {run.id} collects into it",
+                hint=f"{command('wait', '--run', run.id)} follows it",
+            )
+    return others
 
 
 def describe_death(run: Run) -> WorkerError:
@@ -117,10 +119,3 @@ def require_simulations(run: Run) -> None:
     """Refuse a run that is a container of the catalogue, as it has no simulations."""
     if run.record.kind == "container":
         raise ConflictError(f"run {run.id}: is a container, and has no simulations")
-
-
-def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
-    """Find all runs of which a runtime holds nodes or a network; by the id of a run, the runtime's name and the run."""
-    # A runtime that cannot be used here, as a package is missing or broken, does not keep others from being asked.
-    usable = {name: runtime for name in names_of("runtimes") if (runtime := find_runtime(name)) is not None}
-    return {held.run_id: (name, held) for name, runtime in usable.items() for held in runtime.find_held()}

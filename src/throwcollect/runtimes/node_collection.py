@@ -17,9 +17,12 @@ from throwcollect.errors import DatasetError, LossError, WorkerError
 from throwcollect.ros import IntegerRange
 from throwcollect.ros.fast_dds import SERVER_REST_S
 from throwcollect.runtimes.nodes import (
+    CONFIGURATION,
     COORDINATOR,
     LAUNCHER,
+    ROBOT_FILES,
     ROUTER,
+    SIMULATIONS,
     NodeExit,
     NodeHost,
     NodeRole,
@@ -33,12 +36,6 @@ from throwcollect.runtimes.runtime import Session, make_interruption_error
 from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.wording import format_count
 
-SIMULATIONS = "simulations"
-"""Name of the launcher's parameter."""
-CONFIGURATION = "configuration"
-"""Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
-ROBOT_FILES = "robot_files"
-"""Name of the launcher's parameter that holds the files of a robot that is not installed, see `pack_robot`."""
 MOST_SIMULATIONS = 256
 
 _POLL_S = 0.05

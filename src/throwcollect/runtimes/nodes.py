@@ -27,6 +27,12 @@ ROUTER = "router"
 COORDINATOR = "coordinator"
 LAUNCHER = "launcher"
 """Name of the launcher's node; the launcher never runs in a container."""
+SIMULATIONS = "simulations"
+"""Name of the launcher's parameter with the number of simulations."""
+CONFIGURATION = "configuration"
+"""Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
+ROBOT_FILES = "robot_files"
+"""Name of the launcher's parameter that holds the files of a robot that is not installed, see `pack_robot`."""
 
 
 _SIMULATION = "sim_"

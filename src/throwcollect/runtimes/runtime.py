@@ -49,36 +49,6 @@ class NodeState:
 
 
 @dataclass(frozen=True)
-class HeldNode:
-    """A node of a run, as its runtime describes it.
-
-    Attributes:
-        status: The runtime's word for the state, such as ``running``, ``paused`` or ``exited``.
-        handle: Id of the node in the runtime.
-    """
-
-    name: str
-    status: str
-    handle: str
-
-
-@dataclass(frozen=True)
-class HeldRun:
-    """A run of which a runtime holds something; any user of the engine may have started it.
-
-    Attributes:
-        source: Absolute path of the dataset's directory, or name of the volume that holds it.
-        version: Version of throwcollect that started the run.
-        nodes: Nodes of the run, sorted by name.
-    """
-
-    run_id: str
-    source: str
-    version: str
-    nodes: tuple[HeldNode, ...]
-
-
-@dataclass(frozen=True)
 class Place:
     """The directories of a run on this machine, and how its nodes communicate.
 
@@ -236,10 +206,6 @@ class Runtime(ABC):
     def simulations(self, config: Config) -> int:
         """Number of simulations with which a run begins."""
         return config.run.simulations
-
-    def find_held(self) -> list[HeldRun]:
-        """Find the runs of which the runtime holds something; none if it does not answer quickly."""
-        return []
 
     def remove(self, run: str, *, volumes: bool) -> list[str]:
         """Remove everything that the runtime holds of a run, but a volume with its dataset only if `volumes` is true.

@@ -22,7 +22,8 @@ from throwcollect.dataset.journal import read_commits
 from throwcollect.dataset.manifest import read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe
 from throwcollect.sweep.parquet_file import read_parquet

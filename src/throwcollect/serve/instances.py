@@ -24,7 +24,8 @@ from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component

@@ -19,7 +19,8 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, DatasetError, NotFoundError, ThrowcollectError, WorkerError
 from throwcollect.runs.control import set_parameter
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.serve.state import simulations_of
 
 _PARAMETER = "sim.real_time_factor"

@@ -10,7 +10,7 @@ from pathlib import Path
 from throwcollect.coordinator.resume import is_complete
 from throwcollect.dataset.directory import CONFIG, METADATA
 from throwcollect.errors import ConflictError
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 from throwcollect.wording import command
 
 

@@ -20,7 +20,8 @@ from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.runs.component_container import DESCRIPTION
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 
 _MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
 """URL of a mesh in a description: its package, and its path in that package."""

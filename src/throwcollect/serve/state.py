@@ -13,7 +13,8 @@ from pydantic.dataclasses import dataclass
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Kind, Planning
 from throwcollect.runtimes.nodes import is_simulation
 from throwcollect.runtimes.runtime import NodeState

@@ -23,7 +23,7 @@ from throwcollect.ros import Node
 from throwcollect.ros.msg import UInt8MultiArray
 from throwcollect.ros.nodes.coordinator.showing import SHOWN_QOS, make_shown_topic
 from throwcollect.run_key import Signer
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.serve.state import simulations_of
 from throwcollect.sweep.plan import Plan

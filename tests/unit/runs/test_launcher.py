@@ -15,7 +15,8 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import WorkerError
 from throwcollect.runs.launcher import launch
-from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.runtimes.docker import containers, docker_nodes
 from throwcollect.state_directory import STATE_VARIABLE
@@ -51,12 +52,12 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
 
 
 @pytest.fixture
-def run(engine: Engine, tmp_path: Path) -> OpenRun:
+def run(engine: Engine, tmp_path: Path) -> Run:
     for name in ("logs", "data"):
         (tmp_path / name).mkdir()
     run = Records().new("throws")
     record = RunRecord(
-        run=run.run,
+        run=run.id,
         name="throws",
         runtime="docker",
         directory=str(tmp_path / "data"),
@@ -71,20 +72,20 @@ def run(engine: Engine, tmp_path: Path) -> OpenRun:
     return run
 
 
-def launch_run(run: OpenRun, each_look: Callable[[], None] = lambda: None, *, onlooker: Onlooker | None = None) -> None:
+def launch_run(run: Run, each_look: Callable[[], None] = lambda: None, *, onlooker: Onlooker | None = None) -> None:
     def interruptions() -> int:
         each_look()
         return 0
 
-    launch(run, CONFIG, onlooker=onlooker or Onlooker(), interruptions=interruptions)
+    launch(run, interruptions, config=CONFIG, onlooker=onlooker or Onlooker())
 
 
-def status(run: OpenRun) -> str:
-    return Records().get(run.run).status
+def status(run: Run) -> str:
+    return Records().get(run.id).status
 
 
 def test_a_launcher_that_gives_up_says_that_containers_are_left(
-    engine: Engine, run: OpenRun, capsys: pytest.CaptureFixture[str]
+    engine: Engine, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     onlooker = Onlooker()
 
@@ -95,11 +96,11 @@ def test_a_launcher_that_gives_up_says_that_containers_are_left(
     with pytest.raises(WorkerError, match=r"the Docker engine has not answered for [12] s"):
         launch_run(run, silence, onlooker=onlooker)
     assert onlooker.warnings == [
-        f"containers of this run may be left: throwcollect down --run {run.run} ends them",
+        f"containers of this run may be left: throwcollect down --run {run.id} ends them",
     ]
     engine.answer_all()
     assert status(run) == "abandoned"
     ps(everything=False, json=False)
     told = capsys.readouterr().out
-    assert re.search(rf"{run.run} +docker .* abandoned \d+ s ago, exit code 3", told)
-    assert re.search(r"  sim_0 +running +container ", told)
+    assert re.search(rf"{run.id} +docker .* abandoned \d+ s ago, exit code 3", told)
+    assert re.search(r"  sim_0 +starting +container ", told)

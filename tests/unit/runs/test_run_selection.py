@@ -8,13 +8,13 @@ import pytest
 from tests.unit.runtimes.docker.engine import Engine, engine_at
 
 from throwcollect.coordinator.onlooker import SILENT
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, NotFoundError, ThrowcollectError, WorkerError
 from throwcollect.runs.control import down
-from throwcollect.runs.preparation import clear
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.preparation import end_left
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunFailure, RunRecord
 from throwcollect.runs.run_selection import (
-    find_held_runs,
     find_run_to_change,
     find_run_to_watch,
     require_living,
@@ -54,7 +54,7 @@ def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
             "simulations": 2,
             "ended": NOW if status == "ended" else None,
         }
-        run.write(RunRecord(run=run.run, **{**values, **fields}))  # type: ignore[arg-type]
+        run.write(RunRecord(run=run.id, **{**values, **fields}))  # type: ignore[arg-type]
         if status == "lives":
             held.callback(run.close)
         else:
@@ -160,9 +160,9 @@ def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
 def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:
     make("a", "lives")
     with pytest.raises(ConfigError, match=r"/a: run a-0123 collects into it\n  try: throwcollect wait --run a-0123"):
-        clear(records, tmp_path / "a", SILENT)
-    clear(records, tmp_path / "a", SILENT, own="a-0123")
-    clear(records, tmp_path / "b", SILENT)
+        end_left(tmp_path / "a", SILENT)
+    end_left(tmp_path / "a", SILENT, own=records.get("a-0123"))
+    end_left(tmp_path / "b", SILENT)
 
 
 @pytest.fixture
@@ -187,7 +187,7 @@ def test_containers_of_a_dead_launcher_are_ended_before_another_run_uses_its_dir
 ) -> None:
     make("a", "died", **fields)
     engine.create("throwcollect-a-0123-sim_0", {RUN_LABEL: "a-0123", NODE_LABEL: "sim_0"})
-    clear(records, tmp_path / "a", SILENT)
+    end_left(tmp_path / "a", SILENT)
     assert (engine.names() == []) == ends
 
 
@@ -200,7 +200,7 @@ def test_the_directory_of_a_dead_docker_run_is_refused_if_the_engine_is_silent(
     with pytest.raises(
         WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
     ):
-        clear(records, tmp_path / "a", SILENT)
+        end_left(tmp_path / "a", SILENT)
 
 
 def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
@@ -208,7 +208,7 @@ def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
 ) -> None:
     make("a", "died", runtime="docker")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    clear(records, tmp_path / "a", SILENT)
+    end_left(tmp_path / "a", SILENT)
     assert down("a") == ("a-0123", [])
 
 
@@ -223,6 +223,9 @@ def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
     assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
 
 
-def test_without_a_docker_engine_no_held_runs_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    assert find_held_runs() == {}
+def test_containers_of_a_run_without_a_record_are_removed_by_its_id(records: Records, engine: Engine) -> None:
+    engine.create("throwcollect-b-4567-sim_0", {RUN_LABEL: "b-4567", NODE_LABEL: "sim_0"})
+    with pytest.raises(NotFoundError, match="no run 'b'"):
+        down("b")
+    assert down("b-4567") == ("b-4567", ["throwcollect-b-4567-sim_0"])
+    assert engine.names() == []

@@ -61,7 +61,6 @@ def test_a_runtime_describes_itself_and_holds_nothing_of_an_unknown_run(
     member = get_runtime(name)
     assert member.in_words(Config())
     assert member.simulations(Config()) in (1, Config().run.simulations)
-    assert member.find_held() == []
     assert member.outlives_launcher == (name == "docker")
 
 

@@ -12,7 +12,8 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, make_end_fields
 
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 
 URL = "/api/v1/collections"
 

@@ -22,9 +22,10 @@ from throwcollect.runtimes.docker.container_options import (
     ROUTER_PORT,
     RunPlace,
     container_options,
+    key_mount,
 )
 from throwcollect.runtimes.docker.containers import ANSWER_S, Containers
-from throwcollect.runtimes.docker.docker_engine import connect, find_other_machine
+from throwcollect.runtimes.docker.docker_engine import connect
 from throwcollect.runtimes.docker.docker_nodes import describe_container_end
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
@@ -61,20 +62,16 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
             f"run {run}: is on Fast DDS, which containers of the catalogue cannot join",
             hint="run.ros: embedded, or RMW_IMPLEMENTATION=rmw_zenoh_cpp for rclpy",
         )
+    key = key_mount(connection.key)
     if runtime == "docker":
-        place = RunPlace(run, "")
         endpoint = f"{connection.endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}"
-        return JoinOptions(run, _environment(connection, endpoint), place.key_mount(read_only=True), place.network)
-    if (other := find_other_machine()) is not None:
-        problem = f"run {run}: its nodes are processes of this machine, which containers on {other} cannot reach"
-        raise ConfigError(problem)
+        return JoinOptions(run, _environment(connection, endpoint), key, RunPlace(run, "").network)
     if spec.section.ports or spec.section.networks:
         raise ConfigError(
             f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",
             expected="a component without ports and networks",
             hint="leave them out in the catalogue, or have the run in containers: run.runtime: docker",
         )
-    key = Mount(target=str(KEY.directory), source=str(connection.key.directory), type="bind", read_only=True)
     return JoinOptions(run, _environment(connection, connection.endpoint), key, None)
 
 

@@ -27,8 +27,6 @@ RUN_LABEL = "throwcollect.run"
 NODE_LABEL = "throwcollect.node"
 DIRECTORY_LABEL = "throwcollect.directory"
 VERSION_LABEL = "throwcollect.version"
-KEY_LABEL = "throwcollect.key"
-"""Marks the volume that holds the key of a run."""
 JOINED_LABEL = "throwcollect.joined"
 """Label with the id of the run that a component's container has joined, and with which it ends."""
 
@@ -69,11 +67,6 @@ class RunPlace:
         """Name of the run's network."""
         return f"throwcollect-{self.run_id}"
 
-    @property
-    def key_volume(self) -> str:
-        """Name of the volume that holds the run's key."""
-        return f"throwcollect-{self.run_id}-key"
-
     def container(self, node: str) -> str:
         """Name of a node's container."""
         return f"throwcollect-{self.run_id}-{node}"
@@ -88,9 +81,10 @@ class RunPlace:
         kind = "volume" if self.in_volume else "bind"
         return Mount(target=DATA, source=self.source, type=kind, read_only=read_only)
 
-    def key_mount(self, *, read_only: bool) -> Mount:
-        """The mount of the volume with the run's key."""
-        return Mount(target=str(KEY.directory), source=self.key_volume, type="volume", read_only=read_only)
+
+def key_mount(key: RunKey) -> Mount:
+    """The mount of the directory of a key, whose files only their owner can read."""
+    return Mount(target=str(KEY.directory), source=str(key.directory), type="bind", read_only=True)
 
 
 def router_endpoint(config: Config, middleware: Middleware) -> str:
@@ -139,6 +133,7 @@ def node_options(
     place: RunPlace,
     config: Config,
     middleware: Middleware,
+    key: RunKey,
     image_id: str,
     address: str | None = None,
 ) -> dict[str, Any]:
@@ -156,7 +151,7 @@ def node_options(
         DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
         "THROWCOLLECT_NODE": node.name,
     }
-    mounts = [place.key_mount(read_only=True)]
+    mounts = [key_mount(key)]
     if node.name != ROUTER:
         mounts.append(place.mount(read_only=node.name != COORDINATOR))
     options = container_options(place, image(config), node.name, section, environment=own, mounts=mounts)

@@ -18,7 +18,7 @@ from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
 from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL, RunPlace
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, in_words
-from throwcollect.runtimes.docker.held_runs import remove
+from throwcollect.runtimes.docker.removal import remove
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from ipaddress import ip_network
 
@@ -27,7 +26,7 @@ from throwcollect.runtimes.docker.container_options import (
 )
 from throwcollect.runtimes.docker.containers import ANSWER_S, Containers, ContainerState
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
-from throwcollect.runtimes.docker.volume import dataset_info, place_directory, place_key
+from throwcollect.runtimes.docker.volume import dataset_info, place_directory
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
 from throwcollect.runtimes.runtime import Place, Session
@@ -90,11 +89,7 @@ class DockerNodes(NodeHost):
                     self._client.volumes.get(place.source)
                 except NotFound:
                     self._client.volumes.create(place.source, labels=place.labels())
-            # Both steps wait for the engine, so they are done side by side.
-            with ThreadPoolExecutor(1) as pool:
-                placing = pool.submit(place_key, self._client, place, self.config, self.place.key)
-                self._create_network()
-                placing.result()
+            self._create_network()
         super().open()
         self._containers.open()
         if place.in_volume:
@@ -146,6 +141,7 @@ class DockerNodes(NodeHost):
             place=self._place,
             config=self.config,
             middleware=self.place.middleware,
+            key=self.place.key,
             image_id=self._image_id,
             address=self._address_of(node),
         )

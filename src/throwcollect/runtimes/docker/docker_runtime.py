@@ -1,4 +1,4 @@
-"""The runtime ``docker``: whether an engine can be used, and which runs it holds.
+"""The runtime ``docker``: whether an engine can be used, and the end of everything that it holds of a run.
 
 The client of the engine is imported only when it is needed, because most commands only ask whether there is an engine.
 """
@@ -13,7 +13,7 @@ from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket
-from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
+from throwcollect.runtimes.runtime import Check, Place, Runtime
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 _PROBE_S = 3.0
 """With ``run.runtime: auto``, an engine that takes longer to answer is not used."""
-_LOOK_S = 2.0
 
 
 class DockerRuntime(Runtime):
@@ -54,7 +53,6 @@ class DockerRuntime(Runtime):
 
         name, patience_s = image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
         with closing(docker.connect(timeout_s=patience_s)) as client:
-            _refuse_other_machine()
             docker.ensure(client, name, say=say)
             if docker.is_outdated(client, name):
                 finding = f"the image {name} was made from other sources than these"
@@ -71,7 +69,6 @@ class DockerRuntime(Runtime):
         tag = docker.default_tag()
         try:
             with closing(docker.connect(timeout_s=_PROBE_S)) as client, docker.engine_errors("the Docker engine fails"):
-                _refuse_other_machine()
                 engine = client.version()["Version"]
                 found = f"Docker {engine} answers at {engine_address()}"
                 if not docker.is_there(client, tag):
@@ -84,23 +81,12 @@ class DockerRuntime(Runtime):
             return Check("docker", "note", f"{error.message}; runs use processes")
         return Check("docker", "ok", f"{found}, with the image {tag}")
 
-    def find_held(self) -> list[HeldRun]:
-        """See `Runtime.find_held`; none if there is no client, or the engine does not answer quickly."""
-        if not (is_installed("docker") and has_socket()):
-            return []
-        from throwcollect.runtimes.docker.docker_engine import connect
-        from throwcollect.runtimes.docker.held_runs import find_held_runs
-
-        try:
-            with closing(connect(timeout_s=_LOOK_S)) as client:
-                return find_held_runs(client)
-        except WorkerError:
-            return []
-
     def remove(self, run: str, *, volumes: bool) -> list[str]:
         """Remove containers, network, key and, if asked for, the dataset's volume; see `Runtime.remove`."""
+        if not (is_installed("docker") and has_socket()):
+            return []
         from throwcollect.runtimes.docker.docker_engine import connect, timed_out
-        from throwcollect.runtimes.docker.held_runs import remove
+        from throwcollect.runtimes.docker.removal import remove
 
         try:
             client = connect()
@@ -110,17 +96,6 @@ class DockerRuntime(Runtime):
             raise WorkerError(error.message, hint="try again once the Docker engine answers") from error
         with closing(client):
             return remove(client, run, volumes=volumes)
-
-
-def _refuse_other_machine() -> None:
-    """Refuse an engine of another machine."""
-    from throwcollect.runtimes.docker.docker_engine import find_other_machine
-
-    if (other := find_other_machine()) is not None:
-        raise WorkerError(
-            f"the Docker engine at {engine_address()} is on another machine, {other}, without directories of this one",
-            hint=f"run throwcollect on {other}, or use processes: --runtime local",
-        )
 
 
 def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:

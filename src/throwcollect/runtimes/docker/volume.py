@@ -1,8 +1,7 @@
-"""Copies datasets and keys into volumes of the engine, and reads the summary of a dataset in a volume."""
+"""Copies datasets into volumes of the engine, and reads the summary of a dataset in a volume."""
 
 from __future__ import annotations
 
-import io
 import os
 import tarfile
 import tempfile
@@ -18,8 +17,7 @@ from pydantic import TypeAdapter
 from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
-from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.container_options import DATA, KEY, KEY_LABEL, RunPlace, confine, image
+from throwcollect.runtimes.docker.container_options import DATA, RunPlace, confine, image
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, engine_errors
 
 _IN_MEMORY = 16 * 1024**2
@@ -39,25 +37,6 @@ def place_directory(client: DockerClient, place: RunPlace, config: Config, direc
             archive.add(directory, arcname=place.run_id, filter=_give_to_caller)
         packed.seek(0)
         container.put_archive(DATA, packed)
-
-
-def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey) -> None:
-    """Make the volume with the run's key, whose files only this user can read there.
-
-    The key is copied as files, so that it appears neither on a command line nor in the engine's description of
-    containers.
-    """
-    key.check()
-    with engine_errors(f"the key of run {place.run_id} cannot be copied into the volume {place.key_volume}"):
-        client.volumes.create(place.key_volume, labels={**place.labels(), KEY_LABEL: ""})
-        packed = io.BytesIO()
-        with tarfile.open(fileobj=packed, mode="w") as archive:
-            for path in (key.certificate, key.private_key):
-                archive.add(path, arcname=path.name, filter=_let_caller_read)
-        with _make_single_container(
-            client, place, config, ["--version"], place.key_mount(read_only=False)
-        ) as container:
-            container.put_archive(str(KEY.directory), packed.getvalue())
 
 
 def dataset_info(client: DockerClient, place: RunPlace, config: Config) -> Info:
@@ -80,11 +59,6 @@ def _give_to_caller(member: tarfile.TarInfo) -> tarfile.TarInfo:
     member.uid, member.gid = os.getuid(), os.getgid()
     member.uname = member.gname = ""
     return member
-
-
-def _let_caller_read(member: tarfile.TarInfo) -> tarfile.TarInfo:
-    member.mode = 0o400
-    return _give_to_caller(member)
 
 
 @contextmanager

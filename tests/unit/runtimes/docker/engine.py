@@ -84,7 +84,15 @@ class Engine:
                 name = query.get("name", ["without-name"])[0]
                 return 201, {"Id": self.create(name, body["Labels"]), "Warnings": []}
             case "GET", "containers", "json":
-                return 200, [self._list_entry(each) for each in self.containers.values()]
+                wanted = [label.split("=") for label in json.loads(query.get("filters", ["{}"])[0]).get("label", [])]
+                return 200, [
+                    self._list_entry(each)
+                    for each in self.containers.values()
+                    if all(
+                        each["Config"]["Labels"].get(key) in (value or [each["Config"]["Labels"].get(key)])
+                        for key, *value in wanted
+                    )
+                ]
             case _, "containers", key, *action:
                 return self._on_container(method, key, action)
         return 404, {"message": f"no {method} {path}"}

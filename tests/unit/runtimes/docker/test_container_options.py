@@ -9,11 +9,13 @@ import throwcollect
 from rclzenoh.session_config import client_override
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.container_options import RunPlace, image, mount_source, node_options, publishes_port
 from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import NodeRole, NodeSpec
 
 DIRECTORY = RunPlace("throws-1a2b", "/home/me/data set")
+KEY = RunKey(Path("/state/key"))
 VOLUME = RunPlace("throws-1a2b", "datasets")
 
 
@@ -22,7 +24,7 @@ def options(
 ) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
     node = NodeSpec(name, ("command", "--option"), NodeRole.EXPENDABLE, core)
-    return node_options(node, place=place, config=config, middleware=Middleware(), image_id="sha256:12ab")
+    return node_options(node, place=place, config=config, middleware=Middleware(), key=KEY, image_id="sha256:12ab")
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])
@@ -73,7 +75,7 @@ def test_every_node_gets_the_key_of_the_run_in_a_read_only_mount() -> None:
     for name in ("router", "sim_0", "coordinator"):
         made = options(name)
         mount = made["mounts"][0]
-        assert (mount["Type"], mount["Source"]) == ("volume", "throwcollect-throws-1a2b-key")
+        assert (mount["Type"], mount["Source"]) == ("bind", "/state/key")
         assert (mount["Target"], mount["ReadOnly"]) == ("/key", True)
         assert made["environment"]["THROWCOLLECT_KEY"] == "/key"
         assert 'connect_private_key="/key/key.pem"' in made["environment"]["ZENOH_CONFIG_OVERRIDE"]

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 import requests
 from docker.errors import APIError, DockerException
-from urllib3.exceptions import ReadTimeoutError
+from urllib3.exceptions import ProtocolError, ReadTimeoutError
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.docker_engine import connect, engine_errors, in_words
@@ -18,7 +18,7 @@ def api_error(explanation: str) -> APIError:
     [
         (api_error("port is already allocated"), "port is already allocated"),
         (
-            requests.ConnectionError("Connection aborted.", ConnectionRefusedError(111, "Connection refused")),
+            requests.ConnectionError(ProtocolError("Aborted.", ConnectionRefusedError(111, "Connection refused"))),
             "Connection refused",
         ),
         (DockerException("something else"), "something else"),

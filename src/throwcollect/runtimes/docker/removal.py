@@ -1,4 +1,4 @@
-"""Finds the runs of which an engine holds containers or networks, and removes everything that is left of a run."""
+"""Removes everything that an engine holds of a run."""
 
 from __future__ import annotations
 
@@ -11,48 +11,17 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.container_options import (
-    DIRECTORY_LABEL,
-    JOINED_LABEL,
-    KEY_LABEL,
-    NODE_LABEL,
-    RUN_LABEL,
-    VERSION_LABEL,
-)
+from throwcollect.runtimes.docker.container_options import JOINED_LABEL, RUN_LABEL
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, engine_errors, in_words
-from throwcollect.runtimes.runtime import HeldNode, HeldRun
 
 _GRACE_S = 3
 _AT_ONCE = 8
 
 
-def find_held_runs(client: DockerClient) -> list[HeldRun]:
-    """Find all runs of which an engine holds containers or a network, sorted by id."""
-    filters = {"label": RUN_LABEL}
-    with engine_errors("the Docker engine does not say what it holds"):
-        containers = client.api.containers(all=True, filters=filters)
-        networks = client.api.networks(filters=filters)
-    labels = {thing["Labels"][RUN_LABEL]: thing["Labels"] for thing in (*networks, *containers)}
-    nodes: dict[str, list[HeldNode]] = {}
-    for container in containers:
-        if name := container["Labels"].get(NODE_LABEL):
-            node = HeldNode(name, container["State"], container["Id"][:12])
-            nodes.setdefault(container["Labels"][RUN_LABEL], []).append(node)
-    return [
-        HeldRun(
-            run_id,
-            labels[run_id].get(DIRECTORY_LABEL, ""),
-            labels[run_id].get(VERSION_LABEL, ""),
-            tuple(sorted(nodes.get(run_id, []), key=lambda node: node.name)),
-        )
-        for run_id in sorted(labels)
-    ]
-
-
 def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
-    """Remove everything that an engine holds of a run, its key included, but the volume only if `volumes` is true.
+    """Remove everything that an engine holds of a run, but the volume with its dataset only if `volumes` is true.
 
-    Containers that have joined the run are ended, too, because its network and its key cannot be removed before.
+    Containers that have joined the run are ended, too, because its network cannot be removed before.
 
     Returns:
         Names of the containers, networks and volumes that were removed.
@@ -87,8 +56,8 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
             pool.submit(attempt, container["Names"][0].lstrip("/"), partial(end, container))
     for network in networks:
         attempt(f"network {network['Name']}", partial(client.api.remove_network, network["Id"]))
-    for volume in found_volumes:
-        if volumes or KEY_LABEL in volume["Labels"]:
+    if volumes:
+        for volume in found_volumes:
             attempt(f"volume {volume['Name']}", partial(client.api.remove_volume, volume["Name"]))
     if failures:
         raise WorkerError(f"run {run_id}: not everything could be removed", evidence="\n".join(sorted(failures)))
