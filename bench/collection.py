@@ -131,7 +131,7 @@ def _key(directory: Path) -> RunKey:
 
 
 def _place(name: str, directory: Path) -> Place:
-    return Place(name, directory, None, directory / "logs", 0, Middleware.of_process(), _key(directory))
+    return Place(name, directory, directory / "logs", 0, Middleware.of_process(), _key(directory))
 
 
 def local_runtime(plan: Plan, directory: Path) -> NodeHost:

@@ -110,9 +110,9 @@ def key_in(directory: Path) -> RunKey:
     return key
 
 
-def place_of(run: str, dataset: Path, key: RunKey, *, volume: str | None = None) -> Place:
+def place_of(run: str, dataset: Path, key: RunKey) -> Place:
     """A run whose logs lie beside the dataset."""
-    return Place(run, dataset, volume, dataset / "logs", 2, Middleware(), key)
+    return Place(run, dataset, dataset / "logs", 2, Middleware(), key)
 
 
 @contextmanager
@@ -130,4 +130,4 @@ def collecting(client: DockerClient, directory: Path, *overrides: str, run: str 
             supervisor.start()
             yield Collection(runtime, supervisor, dataset)
     finally:
-        remove(client, run, volumes=True)
+        remove(client, run)

@@ -33,9 +33,7 @@ from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.docker_engine import connect
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.docker.removal import remove
-from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeRole, NodeSpec
-from throwcollect.runtimes.supervisor import Supervisor
 
 pytestmark = pytest.mark.docker
 
@@ -156,28 +154,13 @@ def test_a_router_that_comes_back_at_another_address_is_found_again(
 def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_path: Path, digest: str) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "other").mkdir()
-    volume = f"{new_run()}-volume"
-    run = new_run()
-    config = config_for(tmp_path / "other", f"containers.volume={volume}", "run.simulations=1")
-    prepare(config, tmp_path / "other" / "dataset", sweep_directory=tmp_path)
-    key = key_in(tmp_path / "other")
-    runtime = DockerNodes(place_of(run, tmp_path / "other" / "dataset", key, volume=volume), config, client=client)
-    assert runtime.data == f"/data/{run}"
-    try:
-        with (
-            Supervisor(runtime, config.run, roster(runtime, 1)) as supervisor,
-            collecting(client, tmp_path / "one", "run.simulations=1") as collection,
-        ):
-            runtime.open()
-            supervisor.start()
-            assert collection.finish() == digest
-            collection.supervisor.host.close()
-            until(lambda: supervisor.poll()[0] is not None)
-            assert runtime.info().digest == digest
-        assert list_what_is_left(client, f"throwcollect.run={run}") == []
-        assert client.volumes.get(volume).attrs["Labels"]["throwcollect.run"] == run
-    finally:
-        assert remove(client, run, volumes=True) == [f"volume {volume}"]
+    with (
+        collecting(client, tmp_path / "other", "run.simulations=1") as other,
+        collecting(client, tmp_path / "one", "run.simulations=1") as collection,
+    ):
+        assert collection.finish() == digest
+        collection.supervisor.host.close()
+        assert other.finish() == digest
 
 
 @pytest.fixture
@@ -196,7 +179,7 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
     yield make
     for runtime, run in made:
         runtime.close()
-        remove(client, run, volumes=True)
+        remove(client, run)
 
 
 def test_a_node_gets_the_key_as_private_files_that_the_engine_does_not_show(

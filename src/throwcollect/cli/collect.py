@@ -324,8 +324,7 @@ def _start(run: Run, *, json: bool) -> None:
     with count_interruptions() as interruptions:
         record = run.start(interruptions=interruptions).record
     if json:
-        where = {"volume": record.volume} if record.volume else {"directory": record.directory}
-        print_json({"run": record.run, **where})
+        print_json({"run": record.run, "directory": record.directory})
     else:
         typer.echo(record.run)
         tell(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)")

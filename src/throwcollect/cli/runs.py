@@ -97,7 +97,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     if found.status == "died":
         raise describe_death(found)
     if record.summary is not None:
-        print_summary(record.summary, None if record.volume else Path(record.directory), as_json=json)
+        print_summary(record.summary, Path(record.directory), as_json=json)
     if (error := record.error) is not None:
         raise error
 
@@ -175,15 +175,10 @@ def stop(run: RunOption = None) -> None:
         typer.echo(f"{found.id}: stopped")
         return
     complete = "is complete" if error is None else "is not complete"
-    typer.echo(f"{found.id}: stopped; the dataset {complete}: {found.place.dataset}")
+    typer.echo(f"{found.id}: stopped; the dataset {complete}: {found.record.directory}")
 
 
-def down(
-    volumes: Annotated[
-        bool, typer.Option("-v", "--volumes", help="Remove the volume that holds the dataset, too.")
-    ] = False,
-    run: RunOption = None,
-) -> None:
+def down(run: RunOption = None) -> None:
     """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import end
@@ -197,7 +192,7 @@ def down(
 
     # A run without a record may be another user's, so it is removed only if it is named.
     found = find_run_to_change(None, died=True) if run is None else run
-    ended, removed = control.down(found, volumes=volumes)
+    ended, removed = control.down(found)
     for name in removed:
         tell(f"removed {name}")
     typer.echo(f"{ended}: ended and forgotten")
@@ -245,7 +240,7 @@ def _make_document(run: Run) -> dict[str, Any]:
 def _make_row(run: Run) -> tuple[str, ...]:
     record = run.record
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
-    dataset = run.place.dataset if record.kind == "collection" else "-"
+    dataset = run.record.directory if record.kind == "collection" else "-"
     simulations = "-" if record.kind == "container" else str(record.simulations)
     return run.id, record.runtime, simulations, throws, _describe_status(run, record), dataset
 

@@ -1,4 +1,4 @@
-"""Keys for runs in containers: the image, the volume, and the options of each kind of node."""
+"""Keys for runs in containers: the image, and the options of each kind of node."""
 
 from __future__ import annotations
 
@@ -75,11 +75,6 @@ Cores = Annotated[
 ]
 Mount = Annotated[str, AfterValidator(_check_mount), in_words("HOST:CONTAINER[:ro]")]
 Network = Annotated[str, AfterValidator(_check_network), in_words("names of networks")]
-Volume = Annotated[
-    str,
-    match(r"[a-zA-Z0-9][a-zA-Z0-9_.-]+", "a volume's name: letters, digits, _, . and -"),
-    in_words("a volume's name"),
-]
 Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 ContainerPort = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,4}(/tcp|/udp)?$")]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
@@ -197,8 +192,6 @@ class ContainersConfig(Section):
     image: str | None = None
     """Image of all nodes; null takes `throwcollect` of this version (`make image`). Another one is pulled if it
     is missing."""
-    volume: Volume | None = None
-    """Volume of the engine that holds the dataset; null writes it to a directory of this machine."""
     router: NodeContainerConfig = NodeContainerConfig()
     """The router."""
     sim: NodeContainerConfig = NodeContainerConfig()

@@ -57,21 +57,21 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
     return run.now()
 
 
-def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]]:
+def down(named: StrPath | Run) -> tuple[str, list[str]]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
     `named` is a run, or a name that `find` accepts, or the id of a run without a record whose containers a runtime
-    still holds. A volume that holds the dataset is removed only if `volumes` is true.
+    still holds.
 
     Returns:
-        Id of the run, and names of the containers, networks and volumes that were removed.
+        Id of the run, and names of the containers and networks that were removed.
     """
     records = Records()
     try:
         run = named.id if isinstance(named, Run) else id_of(records, named)
     except NotFoundError:
         run = os.fspath(named)  # type: ignore[arg-type]
-        if "/" in run or not (removed := _remove(run, names_of("runtimes"), volumes=volumes)):
+        if "/" in run or not (removed := _remove(run, names_of("runtimes"))):
             raise
         return run, removed
     # A run whose record is damaged can be removed, too, but without the record its launcher's process id is unknown.
@@ -85,7 +85,7 @@ def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]
         evidence = None if record is None else f"its pid is {record.launcher}"
         raise WorkerError(f"run {run}: its launcher does not end", evidence=evidence)
     try:
-        removed = _remove(run, names_of("runtimes") if record is None else (record.runtime,), volumes=volumes)
+        removed = _remove(run, names_of("runtimes") if record is None else (record.runtime,))
     except ThrowcollectError:
         # The record stays, so that the command can be repeated.
         taken.close()
@@ -94,10 +94,10 @@ def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]
     return run, removed
 
 
-def _remove(run: str, runtimes: Iterable[str], *, volumes: bool) -> list[str]:
+def _remove(run: str, runtimes: Iterable[str]) -> list[str]:
     """Remove everything that runtimes hold of a run; one that cannot be used here holds nothing."""
     usable = filter(None, map(find_runtime, runtimes))
-    return [name for runtime in usable for name in runtime.remove(run, volumes=volumes)]
+    return [name for runtime in usable for name in runtime.remove(run)]
 
 
 def scale(run: Run, simulations: int) -> None:

@@ -58,7 +58,7 @@ def join_run(
         unpack_robot(files, scratch)
         config = load(scratch / "config.yaml")
         onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
-        place = Place(token.run, scratch, None, scratch / "logs", simulations, Middleware(), key)
+        place = Place(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
         _simulate(LocalNodes(place, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
 
 

@@ -17,7 +17,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.configuration import reading_config
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.errors import ConfigError, Problem, WorkerError
+from throwcollect.errors import WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runs.launcher import launch
@@ -125,7 +125,7 @@ def resume(
             sweep_directory=sweep_directory,
             processes=processes,
             # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
-            before_writing=lambda: choices.append(_choose_for_directory(read, onlooker)),
+            before_writing=lambda: choices.append(choose(read, say=onlooker.say, warn=onlooker.warn)),
             onlooker=onlooker,
         )
         if has_all_trials(directory, plan):
@@ -134,24 +134,13 @@ def resume(
         return prepare_run(read, directory, plan, onlooker=onlooker, run=run, choice=choices[0] if choices else None)
 
 
-def _choose_for_directory(config: Config, onlooker: Onlooker) -> RuntimeChoice:
-    """Choose the runtime of a run that continues a dataset."""
-    choice = choose(config, say=onlooker.say, warn=onlooker.warn)
-    if (volume := config.containers.volume) and choice.runtime.has_volumes:
-        raise ConfigError(
-            [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
-            expected="a dataset in a directory",
-        )
-    return choice
-
-
 def end_left(directory: Path, onlooker: Onlooker, *, own: Run | None = None) -> None:
     """Refuse a directory into which a run collects, and end containers that do so although their launcher has ended."""
     for run in refuse_busy(directory, own=own):
         if run.status == "ended" or not run.record.runtime:
             continue
         try:
-            removed = get_runtime(run.record.runtime).remove(run.id, volumes=False)
+            removed = get_runtime(run.record.runtime).remove(run.id)
         except WorkerError as error:
             raise WorkerError(
                 f"{directory.absolute()}: containers of run {run.id} may still collect into it: {error.message}",
@@ -180,7 +169,6 @@ def prepare_run(
         run: The run, if it has a record already; None makes a new one.
         choice: The runtime; None if it is not chosen yet.
     """
-    named = directory
     with ExitStack() as held, ExitStack() as undo:
         if run is None:
             run = Records().new(config.name)
@@ -190,9 +178,6 @@ def prepare_run(
             record = run.record
         # The plan may take minutes, so a port that is taken is reported before it is made.
         reserve_port(config.run).close()
-        choice, volume = _choose_volume(config, choice, onlooker)
-        if volume:
-            directory = run.files / "data"
         is_new = not directory.exists()
         if config.run.runtime in ("auto", "local"):
             # What nodes need is imported while this process makes the plan.
@@ -208,13 +193,13 @@ def prepare_run(
         # A resumed dataset had its files before this run, so they are removed only if the plan is new.
         if callable(plan):
             undo.callback(remove_plan, directory, made=is_new)
+        # A runtime may take minutes to get an image, so it is chosen after all other checks.
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn)
         record = replace(
             record,
             runtime=choice.name,
             directory=os.path.realpath(directory),
-            volume=volume,
-            logs=str((run.files if volume else directory).absolute() / "logs"),
+            logs=str(directory.absolute() / "logs"),
             launcher=os.getpid(),
             domain_id=config.run.domain_id,
             simulations=choice.runtime.simulations(config),
@@ -224,23 +209,9 @@ def prepare_run(
         choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
         run.write(record)
         _warn_if_others_may_join(config, choice.middleware, onlooker)
-        onlooker.say(f"plan: {describe_plan(made)}; dataset: {f'volume {volume}' if volume else named}")
-        shown = None if volume else named
+        onlooker.say(f"plan: {describe_plan(made)}; dataset: {directory}")
         launching = partial(launch, config=config, onlooker=onlooker)
-        return run.prepared(config, shown, launching, held=held.pop_all(), undo=undo.pop_all())
-
-
-def _choose_volume(
-    config: Config, choice: RuntimeChoice | None, onlooker: Onlooker
-) -> tuple[RuntimeChoice | None, str | None]:
-    """Find the volume into which the dataset goes, and choose the runtime, if this depends on it; None for a directory.
-
-    A runtime may take minutes to get an image, so it is chosen after all other checks if it can be.
-    """
-    volume = config.containers.volume
-    if volume and choice is None:
-        choice = choose(config, say=onlooker.say, warn=onlooker.warn)
-    return choice, volume if choice is None or choice.runtime.has_volumes else None
+        return run.prepared(config, directory, launching, held=held.pop_all(), undo=undo.pop_all())
 
 
 def _warn_if_others_may_join(config: Config, middleware: Middleware, onlooker: Onlooker) -> None:

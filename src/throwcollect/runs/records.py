@@ -5,7 +5,7 @@ The files lie in a directory of the user and not in datasets, so that a dataset 
     runs/<run>.json     the record; each change writes the whole file
     runs/<run>.lock     locked by the launcher, see `state_directory.is_locked`
     runs/<run>/key/     the key of the run, with which everybody can join who can read it
-    runs/<run>/         further files of a run whose dataset has no directory on this machine
+    runs/<run>/         further files of a run without a dataset, or before its plan is made
 
 Only the owner can read these files.
 """
@@ -16,9 +16,12 @@ import fcntl
 import os
 import secrets
 import time
+from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
+
+from pydantic_core import to_json
 
 from throwcollect.errors import ConfigError, ConflictError
 from throwcollect.runs.run import Run
@@ -108,16 +111,15 @@ class Records:
 
     def all(self) -> list[Run]:
         """All runs whose records can be read, the latest last."""
-        runs = []
-        for run in self.ids():
-            with suppress(ConfigError):
-                runs.append(self.get(run))
-        return sorted(runs, key=lambda run: run.record.started)
+        return self._read(self.ids())
 
     def into(self, directory: Path) -> list[Run]:
-        """Runs that collect, or have collected, into a directory, and not into a volume; the latest last."""
+        """Runs that collect, or have collected, into a directory; the latest last."""
         name = os.path.realpath(directory)
-        return [run for run in self.all() if run.record.volume is None and run.record.directory == name]
+        # There may be thousands of records, so only those that contain the directory's name are parsed.
+        written = to_json(name)
+        runs = self._read(run for run in self.ids() if written in self._read_bytes(run))
+        return [run for run in runs if run.record.directory == name]
 
     def read_change_ns(self, run: str) -> int | None:
         """Time of the last change of a run's record, in ns of the file system's clock; None without a record."""
@@ -125,6 +127,19 @@ class Records:
             return (self._runs / f"{run}.json").stat().st_mtime_ns
         except OSError:
             return None
+
+    def _read(self, ids: Iterable[str]) -> list[Run]:
+        runs = []
+        for run in ids:
+            with suppress(ConfigError):
+                runs.append(self.get(run))
+        return sorted(runs, key=lambda run: run.record.started)
+
+    def _read_bytes(self, run: str) -> bytes:
+        try:
+            return (self._runs / f"{run}.json").read_bytes()
+        except OSError:
+            return b""
 
     def lives(self, run: str) -> bool:
         """Whether the launcher of a run lives."""

@@ -49,8 +49,8 @@ class Run:
         id: Its id.
         key: The key that the router asks for.
         lives: Whether its launcher lived when the record was read.
-        directory: Directory of the dataset of a prepared run, as the user named it; None if it is in a volume.
-        files: Directory of the key, and of the files of a run whose dataset has no directory on this machine.
+        directory: Directory of the dataset of a prepared run, as the user named it; None for other runs.
+        files: Directory of the key, and of the files of a run without a dataset.
         lock: Descriptor of the locked file, which a process that takes the run over inherits; -1 in other processes.
     """
 
@@ -193,14 +193,12 @@ class Run:
         evidence = NodeLogs(Path(run.record.logs)).tail(LAUNCHER)
         raise WorkerError(f"run {run.id}: its launcher died", evidence=evidence or None)
 
-    def prepared(
-        self, config: Config, directory: Path | None, launch: Launch, *, held: ExitStack, undo: ExitStack
-    ) -> Run:
+    def prepared(self, config: Config, directory: Path, launch: Launch, *, held: ExitStack, undo: ExitStack) -> Run:
         """Make the run ready to be launched.
 
         Args:
             config: Its configuration.
-            directory: Directory of the dataset, as the user named it; None if it is in a volume.
+            directory: Directory of the dataset, as the user named it.
             launch: Launches the run in this process.
             held: Holds the lock of the directory until the launcher, which may be another process, holds it itself.
             undo: Removes the files that were made for the run, if it is not launched.

@@ -86,8 +86,7 @@ class RunRecord:
     Attributes:
         name: Name of the collection.
         runtime: Name of the runtime; empty until one is chosen.
-        directory: Absolute path of the dataset; if the dataset is in a volume, of the files from which it was made.
-        volume: Name of the volume that holds the dataset; None if a directory does.
+        directory: Absolute path of the dataset.
         logs: Absolute path of the directory with the logs.
         launcher: Process id of the launcher.
         simulations: Number of simulations that the run is to have.
@@ -111,7 +110,6 @@ class RunRecord:
     name: str
     runtime: str
     directory: str
-    volume: str | None
     logs: str
     domain_id: int
     started: datetime
@@ -148,14 +146,13 @@ class RunRecord:
         """Make the record of a run for which no runtime is chosen and which this process launches."""
         now = datetime.now(timezone.utc)
         place = os.path.realpath(directory)
-        return cls(run, name, runtime, place, None, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
+        return cls(run, name, runtime, place, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
 
     def place(self, key: RunKey) -> Place:
         """The place of the run, which has this key."""
         return Place(
             run=self.run,
             directory=Path(self.directory),
-            volume=self.volume,
             logs=Path(self.logs),
             simulations=self.simulations,
             middleware=self.middleware,

@@ -54,8 +54,7 @@ class Place:
 
     Attributes:
         run: Id of the run.
-        directory: Directory of the dataset; if the dataset is in a volume, of the files from which it is made.
-        volume: Name of the volume that holds the dataset; None if a directory does.
+        directory: Directory of the dataset.
         logs: Directory of the logs.
         simulations: Number of simulations at the start.
         key: The key that the router asks for.
@@ -65,7 +64,6 @@ class Place:
 
     run: str
     directory: Path
-    volume: str | None
     logs: Path
     simulations: int
     middleware: Middleware
@@ -74,19 +72,14 @@ class Place:
     recordings: str | None = None
 
     @property
-    def dataset(self) -> str:
-        """The place of the dataset, in words."""
-        return str(self.directory) if self.volume is None else f"volume {self.volume}, {self.run}"
-
-    @property
     def way_on(self) -> str | None:
-        """The command that goes on with the dataset once the run is over; None where no command can, as in a volume."""
-        return command("resume", self.directory) if self.collects and not self.volume else None
+        """The command that goes on with the dataset once the run is over; None if it collects none."""
+        return command("resume", self.directory) if self.collects else None
 
 
 def make_interruption_error(place: Place) -> Interrupted:
     """The error that somebody stopped a collection before every trial had ended."""
-    message = f"interrupted; finished throws are in {place.dataset}, the dataset is not complete"
+    message = f"interrupted; finished throws are in {place.directory}, the dataset is not complete"
     return Interrupted(message, hint=place.way_on)
 
 
@@ -155,13 +148,11 @@ class Runtime(ABC):
     Attributes:
         handle: The kind of id that its nodes have, as a noun.
         outlives_launcher: Whether nodes go on without the process that started them.
-        has_volumes: Whether the dataset may be in the volume that ``containers.volume`` names.
         can_be_scaled: Whether the number of simulations can be changed while a run lives.
     """
 
     handle: ClassVar[str] = "pid"
     outlives_launcher: ClassVar[bool] = False
-    has_volumes: ClassVar[bool] = False
     can_be_scaled: ClassVar[bool] = True
 
     @abstractmethod
@@ -207,13 +198,13 @@ class Runtime(ABC):
         """Number of simulations with which a run begins."""
         return config.run.simulations
 
-    def remove(self, run: str, *, volumes: bool) -> list[str]:
-        """Remove everything that the runtime holds of a run, but a volume with its dataset only if `volumes` is true.
+    def remove(self, run: str) -> list[str]:
+        """Remove everything that the runtime holds of a run, but no directory with a dataset.
 
         A runtime that has ended holds nothing.
 
         Returns:
-            Names of the containers, networks and volumes that were removed.
+            Names of the containers and networks that were removed.
 
         Raises:
             WorkerError: If the runtime does not answer in time, or something could not be removed; everything else is

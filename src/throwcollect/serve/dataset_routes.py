@@ -119,7 +119,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
 
 def _get_collection(instances: Instances, instance: str) -> Run:
     run = instances.get(instance)
-    if run.record.kind != "collection" or run.record.volume is not None:
+    if run.record.kind != "collection":
         raise NotFoundError(f"run {instance} has no dataset in a directory")
     return run
 

@@ -24,7 +24,7 @@ def check_resumption(run: Run, *, is_complete: Callable[[Path], bool] = is_compl
     directory = run.place.directory
     if run.status == "running":
         raise ConflictError(f"run {run.id} is still running")
-    if run.record.kind != "collection" or run.record.volume is not None or not os.path.isfile(directory / CONFIG):
+    if run.record.kind != "collection" or not os.path.isfile(directory / CONFIG):
         raise ConflictError(f"run {run.id} has no dataset in a directory to go on with")
     if is_complete(directory):
         raise ConflictError(

@@ -30,7 +30,6 @@ FULL = """\
 run: {simulations: 1, runtime: docker}
 containers:
   image: lab/throws:2
-  volume: throws_1
   router: {ports: {80: 8080, 53/udp: 5353}}
   coordinator: {mounts: [/a:/b], options: {device_requests: [{driver: nvidia, count: -1, capabilities: [[gpu]]}]}}
   sim:
@@ -66,7 +65,6 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("section", "message"),
     [
-        ("volume: a b", "volume: should be a volume's name: letters, digits, _, . and -, got 'a b'"),
         ("sim: {memory: 512MB}", "sim.memory: should be a size of 6m or more, such as 512m or 2g, got '512MB'"),
         ("sim: {cpuset: 0-}", "sim.cpuset: should be numbers and ranges of cores, such as 0-3,6, got '0-'"),
         ("sim: {mounts: [a:/b]}", f"sim.mounts.0: {PATHS}, got 'a:/b'"),
@@ -138,5 +136,5 @@ def test_every_container_option_is_a_keyword_of_the_docker_sdk(option: str) -> N
 
 
 def test_keys_of_containers_do_not_change_the_dataset() -> None:
-    containers = ContainersConfig(image="other", volume="throws")
+    containers = ContainersConfig(image="other")
     assert Config(containers=containers).without_run() == Config()

@@ -46,7 +46,7 @@ def remember(name: str, kind: Kind, runtime: str, *, joins: str | None = None) -
     directory = run.files / "data"
     directory.mkdir()
     logs = str(run.files / "logs")
-    record = RunRecord(name, name, runtime, str(directory), None, logs, 0, datetime.now(timezone.utc), 1, 0, kind=kind)
+    record = RunRecord(name, name, runtime, str(directory), logs, 0, datetime.now(timezone.utc), 1, 0, kind=kind)
     run.write(replace(record, origin=Origin(name, joins=joins), endpoint="tls/127.0.0.1:7447"))
     return run
 

@@ -26,7 +26,7 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
 
 
-RECORD = RunRecord("a-0123", "a", "local", "/a", None, "/a/logs", 0, datetime.now(timezone.utc), 1, 2)
+RECORD = RunRecord("a-0123", "a", "local", "/a", "/a/logs", 0, datetime.now(timezone.utc), 1, 2)
 
 
 def living(endpoint: str | None, runtime: str = "local") -> Run:

@@ -20,7 +20,7 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
     first, later = tmp_path / "first", tmp_path / "data" / "logs"
     now = datetime.now(timezone.utc)
     run = Records().new("small")
-    run.write(RunRecord(run.id, "small", "", str(tmp_path / "data"), None, str(first), 0, now, os.getpid(), 1))
+    run.write(RunRecord(run.id, "small", "", str(tmp_path / "data"), str(first), 0, now, os.getpid(), 1))
     first.mkdir()
     (first / "launcher.log").write_text("plan: 3 trials\n")
     EventLog(later, "of-an-earlier-run").run_event("started", simulations=1)

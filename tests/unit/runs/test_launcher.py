@@ -61,7 +61,6 @@ def run(engine: Engine, tmp_path: Path) -> Run:
         name="throws",
         runtime="docker",
         directory=str(tmp_path / "data"),
-        volume=None,
         logs=str(tmp_path / "logs"),
         domain_id=0,
         started=datetime.now(timezone.utc),

@@ -40,7 +40,6 @@ def record(run: Run, **fields: object) -> RunRecord:
         "name": "small",
         "runtime": "local",
         "directory": "/data/small",
-        "volume": None,
         "logs": "/data/small/logs",
         "domain_id": 0,
         "started": NOW,

@@ -46,7 +46,6 @@ def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
             "name": name,
             "runtime": "local",
             "directory": str(tmp_path / name),
-            "volume": None,
             "logs": "logs",
             "domain_id": 0,
             "started": NOW - timedelta(hours=age_h),
@@ -77,7 +76,6 @@ def test_a_run_is_found_by_the_directory_of_its_dataset(
 ) -> None:
     make("a", "ended", age_h=2, directory=str(tmp_path / "data"))
     latest = make("b", "ended", age_h=1, directory=str(tmp_path / "data"))
-    make("c", "ended", directory=str(tmp_path / "data"), volume="other")
     monkeypatch.chdir(tmp_path)
     assert find_run_to_change("data").record == latest
     assert find_run_to_change(str(tmp_path / "data")).record == latest

@@ -35,7 +35,7 @@ sys.stdin.read()
 
 
 def place(directory: Path) -> Place:
-    return Place("run", directory, None, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
+    return Place("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
 
 
 def nodes(directory: Path, **run: object) -> LocalNodes:

@@ -61,7 +61,7 @@ class FakeRuntime(NodeHost):
 
     def __init__(self) -> None:
         self.config = Config()
-        self.place = Place("run", Path("/data"), None, Path("/logs"), 2, Middleware(), RunKey(Path("/key")))
+        self.place = Place("run", Path("/data"), Path("/logs"), 2, Middleware(), RunKey(Path("/key")))
         self.commands: list[tuple[str, tuple[str, ...]]] = []
         self.signals: list[tuple[str, signal.Signals]] = []
         self.stopped: list[tuple[str, float]] = []

@@ -98,7 +98,6 @@ def remember(tmp_path: Path) -> Iterator[Remember]:
             "name": "small",
             "runtime": "local",
             "directory": str(tmp_path / "datasets" / name),
-            "volume": None,
             "logs": str(tmp_path / "datasets" / name / "logs"),
             "domain_id": 0,
             "started": datetime.now(timezone.utc),

@@ -44,23 +44,13 @@ _LOG_SIZE = {"max-size": "10m", "max-file": "2"}
 
 @dataclass(frozen=True)
 class RunPlace:
-    """The names of all containers, networks, volumes and labels that an engine holds for a run.
+    """The names of all containers, networks and labels that an engine holds for a run.
 
-    `source` is the place of the dataset: absolute path of a directory of this machine, or name of a volume.
+    `source` is the absolute path of the dataset's directory.
     """
 
     run_id: str
     source: str
-
-    @property
-    def in_volume(self) -> bool:
-        """Whether the dataset lies in a volume."""
-        return not self.source.startswith("/")
-
-    @property
-    def data(self) -> str:
-        """Directory of the dataset, as nodes see it; a volume may hold those of several runs."""
-        return f"{DATA}/{self.run_id}" if self.in_volume else DATA
 
     @property
     def network(self) -> str:
@@ -77,9 +67,8 @@ class RunPlace:
         return labels if node is None else {**labels, NODE_LABEL: node}
 
     def mount(self, *, read_only: bool) -> Mount:
-        """The mount of the dataset, or of the volume in which it lies."""
-        kind = "volume" if self.in_volume else "bind"
-        return Mount(target=DATA, source=self.source, type=kind, read_only=read_only)
+        """The mount of the dataset."""
+        return Mount(target=DATA, source=self.source, type="bind", read_only=read_only)
 
 
 def key_mount(key: RunKey) -> Mount:
@@ -148,7 +137,7 @@ def node_options(
         # Otherwise nodes would write a random id and /data into the provenance, which mean nothing outside.
         HOST_VARIABLE: socket.gethostname(),
         IMAGE_VARIABLE: image_id,
-        DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
+        DIRECTORY_VARIABLE: place.source,
         "THROWCOLLECT_NODE": node.name,
     }
     mounts = [key_mount(key)]

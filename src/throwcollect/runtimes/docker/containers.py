@@ -152,7 +152,7 @@ class Containers:
                 pool.submit(self._remove, container, math.ceil(grace_s))
 
     def close(self) -> bool:
-        """Remove all containers, that of the router last, and everything else of the run but the dataset's volume.
+        """Remove all containers, that of the router last, and everything else of the run.
 
         Returns:
             Whether the engine has removed all containers.
@@ -163,7 +163,7 @@ class Containers:
             self.remove([ROUTER], grace_s=3.0)
             # The network cannot be removed while somebody else's container is in it.
             with suppress(WorkerError):
-                remove(self._client, self._run, volumes=False)
+                remove(self._client, self._run)
             with suppress(*ENGINE_ERRORS):
                 is_clear = not self._list()
         self._closed.set()

@@ -8,7 +8,6 @@ from contextlib import suppress
 from ipaddress import ip_network
 
 from docker.client import DockerClient
-from docker.errors import NotFound
 from docker.types import IPAMConfig, IPAMPool
 
 from throwcollect.config.schema import Config
@@ -17,6 +16,7 @@ from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.ros.router_endpoint import LOOPBACK, format_endpoint
 from throwcollect.runtimes.docker.checks import check
 from throwcollect.runtimes.docker.container_options import (
+    DATA,
     ROUTER_PORT,
     RunPlace,
     node_options,
@@ -26,7 +26,6 @@ from throwcollect.runtimes.docker.container_options import (
 )
 from throwcollect.runtimes.docker.containers import ANSWER_S, Containers, ContainerState
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
-from throwcollect.runtimes.docker.volume import dataset_info, place_directory
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
 from throwcollect.runtimes.runtime import Place, Session
@@ -41,7 +40,7 @@ _SIGNALLED = 128
 class DockerNodes(NodeHost):
     """Runs nodes as containers that can do little but compute; see `nodes.NodeHost`.
 
-    Containers, networks and volumes carry the run's id as a label, by which `down` finds them if the launcher dies.
+    Containers and networks carry the run's id as a label, by which `down` finds them if the launcher dies.
 
     Args:
         place: The place of the run; its id has to be unique on the engine.
@@ -65,8 +64,8 @@ class DockerNodes(NodeHost):
         self.config = config
         self.listen = router_endpoint(config, place.middleware)
         self.cleared = False
-        self._place = RunPlace(place.run, place.volume or str(place.directory.resolve()))
-        self.data = self._place.data
+        self._place = RunPlace(place.run, str(place.directory.resolve()))
+        self.data = DATA
         self.logs = NodeLogs(place.logs)
         self._client = client or connect(timeout_s=ANSWER_S)
         self._image_id = check(self._client, config)
@@ -80,20 +79,13 @@ class DockerNodes(NodeHost):
         return NodeCollection(self, session).run_to_the_end()
 
     def open(self) -> None:
-        """Make the run's network and volumes, and watch its containers; see `NodeHost.open`."""
+        """Make the run's network, and watch its containers; see `NodeHost.open`."""
         place = self._place
         hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
         with engine_errors(f"run {place.run_id} cannot be prepared on the Docker engine", hint=hint):
-            if place.in_volume:
-                try:
-                    self._client.volumes.get(place.source)
-                except NotFound:
-                    self._client.volumes.create(place.source, labels=place.labels())
             self._create_network()
         super().open()
         self._containers.open()
-        if place.in_volume:
-            place_directory(self._client, place, self.config, self.place.directory)
 
     def _create_network(self) -> None:
         """Make the run's network; on Fast DDS, the router has to be able to keep its address there.
@@ -118,10 +110,6 @@ class DockerNodes(NodeHost):
             network = self._client.networks.get(self._place.network)
         # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
-
-    def info(self) -> Info:
-        """Read the summary of the finished dataset."""
-        return dataset_info(self._client, self._place, self.config) if self._place.in_volume else super().info()
 
     @property
     def endpoint(self) -> str | None:
@@ -182,7 +170,7 @@ class DockerNodes(NodeHost):
         self._containers.remove(names, grace_s=grace_s)
 
     def close(self) -> None:
-        """End all nodes, the router last, and remove everything that was made for the run but its volume.
+        """End all nodes, the router last, and remove everything that was made for the run.
 
         Afterwards, `cleared` is true if the engine has removed all containers.
         """
@@ -192,9 +180,10 @@ class DockerNodes(NodeHost):
         """The error of a silent engine, with the containers that may still run there, and how to go on."""
         place = self._place
         left = ", ".join(map(place.container, self._containers.nodes)) or "none"
-        hint = f"once it answers, {command('down', '--run', place.run_id)} ends them"
-        if not place.in_volume:
-            hint += f", and {command('resume', place.source)} goes on without them"
+        hint = (
+            f"once it answers, {command('down', '--run', place.run_id)} ends them, "
+            f"and {command('resume', place.source)} goes on without them"
+        )
         return WorkerError(
             f"the Docker engine has not answered for {self._containers.silent_s:.0f} s; "
             f"finished throws are safe in {place.source}",

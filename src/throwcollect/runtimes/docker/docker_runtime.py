@@ -28,7 +28,6 @@ class DockerRuntime(Runtime):
 
     handle = "container"
     outlives_launcher = True
-    has_volumes = True
 
     def in_words(self, config: Config) -> str:
         """See `Runtime.in_words`."""
@@ -81,8 +80,8 @@ class DockerRuntime(Runtime):
             return Check("docker", "note", f"{error.message}; runs use processes")
         return Check("docker", "ok", f"{found}, with the image {tag}")
 
-    def remove(self, run: str, *, volumes: bool) -> list[str]:
-        """Remove containers, network, key and, if asked for, the dataset's volume; see `Runtime.remove`."""
+    def remove(self, run: str) -> list[str]:
+        """Remove containers and network; see `Runtime.remove`."""
         if not (is_installed("docker") and has_socket()):
             return []
         from throwcollect.runtimes.docker.docker_engine import connect, timed_out
@@ -95,7 +94,7 @@ class DockerRuntime(Runtime):
                 return []
             raise WorkerError(error.message, hint="try again once the Docker engine answers") from error
         with closing(client):
-            return remove(client, run, volumes=volumes)
+            return remove(client, run)
 
 
 def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:

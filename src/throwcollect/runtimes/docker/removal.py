@@ -18,13 +18,13 @@ _GRACE_S = 3
 _AT_ONCE = 8
 
 
-def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
-    """Remove everything that an engine holds of a run, but the volume with its dataset only if `volumes` is true.
+def remove(client: DockerClient, run_id: str) -> list[str]:
+    """Remove everything that an engine holds of a run.
 
     Containers that have joined the run are ended, too, because its network cannot be removed before.
 
     Returns:
-        Names of the containers, networks and volumes that were removed.
+        Names of the containers and networks that were removed.
     """
     filters = {"label": f"{RUN_LABEL}={run_id}"}
     removed: list[str] = []
@@ -48,17 +48,12 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
         joined = client.api.containers(all=True, filters={"label": f"{JOINED_LABEL}={run_id}"})
         containers = [*client.api.containers(all=True, filters=filters), *joined]
         networks = client.api.networks(filters=filters)
-        # The engine gives null in the place of an empty list of volumes.
-        found_volumes = client.api.volumes(filters=filters)["Volumes"] or []
-    # Containers come first, because networks and volumes that are in use cannot be removed.
+    # Containers come first, because networks that are in use cannot be removed.
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         for container in containers:
             pool.submit(attempt, container["Names"][0].lstrip("/"), partial(end, container))
     for network in networks:
         attempt(f"network {network['Name']}", partial(client.api.remove_network, network["Id"]))
-    if volumes:
-        for volume in found_volumes:
-            attempt(f"volume {volume['Name']}", partial(client.api.remove_volume, volume["Name"]))
     if failures:
         raise WorkerError(f"run {run_id}: not everything could be removed", evidence="\n".join(sorted(failures)))
     return sorted(removed)

@@ -246,7 +246,6 @@ def write_record(run: Run, directory: Path, endpoint: str, **fields: Any) -> Non
         name="throws",
         runtime="local",
         directory=str(directory / "data"),
-        volume=None,
         logs=str(directory),
         domain_id=0,
         started=datetime.now(timezone.utc),

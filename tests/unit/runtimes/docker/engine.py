@@ -68,12 +68,6 @@ class Engine:
                 return 200, {"DockerRootDir": self.root}
             case "GET", "networks":
                 return 200, []
-            case "POST", "volumes", "create":
-                return 201, {"Name": body["Name"], "Labels": body["Labels"]}
-            case "GET", "volumes":
-                return 200, {"Volumes": []}
-            case "GET", "volumes", name:
-                return 200, {"Name": name}
             case "POST", "networks", "create":
                 return 201, {"Id": "net"}
             case "GET", "networks", name:

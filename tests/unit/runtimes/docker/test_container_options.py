@@ -16,7 +16,6 @@ from throwcollect.runtimes.nodes import NodeRole, NodeSpec
 
 DIRECTORY = RunPlace("throws-1a2b", "/home/me/data set")
 KEY = RunKey(Path("/state/key"))
-VOLUME = RunPlace("throws-1a2b", "datasets")
 
 
 def options(
@@ -51,7 +50,6 @@ def test_a_container_gets_the_name_of_its_node_and_the_address_of_the_router() -
     assert environment["THROWCOLLECT_HOST"] == socket.gethostname()
     assert environment["THROWCOLLECT_IMAGE"] == "sha256:12ab"
     assert environment["THROWCOLLECT_DIRECTORY"] == "/home/me/data set"
-    assert options("sim_3", VOLUME)["environment"]["THROWCOLLECT_DIRECTORY"] == ""
     assert made["labels"] == {
         "throwcollect.run": "throws-1a2b",
         "throwcollect.node": "sim_3",
@@ -61,14 +59,13 @@ def test_a_container_gets_the_name_of_its_node_and_the_address_of_the_router() -
 
 
 def test_only_the_coordinator_can_write_the_dataset_and_simulations_can_read_it() -> None:
-    def mounts(name: str, place: RunPlace) -> list[tuple[str, str, str, bool]]:
-        found = options(name, place)["mounts"][1:]
+    def mounts(name: str) -> list[tuple[str, str, str, bool]]:
+        found = options(name)["mounts"][1:]
         return [(each["Type"], each["Source"], each["Target"], each["ReadOnly"]) for each in found]
 
-    assert mounts("coordinator", DIRECTORY) == [("bind", "/home/me/data set", "/data", False)]
-    assert mounts("sim_0", DIRECTORY) == [("bind", "/home/me/data set", "/data", True)]
-    assert mounts("sim_0", VOLUME) == [("volume", "datasets", "/data", True)]
-    assert mounts("router", VOLUME) == []
+    assert mounts("coordinator") == [("bind", "/home/me/data set", "/data", False)]
+    assert mounts("sim_0") == [("bind", "/home/me/data set", "/data", True)]
+    assert mounts("router") == []
 
 
 def test_every_node_gets_the_key_of_the_run_in_a_read_only_mount() -> None:

@@ -53,7 +53,7 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
         key.create()
         made.append(
             DockerNodes(
-                Place("run-1a2b", directory, None, tmp_path / "logs", 1, Middleware(), key),
+                Place("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
                 CONFIG,
                 warn=warnings.append,
             )
