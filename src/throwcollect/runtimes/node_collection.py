@@ -34,7 +34,6 @@ from throwcollect.runtimes.nodes import (
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.runtimes.runtime import Session, make_interruption_error
 from throwcollect.runtimes.supervisor import Supervisor
-from throwcollect.wording import format_count
 
 MOST_SIMULATIONS = 256
 
@@ -163,15 +162,10 @@ class NodeCollection:
             self._session.warn("the coordinator does not see the simulations; all of them are started again")
             self._supervisor.replace([state.name for state in states if state.name != ROUTER])
         else:
-            (router,) = (state for state in states if state.name == ROUTER)
-            died = f"; it was started again {format_count(router.restarts, 'time')}, as it was {router.last_end}"
             raise WorkerError(
                 f"simulations have been ready for {patience_s:g} s, twice, but the coordinator does not see them",
-                evidence=f"they use {self._host.place.middleware.rmw}, and the router at {self._host.endpoint}"
-                + (died if router.restarts else ""),
-                hint="throwcollect logs router shows what it said; it may lack memory"
-                if router.restarts
-                else "a firewall may keep nodes apart; throwcollect doctor shows what is installed",
+                evidence=f"they use {self._host.place.middleware.rmw}, and the router at {self._host.endpoint}",
+                hint="throwcollect logs router shows what it said; a firewall may keep nodes apart",
             )
 
     def _offer(self, node: ros.Node) -> None:

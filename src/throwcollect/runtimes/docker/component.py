@@ -20,9 +20,9 @@ from throwcollect.runtimes.docker.container_options import (
     JOINED_LABEL,
     KEY,
     ROUTER_PORT,
-    RunPlace,
     container_options,
     key_mount,
+    network_of,
 )
 from throwcollect.runtimes.docker.containers import ANSWER_S, Containers
 from throwcollect.runtimes.docker.docker_engine import connect
@@ -65,7 +65,7 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
     key = key_mount(connection.key)
     if runtime == "docker":
         endpoint = f"{connection.endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}"
-        return JoinOptions(run, _environment(connection, endpoint), key, RunPlace(run, "").network)
+        return JoinOptions(run, _environment(connection, endpoint), key, network_of(run))
     if spec.section.ports or spec.section.networks:
         raise ConfigError(
             f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",
@@ -108,11 +108,11 @@ class ComponentContainer:
         self._spec = spec
         self._joining = joining
         self._is_running = is_running
-        self._place = RunPlace(place.run, str(place.directory))
+        self._place = place
         self._logs = NodeLogs(place.logs)
         client = connect(timeout_s=ANSWER_S)
         check_container(client, self._spec, component)
-        self._containers = Containers(client, self._place, self._logs, warn)
+        self._containers = Containers(client, place.run, self._logs, warn)
 
     def collect(self, session: Session) -> None:
         """Run the container until it ends, the user asks to stop, or the run that it has joined ends; then close."""
@@ -184,7 +184,7 @@ class ComponentContainer:
         if containers.given_up:
             raise WorkerError(
                 f"the Docker engine has not answered for {containers.silent_s:.0f} s",
-                hint=f"once it answers, {command('down', '--run', self._place.run_id)} ends the container",
+                hint=f"once it answers, {command('down', '--run', self._place.run)} ends the container",
             )
         if (failure := containers.failure(CONTAINER)) is not None:
             raise WorkerError(f"the container of {self._spec.image} cannot be started: {failure}")

@@ -16,7 +16,7 @@ from docker.errors import NotFound
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
-from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL, RunPlace
+from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL, network_of
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, in_words
 from throwcollect.runtimes.docker.removal import remove
 from throwcollect.runtimes.node_logs import NodeLogs
@@ -83,12 +83,11 @@ class Containers:
         warn: Gets a line of text when the engine does not answer for long.
     """
 
-    def __init__(self, client: DockerClient, place: RunPlace, logs: NodeLogs, warn: Callable[[str], None]) -> None:
+    def __init__(self, client: DockerClient, run: str, logs: NodeLogs, warn: Callable[[str], None]) -> None:
         self.given_up = False
         self.last_error = ""
         self._client = client
-        self._run = place.run_id
-        self._network = place.network
+        self._run = run
         self._logs = logs
         self._warn = warn
         self._warned = False
@@ -229,7 +228,7 @@ class Containers:
     def _inspect(self, listed: dict[str, Any] | None, key: str) -> ContainerState:
         if listed is None:
             return ContainerState("removed")
-        address = listed["NetworkSettings"]["Networks"].get(self._network, {}).get("IPAddress") or None
+        address = listed["NetworkSettings"]["Networks"].get(network_of(self._run), {}).get("IPAddress") or None
         state = ContainerState(listed["State"], address=address)
         if not state.ended:
             return state

@@ -18,7 +18,9 @@ from throwcollect.runtimes.docker.checks import check
 from throwcollect.runtimes.docker.container_options import (
     DATA,
     ROUTER_PORT,
-    RunPlace,
+    container_of,
+    labels,
+    network_of,
     node_options,
     publishes_port,
     router_endpoint,
@@ -64,12 +66,11 @@ class DockerNodes(NodeHost):
         self.config = config
         self.listen = router_endpoint(config, place.middleware)
         self.cleared = False
-        self._place = RunPlace(place.run, str(place.directory.resolve()))
         self.data = DATA
         self.logs = NodeLogs(place.logs)
         self._client = client or connect(timeout_s=ANSWER_S)
         self._image_id = check(self._client, config)
-        self._containers = Containers(self._client, self._place, self.logs, warn)
+        self._containers = Containers(self._client, place.run, self.logs, warn)
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
@@ -80,9 +81,8 @@ class DockerNodes(NodeHost):
 
     def open(self) -> None:
         """Make the run's network, and watch its containers; see `NodeHost.open`."""
-        place = self._place
         hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
-        with engine_errors(f"run {place.run_id} cannot be prepared on the Docker engine", hint=hint):
+        with engine_errors(f"run {self.place.run} cannot be prepared on the Docker engine", hint=hint):
             self._create_network()
         super().open()
         self._containers.open()
@@ -93,21 +93,21 @@ class DockerNodes(NodeHost):
         Nodes on Fast DDS look up the address of their discovery server only once. A container can choose its address
         only in a network whose range was named, so a first network serves to find a free range.
         """
-        place = self._place
-        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": place.labels()}
-        network = self._client.networks.create(place.network, **options)
+        name = network_of(self.place.run)
+        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": labels(self.place)}
+        network = self._client.networks.create(name, **options)
         if self.place.middleware.is_fast_dds:
             network.reload()
             pool = IPAMPool(subnet=network.attrs["IPAM"]["Config"][0]["Subnet"])
             network.remove()
-            self._client.networks.create(place.network, ipam=IPAMConfig(pool_configs=[pool]), **options)
+            self._client.networks.create(name, ipam=IPAMConfig(pool_configs=[pool]), **options)
 
     def _address_of(self, node: NodeSpec) -> str | None:
         """The address that a node is to have in the run's network; None if it may be any."""
         if node.name != ROUTER or not self.place.middleware.is_fast_dds:
             return None
         with engine_errors("the engine does not say which addresses the run's network has"):
-            network = self._client.networks.get(self._place.network)
+            network = self._client.networks.get(network_of(self.place.run))
         # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
@@ -126,10 +126,8 @@ class DockerNodes(NodeHost):
         """Begin to start a node; if it cannot be started, one of the next `exits` reports it."""
         options = node_options(
             node,
-            place=self._place,
+            place=self.place,
             config=self.config,
-            middleware=self.place.middleware,
-            key=self.place.key,
             image_id=self._image_id,
             address=self._address_of(node),
         )
@@ -178,15 +176,15 @@ class DockerNodes(NodeHost):
 
     def _make_silence_error(self) -> WorkerError:
         """The error of a silent engine, with the containers that may still run there, and how to go on."""
-        place = self._place
-        left = ", ".join(map(place.container, self._containers.nodes)) or "none"
+        place = self.place
+        left = ", ".join(container_of(place.run, node) for node in self._containers.nodes) or "none"
         hint = (
-            f"once it answers, {command('down', '--run', place.run_id)} ends them, "
-            f"and {command('resume', place.source)} goes on without them"
+            f"once it answers, {command('down', '--run', place.run)} ends them, "
+            f"and {command('resume', place.directory)} goes on without them"
         )
         return WorkerError(
             f"the Docker engine has not answered for {self._containers.silent_s:.0f} s; "
-            f"finished throws are safe in {place.source}",
+            f"finished throws are safe in {place.directory}",
             evidence="\n".join(filter(None, (self._containers.last_error, f"containers that may run on: {left}"))),
             hint=hint,
         )

@@ -10,20 +10,18 @@ from rclzenoh.session_config import client_override
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.container_options import RunPlace, image, mount_source, node_options, publishes_port
+from throwcollect.runtimes.docker.container_options import image, mount_source, node_options, publishes_port
 from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import NodeRole, NodeSpec
+from throwcollect.runtimes.runtime import Place
 
-DIRECTORY = RunPlace("throws-1a2b", "/home/me/data set")
-KEY = RunKey(Path("/state/key"))
+PLACE = Place("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
 
 
-def options(
-    name: str, place: RunPlace = DIRECTORY, *, core: int | None = None, run: Any = None, **containers: Any
-) -> dict[str, Any]:
+def options(name: str, *, core: int | None = None, run: Any = None, **containers: Any) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
     node = NodeSpec(name, ("command", "--option"), NodeRole.EXPENDABLE, core)
-    return node_options(node, place=place, config=config, middleware=Middleware(), key=KEY, image_id="sha256:12ab")
+    return node_options(node, place=PLACE, config=config, image_id="sha256:12ab")
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])
