@@ -20,8 +20,8 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker.containers import remove
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
-from throwcollect.runtimes.docker.removal import remove
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import NodeExit
 from throwcollect.runtimes.runtime import Place

@@ -30,9 +30,9 @@ from tests.e2e.collection import collect_here
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import WorkerError
+from throwcollect.runtimes.docker.containers import remove
 from throwcollect.runtimes.docker.docker_engine import connect
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
-from throwcollect.runtimes.docker.removal import remove
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeRole, NodeSpec
 
 pytestmark = pytest.mark.docker

@@ -25,7 +25,7 @@ from pydantic_core import to_json
 
 from throwcollect.errors import ConfigError, ConflictError
 from throwcollect.runs.run import Run
-from throwcollect.state_directory import is_locked, state_directory, unusable
+from throwcollect.state_directory import state_directory, unusable
 
 _REMEMBERED = timedelta(days=7)
 """Records of runs that have ended are kept for this long."""
@@ -140,10 +140,6 @@ class Records:
             return (self._runs / f"{run}.json").read_bytes()
         except OSError:
             return b""
-
-    def lives(self, run: str) -> bool:
-        """Whether the launcher of a run lives."""
-        return is_locked(self._runs / f"{run}.lock")
 
     def _forget_old(self) -> None:
         before = datetime.now(timezone.utc) - _REMEMBERED

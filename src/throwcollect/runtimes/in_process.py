@@ -36,10 +36,6 @@ class InProcessRuntime(Runtime):
         """See `Runtime.in_words`."""
         return "this process, with one simulation"
 
-    def simulations(self, config: Config) -> int:
-        """The only number of simulations that there can be."""
-        return 1
-
     def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> InProcess:
         """Make the host of a run in this process."""
         return InProcess(place, config)

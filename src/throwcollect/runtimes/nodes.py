@@ -183,10 +183,6 @@ class NodeHost(ABC):
     def frozen(self) -> frozenset[str]:
         """Names of the nodes that are paused or were stopped by SIGSTOP."""
 
-    def ready(self, name: str) -> bool:
-        """Whether a simulation has ever been ready for trials."""
-        return self.logs.said_ready(name)
-
     @abstractmethod
     def signal(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node, unless it has ended."""

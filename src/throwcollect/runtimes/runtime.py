@@ -148,7 +148,7 @@ class Runtime(ABC):
     Attributes:
         handle: The kind of id that its nodes have, as a noun.
         outlives_launcher: Whether nodes go on without the process that started them.
-        can_be_scaled: Whether the number of simulations can be changed while a run lives.
+        can_be_scaled: Whether a run may have any number of simulations, which can be changed while it lives.
     """
 
     handle: ClassVar[str] = "pid"
@@ -196,7 +196,7 @@ class Runtime(ABC):
 
     def simulations(self, config: Config) -> int:
         """Number of simulations with which a run begins."""
-        return config.run.simulations
+        return config.run.simulations if self.can_be_scaled else 1
 
     def remove(self, run: str) -> list[str]:
         """Remove everything that the runtime holds of a run, but no directory with a dataset.

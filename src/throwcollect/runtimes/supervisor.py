@@ -88,7 +88,7 @@ class Supervisor:
         end = None
         news = self._end_frozen()
         # Readiness is noted before ends are handled: a simulation that was ready once may be restarted more often.
-        self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
+        self._ready |= {name for name in self._expendables if name in self._ready or self.host.logs.said_ready(name)}
         self._has_worked |= self._ready
         for node in self.host.exits():
             self._last_end[node.name] = node.reason

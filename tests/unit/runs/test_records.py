@@ -90,9 +90,9 @@ def test_a_run_lives_as_long_as_its_lock_is_held(state: Path) -> None:
     records = Records()
     run = records.new("small")
     run.write(record(run))
-    assert (records.lives(run.id), records.get(run.id).status) == (True, "running")
+    assert records.get(run.id).status == "running"
     run.close()
-    assert (records.lives(run.id), records.get(run.id).status) == (False, "died")
+    assert records.get(run.id).status == "died"
 
 
 def test_a_killed_launcher_releases_its_run_even_if_its_pid_is_in_use(state: Path) -> None:
@@ -122,10 +122,10 @@ def test_a_run_is_handed_to_another_process_without_ever_seeming_dead(state: Pat
         inherited = records.inherit(run.id, os.dup(run.lock))
         run.close()
         inherited.close()
-        assert records.lives(run.id)
+        assert run.is_locked()
         process.kill()
         process.wait()
-    assert not records.lives(run.id)
+    assert not run.is_locked()
 
 
 def test_only_one_process_can_take_over_a_dead_run(state: Path) -> None:

@@ -108,12 +108,12 @@ def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNo
 
 
 def test_the_readiness_and_the_log_of_a_node_outlive_it(runtime: LocalNodes) -> None:
-    assert not runtime.ready("node")
+    assert not runtime.logs.said_ready("node")
     runtime.start(node("print('node is ready', flush=True); import time; time.sleep(60)"))
-    until(lambda: runtime.ready("node"))
+    until(lambda: runtime.logs.said_ready("node"))
     runtime.signal("node", signal.SIGTERM)
     wait_for_end(runtime)
-    assert runtime.ready("node")
+    assert runtime.logs.said_ready("node")
     assert runtime.logs.tail("node") == "node is ready"
 
 

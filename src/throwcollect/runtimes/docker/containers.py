@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from docker.client import DockerClient
@@ -16,9 +17,8 @@ from docker.errors import NotFound
 
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
-from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL, network_of
-from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, in_words
-from throwcollect.runtimes.docker.removal import remove
+from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL, network_of
+from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, engine_errors, in_words
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
 
@@ -28,6 +28,7 @@ SILENCE_S = 120.0
 """An engine that has not answered for this long is given up."""
 _WARN_S = 15.0
 _POLL_S = 0.5
+_GRACE_S = 3
 _AT_ONCE = 8
 """Starting more containers at the same time was measured to gain nothing."""
 _TAIL_LINES = 200
@@ -158,8 +159,8 @@ class Containers:
         """
         is_clear = False
         if not self.given_up:
-            self.remove([node for node in self._containers if node != ROUTER], grace_s=3.0)
-            self.remove([ROUTER], grace_s=3.0)
+            self.remove([node for node in self._containers if node != ROUTER], grace_s=_GRACE_S)
+            self.remove([ROUTER], grace_s=_GRACE_S)
             # The network cannot be removed while somebody else's container is in it.
             with suppress(WorkerError):
                 remove(self._client, self._run)
@@ -252,3 +253,44 @@ class Containers:
                 with open(open_log(self._logs.path(container.node)), "ab") as log:
                     log.write(b"".join(text + b"\n" for _, text in new))
                 container.printed = new[-1][0]
+
+
+def remove(client: DockerClient, run_id: str) -> list[str]:
+    """Remove everything that an engine holds of a run.
+
+    Containers that have joined the run are ended, too, because its network cannot be removed before.
+
+    Returns:
+        Names of the containers and networks that were removed.
+    """
+    filters = {"label": f"{RUN_LABEL}={run_id}"}
+    removed: list[str] = []
+    failures: list[str] = []
+
+    def attempt(name: str, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except NotFound:
+            return
+        except ENGINE_ERRORS as error:
+            failures.append(f"{name}: {in_words(error)}")
+        else:
+            removed.append(name)
+
+    def end(container: dict[str, Any]) -> None:
+        client.api.stop(container["Id"], timeout=_GRACE_S)
+        client.api.remove_container(container["Id"], v=True, force=True)
+
+    with engine_errors(f"run {run_id} cannot be removed"):
+        joined = client.api.containers(all=True, filters={"label": f"{JOINED_LABEL}={run_id}"})
+        containers = [*client.api.containers(all=True, filters=filters), *joined]
+        networks = client.api.networks(filters=filters)
+    # Containers come first, because networks that are in use cannot be removed.
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        for container in containers:
+            pool.submit(attempt, container["Names"][0].lstrip("/"), partial(end, container))
+    for network in networks:
+        attempt(f"network {network['Name']}", partial(client.api.remove_network, network["Id"]))
+    if failures:
+        raise WorkerError(f"run {run_id}: not everything could be removed", evidence="\n".join(sorted(failures)))
+    return sorted(removed)

@@ -84,8 +84,8 @@ class DockerRuntime(Runtime):
         """Remove containers and network; see `Runtime.remove`."""
         if not (is_installed("docker") and has_socket()):
             return []
+        from throwcollect.runtimes.docker.containers import remove
         from throwcollect.runtimes.docker.docker_engine import connect, timed_out
-        from throwcollect.runtimes.docker.removal import remove
 
         try:
             client = connect()

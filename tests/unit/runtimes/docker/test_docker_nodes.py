@@ -137,7 +137,7 @@ def test_the_output_of_a_container_is_in_the_log_once_and_before_its_end_is_know
     name = "throwcollect-run-1a2b-sim_0"
     log = runtime.logs.path("sim_0")
     engine.printed[name] = ["one", "sim_0 is ready"]
-    until(lambda: runtime.ready("sim_0"), runtime=runtime)
+    until(lambda: runtime.logs.said_ready("sim_0"), runtime=runtime)
     # More lines than the engine is asked for at first.
     engine.printed[name] += [str(number) for number in range(9)]
     until(lambda: log.read_text().endswith("8\n"), runtime=runtime)
