@@ -24,7 +24,7 @@ from throwcollect.runtimes.docker.containers import remove
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import NodeExit
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 from throwcollect.runtimes.supervisor import Supervisor
 
 TRIALS = 20
@@ -110,9 +110,9 @@ def key_in(directory: Path) -> RunKey:
     return key
 
 
-def place_of(run: str, dataset: Path, key: RunKey) -> Place:
+def place_of(run: str, dataset: Path, key: RunKey) -> RunContext:
     """A run whose logs lie beside the dataset."""
-    return Place(run, dataset, dataset / "logs", 2, Middleware(), key)
+    return RunContext(run, dataset, dataset / "logs", 2, Middleware(), key)
 
 
 @contextmanager

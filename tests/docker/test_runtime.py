@@ -170,8 +170,8 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
 
     def make(*overrides: str, through: DockerClient = client) -> DockerNodes:
         run = new_run()
-        place = place_of(run, tmp_path, key_in(tmp_path))
-        runtime = DockerNodes(place, config_for(tmp_path, *overrides), client=through)
+        context = place_of(run, tmp_path, key_in(tmp_path))
+        runtime = DockerNodes(context, config_for(tmp_path, *overrides), client=through)
         made.append((runtime, run))
         runtime.open()
         return runtime

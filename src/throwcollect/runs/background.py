@@ -157,7 +157,7 @@ def carry_out(id: str, lock: int, order: bytes, *, onlooker: Onlooker, interrupt
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
     run = Records().inherit(id, lock)
     if not order:
-        launch(run, interruptions, config=load(config_path(run.place.directory)), onlooker=onlooker)
+        launch(run, interruptions, config=load(config_path(run.context.directory)), onlooker=onlooker)
         return
     if run.record.kind == "container":
         launch_container(run, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
@@ -253,7 +253,7 @@ def _prepare_session(run: Run, order: Order, onlooker: Onlooker) -> Run:
         _check_session(read)
         # Clients of a session act in real time. The file has the factor, as nodes and watchers take it from there.
         config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
-        directory = run.place.directory
+        directory = run.context.directory
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
         choice = choose(config, say=onlooker.say, warn=onlooker.warn)
@@ -262,7 +262,7 @@ def _prepare_session(run: Run, order: Order, onlooker: Onlooker) -> Run:
         recordings = str(order.output) if choice.name == "local" else None
         run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations, recordings=recordings)
         # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
-        choice.runtime.host(run.place, config, warn=onlooker.warn).close()
+        choice.runtime.host(run.context, config, warn=onlooker.warn).close()
         launching = partial(launch, config=config, onlooker=onlooker)
         return run.prepared(config, directory, launching, held=ExitStack(), undo=ExitStack())
 

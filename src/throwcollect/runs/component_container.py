@@ -17,7 +17,7 @@ from throwcollect.extras import explain_missing
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_selection import require_living
-from throwcollect.runtimes.runtime import Host, Place
+from throwcollect.runtimes.runtime import Host, RunContext
 
 if TYPE_CHECKING:
     from throwcollect.runtimes.docker.component import JoinOptions
@@ -57,12 +57,12 @@ def launch_container(run: Run, order: ContainerOrder, *, onlooker: Onlooker, int
     # `serve` imports this module for `check_order`, and should not wait for the launcher's imports.
     from throwcollect.runs.launcher import launch_host
 
-    def host(place: Place) -> Host:
+    def host(context: RunContext) -> Host:
         from throwcollect.runtimes.docker.component import ComponentContainer
 
         joining = None if order.joins is None else _wait_for_router(order.joins, order.spec, interruptions)
         return ComponentContainer(
-            place, order.component, order.spec, joining, is_running=_is_running, warn=onlooker.warn
+            context, order.component, order.spec, joining, is_running=_is_running, warn=onlooker.warn
         )
 
     launch_host(run, host, onlooker=onlooker, interruptions=interruptions)

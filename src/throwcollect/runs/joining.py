@@ -22,7 +22,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import CONFIGURATION, LAUNCHER, ROBOT_FILES, simulation_name_of, simulation_nodes
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.wording import format_count
 
@@ -58,8 +58,8 @@ def join_run(
         unpack_robot(files, scratch)
         config = load(scratch / "config.yaml")
         onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
-        place = Place(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
-        _simulate(LocalNodes(place, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
+        context = RunContext(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
+        _simulate(LocalNodes(context, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
 
 
 def _simulate(
@@ -71,7 +71,7 @@ def _simulate(
     reports = _Reports(onlooker)
     # Names of nodes have to be unique, and several processes of one machine may join.
     name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
-    roster = simulation_nodes([f"{name}_{index}" for index in range(host.place.simulations)], host.data)
+    roster = simulation_nodes([f"{name}_{index}" for index in range(host.context.simulations)], host.data)
     with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
         supervisor.start()
         while not reports.over and not interruptions():

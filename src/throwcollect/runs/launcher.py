@@ -19,7 +19,7 @@ from throwcollect.runs.events import EventLog
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunFailure, Summary
 from throwcollect.runtimes.registry import get_runtime
-from throwcollect.runtimes.runtime import Host, NodeState, Place, RunEvent
+from throwcollect.runtimes.runtime import Host, NodeState, RunContext, RunEvent
 from throwcollect.wording import command
 
 _WRITE_PROGRESS_S = 1.0
@@ -36,16 +36,16 @@ def launch(run: Run, interruptions: Callable[[], int], *, config: Config, onlook
         The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
     """
 
-    def host(place: Place) -> Host:
+    def host(context: RunContext) -> Host:
         run.record.middleware.joining.settle()
-        return get_runtime(run.record.runtime).host(place, config, warn=onlooker.warn)
+        return get_runtime(run.record.runtime).host(context, config, warn=onlooker.warn)
 
     return launch_host(run, host, onlooker=onlooker, interruptions=interruptions, is_open=config.run.open)
 
 
 def launch_host(
     run: Run,
-    make_host: Callable[[Place], Host],
+    make_host: Callable[[RunContext], Host],
     *,
     onlooker: Onlooker,
     interruptions: Callable[[], int],
@@ -56,18 +56,18 @@ def launch_host(
     With `is_open`, anybody can join the run.
     """
     session = _Session(run, onlooker, interruptions)
-    place = run.place
+    context = run.context
     # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always tells an end.
     code, summary = 1, None
     failure: RunFailure | None = RunFailure("internal error")
     host: Host | None = None
     try:
-        host = make_host(place)
-        with hold_lock(place.directory, alone=False):
+        host = make_host(context)
+        with hold_lock(context.directory, alone=False):
             run.update(launcher=os.getpid())
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
-        lost = None if summary is None else explain_loss(summary.outcomes, hint=place.way_on)
+        lost = None if summary is None else explain_loss(summary.outcomes, hint=context.resume_command)
         code, failure = (0, None) if lost is None else (lost.exit_code, RunFailure.of(lost))
         return summary
     except ThrowcollectError as error:

@@ -206,7 +206,7 @@ def prepare_run(
             middleware=choice.middleware,
         )
         # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
-        choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
+        choice.runtime.host(record.context(run.key), config, warn=onlooker.warn).close()
         run.write(record)
         _warn_if_others_may_join(config, choice.middleware, onlooker)
         onlooker.say(f"plan: {describe_plan(made)}; dataset: {directory}")

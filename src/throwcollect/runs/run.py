@@ -28,7 +28,7 @@ from throwcollect.runs.run_record import RunRecord, Summary
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import find_runtime
-from throwcollect.runtimes.runtime import NodeState, Place
+from throwcollect.runtimes.runtime import NodeState, RunContext
 from throwcollect.state_directory import is_locked, unusable
 from throwcollect.wording import command
 
@@ -89,9 +89,9 @@ class Run:
         return is_locked(self._lock_path)
 
     @property
-    def place(self) -> Place:
-        """The place of the run."""
-        return self.record.place(self.key)
+    def context(self) -> RunContext:
+        """The directories, key and middleware of the run, for its host."""
+        return self.record.context(self.key)
 
     @property
     def connection(self) -> Connection | None:

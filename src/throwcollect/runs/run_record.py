@@ -15,7 +15,7 @@ from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.runtime import NodeState, Place
+from throwcollect.runtimes.runtime import NodeState, RunContext
 
 VERSION: Literal[1] = 1
 """Version of the layout of records."""
@@ -145,12 +145,12 @@ class RunRecord:
     ) -> RunRecord:
         """Make the record of a run for which no runtime is chosen and which this process launches."""
         now = datetime.now(timezone.utc)
-        place = os.path.realpath(directory)
-        return cls(run, name, runtime, place, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
+        context = os.path.realpath(directory)
+        return cls(run, name, runtime, context, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
 
-    def place(self, key: RunKey) -> Place:
-        """The place of the run, which has this key."""
-        return Place(
+    def context(self, key: RunKey) -> RunContext:
+        """The context of the run, which has this key."""
+        return RunContext(
             run=self.run,
             directory=Path(self.directory),
             logs=Path(self.logs),

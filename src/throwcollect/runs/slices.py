@@ -48,7 +48,7 @@ def collect_slice(
         directory: Directory of the dataset, with its configuration and its plan.
         slice: The slice.
         overrides: Keys to change that do not influence the data: ``key=value`` pairs, as ``--set`` takes them.
-        onlooker: Is told what goes on.
+        onlooker: Receives the progress.
         interruptions: How often somebody has asked to stop: the first time, running trials are still finished.
 
     Returns:

@@ -16,7 +16,7 @@ from throwcollect.own_process import SERIAL_LIBRARIES
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 
 if TYPE_CHECKING:
     # Modules that need only the names of nodes should not wait for these imports.
@@ -137,7 +137,7 @@ class NodeHost(ABC):
     data: str
     listen: str
     cleared: bool
-    place: Place
+    context: RunContext
     config: Config
     logs: NodeLogs
 
@@ -146,7 +146,7 @@ class NodeHost(ABC):
         """The connection with which this process joins the run; None while it cannot reach the router."""
         if (endpoint := self.endpoint) is None:
             return None
-        return Connection(endpoint, self.place.key, self.config.run.domain_id, self.place.middleware)
+        return Connection(endpoint, self.context.key, self.config.run.domain_id, self.context.middleware)
 
     def open(self) -> None:
         """Make everything that the nodes need, such as a network, and skip what earlier runs have logged."""
@@ -156,7 +156,7 @@ class NodeHost(ABC):
         """Read the summary of the finished dataset."""
         from throwcollect.dataset.inspect import info
 
-        return info(self.place.directory)
+        return info(self.context.directory)
 
     @property
     @abstractmethod

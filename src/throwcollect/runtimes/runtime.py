@@ -49,7 +49,7 @@ class NodeState:
 
 
 @dataclass(frozen=True)
-class Place:
+class RunContext:
     """The directories of a run on this machine, and how its nodes communicate.
 
     Attributes:
@@ -72,15 +72,15 @@ class Place:
     recordings: str | None = None
 
     @property
-    def way_on(self) -> str | None:
+    def resume_command(self) -> str | None:
         """The command that goes on with the dataset once the run is over; None if it collects none."""
         return command("resume", self.directory) if self.collects else None
 
 
-def make_interruption_error(place: Place) -> Interrupted:
+def make_interruption_error(context: RunContext) -> Interrupted:
     """The error that somebody stopped a collection before every trial had ended."""
-    message = f"interrupted; finished throws are in {place.directory}, the dataset is not complete"
-    return Interrupted(message, hint=place.way_on)
+    message = f"interrupted; finished throws are in {context.directory}, the dataset is not complete"
+    return Interrupted(message, hint=context.resume_command)
 
 
 @dataclass(frozen=True)
@@ -156,11 +156,11 @@ class Runtime(ABC):
     can_be_scaled: ClassVar[bool] = True
 
     @abstractmethod
-    def in_words(self, config: Config) -> str:
+    def describe(self, config: Config) -> str:
         """The runtime in words, as in ``runtime: local processes``."""
 
     @abstractmethod
-    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> Host:
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
         """Make the host of a run, which starts nothing yet; `warn` gets a line of text about each long wait.
 
         Raises:

@@ -107,7 +107,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
     @router.get("/landings")
     def landings(instance: str, first: Annotated[int, Query(ge=0)] = 0) -> LandingPoints:
         """Where throws came down, or pucks rest, of a finished dataset or of one that grows; none for other tasks."""
-        directory = _get_collection(instances, instance).place.directory
+        directory = _get_collection(instances, instance).context.directory
         end = next(reversed(load(config_path(directory)).task.events), "landing")
         columns = (f"{end}_x_m", f"{end}_y_m", "outcome", "trial")
         if _is_finished(directory):
@@ -155,7 +155,7 @@ def _is_finished(directory: Path) -> bool:
 def _find_finished(instances: Instances, instance: str) -> Path:
     """Directory of the finished dataset of a run."""
     run = _get_collection(instances, instance)
-    directory = run.place.directory
+    directory = run.context.directory
     if not _is_finished(directory):
         raise ConflictError(f"run {instance}: its dataset is not finished")
     return directory

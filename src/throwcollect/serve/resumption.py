@@ -21,7 +21,7 @@ def check_resumption(run: Run, *, is_complete: Callable[[Path], bool] = is_compl
         run: The run, as it is now.
         is_complete: Returns whether nothing is left to collect into a directory.
     """
-    directory = run.place.directory
+    directory = run.context.directory
     if run.status == "running":
         raise ConflictError(f"run {run.id} is still running")
     if run.record.kind != "collection" or not os.path.isfile(directory / CONFIG):

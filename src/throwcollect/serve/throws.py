@@ -100,7 +100,7 @@ class ThrowWatch:
         self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
         self._is_over = threading.Event()
         self._newest: bytes | None = None
-        self._planned = PlannedTrials(run.place.directory)
+        self._planned = PlannedTrials(run.context.directory)
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:

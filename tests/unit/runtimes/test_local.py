@@ -19,7 +19,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.runtimes import local
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 
 LAUNCHER = """
 import sys
@@ -34,12 +34,12 @@ sys.stdin.read()
 """
 
 
-def place(directory: Path) -> Place:
-    return Place("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
+def context(directory: Path) -> RunContext:
+    return RunContext("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
 
 
 def nodes(directory: Path, **run: object) -> LocalNodes:
-    return LocalNodes(place(directory), Config.model_validate({"run": run}))
+    return LocalNodes(context(directory), Config.model_validate({"run": run}))
 
 
 def node(code: str, name: str = "node") -> NodeSpec:

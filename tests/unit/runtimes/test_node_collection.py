@@ -19,8 +19,10 @@ def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock, simulations: i
     monkeypatch.setattr(node_collection, "Supervisor", Mock(return_value=supervisor))
     monkeypatch.setattr(node_collection, "RunListener", Mock())
     monkeypatch.setattr(node_collection, "roster", Mock())
-    place = SimpleNamespace(simulations=simulations, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
-    host = SimpleNamespace(place=place, config=Config(), endpoint=None, connection=None)
+    context = SimpleNamespace(
+        simulations=simulations, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp")
+    )
+    host = SimpleNamespace(context=context, config=Config(), endpoint=None, connection=None)
     return NodeCollection(host, session)
 
 

@@ -29,7 +29,7 @@ from throwcollect.runtimes.docker.docker_engine import connect
 from throwcollect.runtimes.docker.docker_nodes import describe_container_end
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
-from throwcollect.runtimes.runtime import NodeState, Place, Session
+from throwcollect.runtimes.runtime import NodeState, RunContext, Session
 from throwcollect.wording import command
 
 CONTAINER = "container"
@@ -84,7 +84,7 @@ class ComponentContainer:
     """Runs one container until it ends or the user asks to stop; a `runtime.Host`.
 
     Args:
-        place: The place of the run that consists of this container.
+        context: The run that consists of this container.
         joining: The options for the run that the container joins; None if it joins none.
         is_running: Returns whether the run with an id is running; it is called again and again.
         warn: Gets a line of text when the engine is silent for long.
@@ -96,7 +96,7 @@ class ComponentContainer:
 
     def __init__(
         self,
-        place: Place,
+        context: RunContext,
         component: str,
         spec: ContainerSpec,
         joining: JoinOptions | None,
@@ -108,11 +108,11 @@ class ComponentContainer:
         self._spec = spec
         self._joining = joining
         self._is_running = is_running
-        self._place = place
-        self._logs = NodeLogs(place.logs)
+        self._context = context
+        self._logs = NodeLogs(context.logs)
         client = connect(timeout_s=ANSWER_S)
         check_container(client, self._spec, component)
-        self._containers = Containers(client, place.run, self._logs, warn)
+        self._containers = Containers(client, context.run, self._logs, warn)
 
     def collect(self, session: Session) -> None:
         """Run the container until it ends, the user asks to stop, or the run that it has joined ends; then close."""
@@ -150,7 +150,7 @@ class ComponentContainer:
     def _options(self) -> dict[str, Any]:
         joining, spec = self._joining, self._spec
         options = container_options(
-            self._place,
+            self._context,
             spec.image,
             CONTAINER,
             spec.section,
@@ -184,7 +184,7 @@ class ComponentContainer:
         if containers.given_up:
             raise WorkerError(
                 f"the Docker engine has not answered for {containers.silent_s:.0f} s",
-                hint=f"once it answers, {command('down', '--run', self._place.run)} ends the container",
+                hint=f"once it answers, {command('down', '--run', self._context.run)} ends the container",
             )
         if (failure := containers.failure(CONTAINER)) is not None:
             raise WorkerError(f"the container of {self._spec.image} cannot be started: {failure}")

@@ -20,7 +20,7 @@ from throwcollect.ros.router_endpoint import LOOPBACK
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeSpec, is_simulation, node_environment, protocol_of
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 from throwcollect.version import __version__
 
 RUN_LABEL = "throwcollect.run"
@@ -53,9 +53,9 @@ def container_of(run: str, node: str) -> str:
     return f"throwcollect-{run}-{node}"
 
 
-def labels(place: Place) -> dict[str, str]:
+def labels(context: RunContext) -> dict[str, str]:
     """Labels of everything that is made for a run."""
-    return {RUN_LABEL: place.run, DIRECTORY_LABEL: str(place.directory.resolve()), VERSION_LABEL: __version__}
+    return {RUN_LABEL: context.run, DIRECTORY_LABEL: str(context.directory.resolve()), VERSION_LABEL: __version__}
 
 
 def key_mount(key: RunKey) -> Mount:
@@ -85,28 +85,28 @@ def publishes_port(config: Config) -> bool:
 
 
 def node_options(
-    node: NodeSpec, *, place: Place, config: Config, image_id: str, address: str | None = None
+    node: NodeSpec, *, context: RunContext, config: Config, image_id: str, address: str | None = None
 ) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
     The configuration may bind the node to another core. The id of the image goes into the dataset's provenance; the
     address is that in the run's network, None for any.
     """
-    section, network = section_of(config, node.name), network_of(place.run)
-    directory = str(place.directory.resolve())
-    endpoint = router_endpoint(config, place.middleware)
+    section, network = section_of(config, node.name), network_of(context.run)
+    directory = str(context.directory.resolve())
+    endpoint = router_endpoint(config, context.middleware)
     own = {
-        **node_environment(Connection(endpoint, KEY, config.run.domain_id, place.middleware)),
+        **node_environment(Connection(endpoint, KEY, config.run.domain_id, context.middleware)),
         # Otherwise nodes would write a random id and /data into the provenance, which mean nothing outside.
         HOST_VARIABLE: socket.gethostname(),
         IMAGE_VARIABLE: image_id,
         DIRECTORY_VARIABLE: directory,
         "THROWCOLLECT_NODE": node.name,
     }
-    mounts = [key_mount(place.key)]
+    mounts = [key_mount(context.key)]
     if node.name != ROUTER:
         mounts.append(Mount(target=DATA, source=directory, type="bind", read_only=node.name != COORDINATOR))
-    options = container_options(place, image(config), node.name, section, environment=own, mounts=mounts)
+    options = container_options(context, image(config), node.name, section, environment=own, mounts=mounts)
     if node.name == ROUTER and config.run.router_port:
         options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
     return {
@@ -119,7 +119,7 @@ def node_options(
 
 
 def container_options(
-    place: Place,
+    context: RunContext,
     image: str,
     node: str,
     section: NodeContainerConfig,
@@ -145,8 +145,8 @@ def container_options(
         "stop_signal": "SIGTERM",
         "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
         **options,
-        "name": container_of(place.run, node),
-        "labels": {**options.get("labels", {}), **labels(place), NODE_LABEL: node},
+        "name": container_of(context.run, node),
+        "labels": {**options.get("labels", {}), **labels(context), NODE_LABEL: node},
         # Nothing but /tmp can be written in the container.
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _with_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),

@@ -18,7 +18,7 @@ from docker.errors import NotFound
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
 from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL, network_of
-from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, engine_errors, in_words
+from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, describe_error, engine_errors
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
 
@@ -134,7 +134,7 @@ class Containers:
         """Reason why a node's container could not be started; None if there is none."""
         starting = self._containers[node].starting
         error = starting.exception() if starting.done() else None
-        return None if error is None else in_words(error)
+        return None if error is None else describe_error(error)
 
     def state(self, node: str) -> ContainerState | None:
         """The last state of a node's container; None if there is none yet."""
@@ -203,7 +203,7 @@ class Containers:
             try:
                 self._look()
             except ENGINE_ERRORS as error:
-                self.last_error = in_words(error)
+                self.last_error = describe_error(error)
                 # Only a request that failed counts: this process itself may have been stopped for a while.
                 self.given_up = self.given_up or self.silent_s >= SILENCE_S
             else:
@@ -273,7 +273,7 @@ def remove(client: DockerClient, run_id: str) -> list[str]:
         except NotFound:
             return
         except ENGINE_ERRORS as error:
-            failures.append(f"{name}: {in_words(error)}")
+            failures.append(f"{name}: {describe_error(error)}")
         else:
             removed.append(name)
 

@@ -45,7 +45,7 @@ def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
         client = DockerClient.from_env(timeout=timeout_s, environment={**os.environ, "DOCKER_HOST": address})
         machine = socket.gethostname() if address.startswith("unix:") else str(client.info()["Name"])
     except ENGINE_ERRORS as error:
-        raise no_answer(in_words(error)) from error
+        raise no_answer(describe_error(error)) from error
     if machine != socket.gethostname():
         raise WorkerError(
             f"the Docker engine at {address} is on another machine, {machine}, without directories of this one",
@@ -54,7 +54,7 @@ def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
     return client
 
 
-def in_words(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """The reason that the engine, or else the operating system, gives for an error."""
     if isinstance(error, APIError):
         return str(error.explanation or error).strip()
@@ -76,7 +76,7 @@ def engine_errors(what: str, *, hint: str | None = None) -> Iterator[None]:
     try:
         yield
     except ENGINE_ERRORS as error:
-        raise WorkerError(f"{what}: {in_words(error)}", hint=hint) from error
+        raise WorkerError(f"{what}: {describe_error(error)}", hint=hint) from error
 
 
 def default_tag() -> str:

@@ -30,7 +30,7 @@ from throwcollect.runtimes.docker.containers import ANSWER_S, Containers, Contai
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
-from throwcollect.runtimes.runtime import Place, Session
+from throwcollect.runtimes.runtime import RunContext, Session
 from throwcollect.wording import command
 
 _ROUTER_HOST = -2
@@ -45,7 +45,7 @@ class DockerNodes(NodeHost):
     Containers and networks carry the run's id as a label, by which `down` finds them if the launcher dies.
 
     Args:
-        place: The place of the run; its id has to be unique on the engine.
+        context: The run; its id has to be unique on the engine.
         warn: Gets a line of text when the engine is silent for long.
         client: Client of the engine; None connects to the one that `engine_address` finds.
 
@@ -56,21 +56,21 @@ class DockerNodes(NodeHost):
 
     def __init__(
         self,
-        place: Place,
+        context: RunContext,
         config: Config,
         *,
         warn: Callable[[str], None] = lambda _line: None,
         client: DockerClient | None = None,
     ) -> None:
-        self.place = place
+        self.context = context
         self.config = config
-        self.listen = router_endpoint(config, place.middleware)
+        self.listen = router_endpoint(config, context.middleware)
         self.cleared = False
         self.data = DATA
-        self.logs = NodeLogs(place.logs)
+        self.logs = NodeLogs(context.logs)
         self._client = client or connect(timeout_s=ANSWER_S)
         self._image_id = check(self._client, config)
-        self._containers = Containers(self._client, place.run, self.logs, warn)
+        self._containers = Containers(self._client, context.run, self.logs, warn)
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
@@ -82,7 +82,7 @@ class DockerNodes(NodeHost):
     def open(self) -> None:
         """Make the run's network, and watch its containers; see `NodeHost.open`."""
         hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
-        with engine_errors(f"run {self.place.run} cannot be prepared on the Docker engine", hint=hint):
+        with engine_errors(f"run {self.context.run} cannot be prepared on the Docker engine", hint=hint):
             self._create_network()
         super().open()
         self._containers.open()
@@ -93,10 +93,10 @@ class DockerNodes(NodeHost):
         Nodes on Fast DDS look up the address of their discovery server only once. A container can choose its address
         only in a network whose range was named, so a first network serves to find a free range.
         """
-        name = network_of(self.place.run)
-        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": labels(self.place)}
+        name = network_of(self.context.run)
+        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": labels(self.context)}
         network = self._client.networks.create(name, **options)
-        if self.place.middleware.is_fast_dds:
+        if self.context.middleware.is_fast_dds:
             network.reload()
             pool = IPAMPool(subnet=network.attrs["IPAM"]["Config"][0]["Subnet"])
             network.remove()
@@ -104,10 +104,10 @@ class DockerNodes(NodeHost):
 
     def _address_of(self, node: NodeSpec) -> str | None:
         """The address that a node is to have in the run's network; None if it may be any."""
-        if node.name != ROUTER or not self.place.middleware.is_fast_dds:
+        if node.name != ROUTER or not self.context.middleware.is_fast_dds:
             return None
         with engine_errors("the engine does not say which addresses the run's network has"):
-            network = self._client.networks.get(network_of(self.place.run))
+            network = self._client.networks.get(network_of(self.context.run))
         # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
@@ -117,7 +117,7 @@ class DockerNodes(NodeHost):
         state = self._containers.state(ROUTER)
         if state is None or state.ended:
             return None
-        protocol = protocol_of(self.config.run, self.place.middleware)
+        protocol = protocol_of(self.config.run, self.context.middleware)
         if self.config.run.router_port:
             return format_endpoint(protocol, LOOPBACK, self.config.run.router_port)
         return format_endpoint(protocol, state.address, ROUTER_PORT) if state.address else None
@@ -126,7 +126,7 @@ class DockerNodes(NodeHost):
         """Begin to start a node; if it cannot be started, one of the next `exits` reports it."""
         options = node_options(
             node,
-            place=self.place,
+            context=self.context,
             config=self.config,
             image_id=self._image_id,
             address=self._address_of(node),
@@ -176,15 +176,15 @@ class DockerNodes(NodeHost):
 
     def _make_silence_error(self) -> WorkerError:
         """The error of a silent engine, with the containers that may still run there, and how to go on."""
-        place = self.place
-        left = ", ".join(container_of(place.run, node) for node in self._containers.nodes) or "none"
+        context = self.context
+        left = ", ".join(container_of(context.run, node) for node in self._containers.nodes) or "none"
         hint = (
-            f"once it answers, {command('down', '--run', place.run)} ends them, "
-            f"and {command('resume', place.directory)} goes on without them"
+            f"once it answers, {command('down', '--run', context.run)} ends them, "
+            f"and {command('resume', context.directory)} goes on without them"
         )
         return WorkerError(
             f"the Docker engine has not answered for {self._containers.silent_s:.0f} s; "
-            f"finished throws are safe in {place.directory}",
+            f"finished throws are safe in {context.directory}",
             evidence="\n".join(filter(None, (self._containers.last_error, f"containers that may run on: {left}"))),
             hint=hint,
         )

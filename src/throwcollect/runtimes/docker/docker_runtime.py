@@ -13,7 +13,7 @@ from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket
-from throwcollect.runtimes.runtime import Check, Place, Runtime
+from throwcollect.runtimes.runtime import Check, RunContext, Runtime
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
@@ -29,17 +29,17 @@ class DockerRuntime(Runtime):
     handle = "container"
     outlives_launcher = True
 
-    def in_words(self, config: Config) -> str:
-        """See `Runtime.in_words`."""
+    def describe(self, config: Config) -> str:
+        """See `Runtime.describe`."""
         from throwcollect.runtimes.docker.container_options import image
 
         return f"Docker containers of {image(config)}"
 
-    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
         """Make the host of a run; see `Runtime.host`."""
         from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 
-        return DockerNodes(place, config, warn=warn)
+        return DockerNodes(context, config, warn=warn)
 
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]

@@ -13,15 +13,15 @@ from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.container_options import image, mount_source, node_options, publishes_port
 from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import NodeRole, NodeSpec
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 
-PLACE = Place("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
+PLACE = RunContext("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
 
 
 def options(name: str, *, core: int | None = None, run: Any = None, **containers: Any) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
     node = NodeSpec(name, ("command", "--option"), NodeRole.EXPENDABLE, core)
-    return node_options(node, place=PLACE, config=config, image_id="sha256:12ab")
+    return node_options(node, context=PLACE, config=config, image_id="sha256:12ab")
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])

@@ -20,7 +20,7 @@ from throwcollect.runtimes.docker import docker_nodes as module
 from throwcollect.runtimes.docker.containers import ContainerState
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 
 CONFIG = Config.model_validate({"containers": {"image": "image"}})
 
@@ -53,7 +53,7 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
         key.create()
         made.append(
             DockerNodes(
-                Place("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
+                RunContext("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
                 CONFIG,
                 warn=warnings.append,
             )
