@@ -30,6 +30,7 @@ from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
 from throwcollect.interruption import stop_signals
+from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runs.component_container import (
     CONTAINER_ORDERS,
     DESCRIPTION,
@@ -256,6 +257,7 @@ def _prepare_session(run: Run, order: Order, onlooker: Onlooker) -> Run:
         directory = run.context.directory
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
+        reserve_port(config.run).close()
         choice = choose(config, say=onlooker.say, warn=onlooker.warn)
         simulations = choice.runtime.simulations(config)
         # Containers do not see the directory.

@@ -13,32 +13,23 @@ from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.config.host_paths import DEVICES, is_allowed_device, refusal
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
-from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runtimes.docker.address import engine_address
 from throwcollect.runtimes.docker.container_options import (
     image,
     mount_source,
-    section_of,
 )
 from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors
-from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
 from throwcollect.state_directory import state_directory
-
-_NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
 
 
 def check(client: DockerClient, config: Config) -> str:
-    """Check the image, the mounts, the networks, and the router's port of a run.
+    """Check the image, the mounts and the networks of a run.
 
     Returns:
         Id of the image, which is a SHA-256 of its content.
     """
-    sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
-    image_id = _check(client, image(config), sections)
-    if config.run.router_port:
-        # The engine binds the port later; trying it here gives an error that names the key of the configuration.
-        reserve_port(config.run).close()
-    return image_id
+    kinds = ("router", "sim", "coordinator")
+    return _check(client, image(config), {f"containers.{kind}": getattr(config.containers, kind) for kind in kinds})
 
 
 def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:
