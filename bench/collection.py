@@ -22,7 +22,7 @@ from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import NodeHost
 from throwcollect.runtimes.run_listener import RunListener
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.samplers import draw_points
@@ -130,8 +130,8 @@ def _key(directory: Path) -> RunKey:
     return key
 
 
-def _place(name: str, directory: Path) -> Place:
-    return Place(name, directory, None, directory / "logs", 0, Middleware.of_process(), _key(directory))
+def _place(name: str, directory: Path) -> RunContext:
+    return RunContext(name, directory, directory / "logs", 0, Middleware.of_process(), _key(directory))
 
 
 def local_runtime(plan: Plan, directory: Path) -> NodeHost:

@@ -20,11 +20,11 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker.containers import remove
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
-from throwcollect.runtimes.docker.held_runs import remove
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import NodeExit
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 from throwcollect.runtimes.supervisor import Supervisor
 
 TRIALS = 20
@@ -110,16 +110,14 @@ def key_in(directory: Path) -> RunKey:
     return key
 
 
-def place_of(run: str, dataset: Path, key: RunKey, *, volume: str | None = None) -> Place:
+def place_of(run: str, dataset: Path, key: RunKey) -> RunContext:
     """A run whose logs lie beside the dataset."""
-    return Place(run, dataset, volume, dataset / "logs", 2, Middleware(), key)
+    return RunContext(run, dataset, dataset / "logs", 2, Middleware(), key)
 
 
 @contextmanager
-def collecting(
-    client: DockerClient, directory: Path, *overrides: str, run: str | None = None, found: tuple[str, ...] = ()
-) -> Iterator[Collection]:
-    """Start the nodes of a collection, or take over those of a run; nothing of it is left afterwards."""
+def collecting(client: DockerClient, directory: Path, *overrides: str, run: str | None = None) -> Iterator[Collection]:
+    """Start the nodes of a collection; nothing of it is left afterwards."""
     run = run or new_run()
     config = config_for(directory, *overrides)
     dataset = directory / "dataset"
@@ -128,8 +126,8 @@ def collecting(
     runtime = DockerNodes(place_of(run, dataset, key_in(directory)), config, client=client)
     try:
         with Supervisor(runtime, config.run, roster(runtime, config.run.simulations)) as supervisor:
-            assert sorted(runtime.open()) == sorted(found)
-            supervisor.start(found=found)
+            runtime.open()
+            supervisor.start()
             yield Collection(runtime, supervisor, dataset)
     finally:
-        remove(client, run, volumes=True)
+        remove(client, run)

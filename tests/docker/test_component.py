@@ -13,7 +13,7 @@ from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin
 from throwcollect.runtimes.docker.container_options import RUN_LABEL
 from throwcollect.runtimes.docker.docker_engine import default_tag

@@ -46,7 +46,7 @@ def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, doc
 def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
     engine: docker.DockerClient, tmp_path: Path
 ) -> None:
-    """Nodes of each kind are killed, a simulation is paused; then the launcher dies, and after it a simulation."""
+    """Nodes of each kind are killed, a simulation is paused; then the launcher dies, and leaves its containers."""
     # Slow enough that the collection outlives all kills even on a fast machine.
     config = write_config(tmp_path, trials=30, sim=f"{FAST}, real_time_factor: 2")
     directory = tmp_path / "data"
@@ -66,14 +66,10 @@ def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
     running.process.communicate()
     left = containers_of(engine, directory)
     assert {"router", "coordinator"} & left.keys()
-    left["sim_1"].kill()
-    time.sleep(chance.uniform(0.0, 2.0))
     resumed = call("resume", directory, "-n", "2", "--runtime", "docker")
     assert resumed.returncode == 0, resumed.stderr
-    assert "sim_1 was lost (ended by SIGKILL)" in resumed.stderr
+    assert "its launcher had ended before its containers; they are ended now" in resumed.stderr
     assert fingerprints(directory) == fingerprints(tmp_path / "undisturbed")
-    # The second launcher does not copy log lines that the first one has copied.
-    assert (directory / "logs" / "sim_0.log").read_text(encoding="utf-8").count("sim_0 is ready") == 1
     provenance = json.loads((directory / "provenance.json").read_text(encoding="utf-8"))
     assert provenance["image"] == engine.images.get(default_tag()).id
     assert {path.stat().st_uid for path in directory.rglob("*")} == {os.getuid()}

@@ -189,7 +189,7 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
-    said = call_here("down", "-v")
+    said = call_here("down")
     assert (said.returncode, said.stdout) == (0, f"{run}: ended and forgotten\n")
     assert_gone(processes)
     assert list_runs("-a") == []

@@ -96,7 +96,7 @@ def over() -> Iterator[tuple[str, str]]:
     """Two runs that have ended."""
     runs, now = [Records().new(name) for name in ("early", "late")], datetime.now(timezone.utc)
     for run in runs:
-        record = RunRecord(run.run, "small", "local", "/none", None, "/none/logs", 0, now, 1, 1, ended=now, exit_code=0)
+        record = RunRecord(run.id, "small", "local", "/none", "/none/logs", 0, now, 1, 1, ended=now, exit_code=0)
         run.write(record)
         run.close()
     yield runs[0].run, runs[1].run

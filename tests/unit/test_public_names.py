@@ -38,9 +38,9 @@ def test_functions_have_the_parameters_that_are_described() -> None:
     described = read_signatures("python.md")
     assert described == {name: list(inspect.signature(getattr(throwcollect, name)).parameters) for name in described}
     described = read_signatures("runs.md")
-    assert described["runs.prepare"] == list(inspect.signature(prepare).parameters)
-    # The last parameter is for the launcher, and not documented.
-    assert described["runs.resume"] == list(inspect.signature(resume).parameters)[:-1]
+    for function in (prepare, resume):
+        # The last parameter is for the launcher, and not documented.
+        assert described[f"runs.{function.__name__}"] == list(inspect.signature(function).parameters)[:-1]
 
 
 @pytest.mark.parametrize("face", [throwcollect, runs], ids=lambda face: face.__name__)

@@ -16,7 +16,7 @@ from throwcollect.cli.dataset.info import print_collected
 from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
-from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, follow
+from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesState, follow
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.interruption import count_interruptions
@@ -87,7 +87,7 @@ def end(run: ClusterRun) -> None:
     typer.echo(f"{run.directory}: stopped; the dataset {complete}")
 
 
-def list_queued(directories: Iterable[Path]) -> list[tuple[ClusterRun, SlicesLook]]:
+def list_queued(directories: Iterable[Path]) -> list[tuple[ClusterRun, SlicesState]]:
     """List the runs in the queue, and how each is; print the error of one whose directory is gone, for example."""
     found = []
     for directory in directories:
@@ -99,7 +99,7 @@ def list_queued(directories: Iterable[Path]) -> list[tuple[ClusterRun, SlicesLoo
     return found
 
 
-def make_row(run: ClusterRun, look: SlicesLook) -> tuple[str, ...]:
+def make_row(run: ClusterRun, look: SlicesState) -> tuple[str, ...]:
     """Make the row of a run in the table that `ps` prints."""
     return (
         _number_of(run),
@@ -111,7 +111,7 @@ def make_row(run: ClusterRun, look: SlicesLook) -> tuple[str, ...]:
     )
 
 
-def make_document(run: ClusterRun, look: SlicesLook) -> dict[str, Any]:
+def make_document(run: ClusterRun, look: SlicesState) -> dict[str, Any]:
     """Make the entry of a run in the JSON document that `ps` prints."""
     return {
         "run": _number_of(run),
@@ -129,7 +129,7 @@ def _number_of(run: ClusterRun) -> str:
     return run.submission.jobs[-1].array or run.submission.jobs[-1].join
 
 
-def _describe_status(look: SlicesLook, run: ClusterRun) -> str:
+def _describe_status(look: SlicesState, run: ClusterRun) -> str:
     if run.submission.live:
         return f"one run on {format_count(run.submission.tasks, 'node')}, {'running' if look.running else 'waiting'}"
     tasks = format_count(run.submission.tasks, "task")

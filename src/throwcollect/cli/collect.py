@@ -33,7 +33,7 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    from throwcollect.runs.prepared_run import PreparedRun
+    from throwcollect.runs.run import Run
 
 LockOption = Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]
 
@@ -77,7 +77,7 @@ def up(
     from throwcollect.runs.preparation import prepare
     from throwcollect.runs.preparation import resume as go_on
 
-    prepare_run: Callable[..., PreparedRun | None]
+    prepare_run: Callable[..., Run | None]
     if resume is None:
         config = config or DEFAULT_CONFIG
         prepare_run = partial(prepare, config, overrides=changes, output=output, processes=count_cores())
@@ -197,16 +197,8 @@ def cover(
         tell(f"make one of them: {command('dataset', 'merge', *found, directory / 'all')}")
 
 
-def launch(run: str, lock: LockOption) -> None:
-    """Launch a prepared run; `up -d` starts this command."""
-    from throwcollect.runs.launcher import launch_inherited
-
-    with display(quiet=True) as shown, count_interruptions() as interruptions:
-        launch_inherited(run, lock, onlooker=shown, interruptions=interruptions)
-
-
 def begin(run: str, lock: LockOption) -> None:
-    """Prepare and launch a run that another process has begun; that process writes the order to standard input."""
+    """Launch a run that another process has prepared, or prepare it as well, if there is an order on standard input."""
     from throwcollect.runs.background import carry_out
 
     order = sys.stdin.buffer.read()
@@ -252,7 +244,7 @@ def join(directory: DatasetArgument, json: JsonOption = False) -> None:
 
 
 def _collect(
-    prepare_run: Callable[..., PreparedRun | None],
+    prepare_run: Callable[..., Run | None],
     *,
     directory: Path | None,
     detach: bool,
@@ -279,14 +271,14 @@ def _collect(
     from throwcollect.cli.dataset.info import print_collected, print_summary
 
     if run is not None:
-        print_collected(summary, run.directory, as_json=json, hint=run.place.way_on)
+        print_collected(summary, run.directory, as_json=json, hint=run.context.resume_command)
     elif directory is not None:
         from throwcollect.dataset.inspect import info
 
         print_summary(info(directory), directory, as_json=json)
 
 
-def _announce(run: PreparedRun, token_file: Path | None, *, view: bool) -> None:
+def _announce(run: Run, token_file: Path | None, *, view: bool) -> None:
     """Hand out the token of a run that other machines may join, and the address of the page if it is asked for."""
     if token_file is not None:
         write_secret(token_file, f"{run.token}\n".encode())
@@ -302,12 +294,11 @@ def _announce(run: PreparedRun, token_file: Path | None, *, view: bool) -> None:
         tell(write_tunnel(address))
 
 
-def _start(run: PreparedRun, *, json: bool) -> None:
+def _start(run: Run, *, json: bool) -> None:
     """Hand the run over to a process of its own, and print how to follow it."""
     with count_interruptions() as interruptions:
         record = run.start(interruptions=interruptions).record
-    where = {"volume": record.volume} if record.volume else {"directory": record.directory}
-    show({"run": record.run, **where}, record.run, json=json)
+    show({"run": record.run, "directory": record.directory}, record.run, json=json)
     if not json:
         tell(f"follow it: {command('wait', '--run', record.run)}   (or ps, logs -f, stop)")
     ensure_written(hint=f"run {record.run} goes on; throwcollect ps lists it")

@@ -31,7 +31,7 @@ _COMMANDS = {
     "Runs": "runs:ps runs:wait runs:logs runs:events runs:scale runs:stop runs:down serve:serve serve:view",
     "From a dataset to a throw": "learning:fit learning:aim learning:throw learning:score learning:adapt",
     "Nodes, as `up` starts them": "node_commands:router node_commands:sim node_commands:coordinator",
-    "": "collect:launch collect:begin",
+    "": "collect:begin",
 }
 """Modules and functions of the commands, by panel of the help; those without a panel are hidden."""
 _GROUPS = {

@@ -20,9 +20,9 @@ from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
     from throwcollect.cluster.cluster_run import ClusterRun
-    from throwcollect.runs.records import Run
+    from throwcollect.runs.run import Run
     from throwcollect.runs.run_record import RunRecord
-    from throwcollect.runtimes.runtime import HeldRun, NodeState
+    from throwcollect.runtimes.runtime import NodeState
 
 _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
@@ -36,26 +36,20 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
     """
     from throwcollect.cluster.submission import find_queued
     from throwcollect.runs.records import Records
-    from throwcollect.runs.run_selection import find_held_runs
     from throwcollect.serve.finding import SERVER, find_living
 
     records = Records()
-    ids = records.ids()
     known: list[Run] = []
-    for name in ids:
+    for name in records.ids():
         try:
             known.append(records.get(name))
         except ConfigError as error:
             tell(f"throwcollect: {error}")
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
-    held = find_held_runs()
-    unrecorded = [each for run, each in held.items() if run not in ids]
     queued, server = find_queued(), find_living()
     if json:
         documents = [_make_document(run) for run in shown]
-        for runtime, found in unrecorded:
-            documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
         if queued:
             from throwcollect.cli.cluster_runs import list_queued, make_document
 
@@ -66,8 +60,7 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
             )
         show(documents, json=True)
         return
-    rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
-    rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
+    rows = [(_make_row(run), _list_node_lines(run)) for run in shown]
     if queued:
         from throwcollect.cli.cluster_runs import list_queued, make_row
 
@@ -104,7 +97,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     if found.status == "died":
         raise describe_death(found)
     if record.summary is not None:
-        print_summary(record.summary, None if record.volume else Path(record.directory), as_json=json)
+        print_summary(record.summary, Path(record.directory), as_json=json)
     if (error := record.error) is not None:
         raise error
 
@@ -184,15 +177,11 @@ def stop(run: RunOption = None) -> None:
         typer.echo(f"{found.id}: stopped")
         return
     complete = "is complete" if error is None else "is not complete"
-    typer.echo(f"{found.id}: stopped; the dataset {complete}: {found.place.dataset}")
+    typer.echo(f"{found.id}: stopped; the dataset {complete}: {found.record.directory}")
 
 
-def down(*, volumes: bool = False, run: RunOption = None) -> None:
-    """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset.
-
-    Options:
-        volumes (-v --volumes): Remove the volume that holds the dataset, too.
-    """
+def down(*, run: RunOption = None) -> None:
+    """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import end
 
@@ -205,7 +194,7 @@ def down(*, volumes: bool = False, run: RunOption = None) -> None:
 
     # A run without a record may be another user's, so it is removed only if it is named.
     found = find_run_to_change(None, died=True) if run is None else run
-    ended, removed = control.down(found, volumes=volumes)
+    ended, removed = control.down(found)
     for name in removed:
         tell(f"removed {name}")
     typer.echo(f"{ended}: ended and forgotten")
@@ -253,7 +242,7 @@ def _make_document(run: Run) -> dict[str, Any]:
 def _make_row(run: Run) -> tuple[str, ...]:
     record = run.record
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
-    dataset = run.place.dataset if record.kind == "collection" else "-"
+    dataset = run.record.directory if record.kind == "collection" else "-"
     simulations = "-" if record.kind == "container" else str(record.simulations)
     return run.id, record.runtime, simulations, throws, _describe_status(run, record), dataset
 
@@ -271,18 +260,13 @@ def _describe_status(run: Run, record: RunRecord) -> str:
     return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
 
 
-def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
-    from throwcollect.runtimes.nodes import is_simulation
+def _list_node_lines(run: Run) -> list[tuple[str, ...]]:
+    """Format the nodes that can still run, as the launcher last wrote them."""
+    from throwcollect.runtimes.registry import find_runtime
+    from throwcollect.runtimes.runtime import Runtime
 
-    simulations = sum(is_simulation(node.name) for node in held.nodes)
-    return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
-
-
-def _list_node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, ...]]:
-    if run.status == "running":
-        return [_make_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
-    # If the launcher has ended, its record of the nodes may be out of date.
-    return _list_held_nodes(*held) if held is not None else []
+    handle = (find_runtime(run.record.runtime) or Runtime).handle
+    return [_make_node_line(node, handle) for node in run.nodes]
 
 
 def _make_node_line(node: NodeState, handle: str) -> tuple[str, ...]:
@@ -293,18 +277,6 @@ def _make_node_line(node: NodeState, handle: str) -> tuple[str, ...]:
         f"{handle} {node.handle[:12]}" if node.handle else "",
         ", ".join(filter(None, (again, node.last_end and f"last: {node.last_end}"))),
     )
-
-
-def _list_held_nodes(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
-    return [(node.name, node.status, f"{_handle(runtime)} {node.handle[:12]}", "") for node in held.nodes]
-
-
-def _handle(name: str) -> str:
-    """Find the noun for the handle of a node; "pid" if this machine cannot use the runtime."""
-    from throwcollect.runtimes.registry import find_runtime
-    from throwcollect.runtimes.runtime import Runtime
-
-    return (find_runtime(name) or Runtime).handle
 
 
 def _make_table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:

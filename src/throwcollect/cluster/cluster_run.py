@@ -62,7 +62,7 @@ class ClusterRun:
         """Numbers of all its jobs."""
         return tuple(job for each in self.submission.jobs for job in (each.array, each.join) if job)
 
-    def look(self) -> SlicesLook:
+    def look(self) -> SlicesState:
         """Look at the queue and the files."""
         # Ask the queue before the files are read: a task puts its slice into place before it leaves the queue.
         queue = slurm.find_tasks()
@@ -73,13 +73,13 @@ class ClusterRun:
             joining = next(iter(queue.get(job.join, ())), joining)
         complete = (self.directory / METADATA).exists()
         finished = frozenset(self.submission.slices) if complete else find_finished(self.directory)
-        return SlicesLook(finished, tuple(tasks.values()), joining, complete)
+        return SlicesState(finished, tuple(tasks.values()), joining, complete)
 
     def stop(self) -> None:
         """End all jobs: tasks shut down properly, and keep the episodes that they have."""
         slurm.cancel(self.jobs)
 
-    def explain(self, look: SlicesLook) -> ThrowcollectError | None:
+    def explain(self, look: SlicesState) -> ThrowcollectError | None:
         """Make the error that says why a run that has ended has no finished dataset; None if it has one."""
         if look.complete:
             return None
@@ -136,7 +136,7 @@ class ClusterRun:
 
 
 @dataclass(frozen=True)
-class SlicesLook:
+class SlicesState:
     """The state of a submitted dataset at one time.
 
     Attributes:
@@ -181,7 +181,7 @@ class ProgressOfSlices:
         self._outcomes: Counter[str] = Counter()
         self._read: set[Slice] = set()
 
-    def at(self, look: SlicesLook) -> Progress:
+    def at(self, look: SlicesState) -> Progress:
         """Count the trials that have ended."""
         directory = self._run.directory
         if look.complete:
@@ -221,7 +221,7 @@ def _count_outcomes(directory: Path) -> Counter[str]:
     return Counter(each for each in read_parquet(directory / THROWS)["outcome"].to_pylist() if each != REFUSED)
 
 
-def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[SlicesLook]:
+def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[SlicesState]:
     """Look at a run every few seconds, until it has ended or `keep_on` returns False.
 
     Yields:

@@ -79,14 +79,9 @@ def submit(script: Path, *options: str) -> str:
     Returns:
         Number of the job.
     """
-    # With several clusters, sbatch prints NUMBER;CLUSTER.
-    return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
-
-
-def check(script: Path) -> None:
-    """Check that Slurm would take a batch script, and submit nothing."""
     try:
-        _run("sbatch", "--test-only", str(script))
+        # With several clusters, sbatch prints NUMBER;CLUSTER.
+        return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
     except WorkerError as error:
         hint = (
             error.hint

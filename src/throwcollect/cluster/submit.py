@@ -80,7 +80,7 @@ def submit(
         overrides: Overrides of keys of the configuration, as ``--set`` takes them.
         live: Whether it is one run on several nodes, as a plan needs that grows with its results.
         dry: Whether to make only the script, and write nothing.
-        onlooker: Is told what is planned and submitted.
+        onlooker: Receives what is planned and submitted.
     """
     directory = directory.absolute()
     with load_locating_errors(config, overrides) as read, ExitStack() as undo:
@@ -180,10 +180,9 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
 
 
 def _write(directory: Path, name: str, text: str) -> Path:
-    """Write a script into the directory of a dataset, and check that Slurm would take it."""
+    """Write a script into the directory of a dataset."""
     path = directory / CLUSTER / name
     write_file(path, text.encode())
-    slurm.check(path)
     return path
 
 

@@ -1,4 +1,4 @@
-"""Keys for runs in containers: the image, the volume, and the options of each kind of node."""
+"""Keys for runs in containers: the image, and the options of each kind of node."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ Cores = Annotated[str, NUMBER_AS_TEXT, Field(pattern=r"^[0-9]+(-[0-9]+)?(,[0-9]+
 # Which directories and devices of the host may be used is checked when a run begins, after links have been followed.
 Mount = Annotated[str, Field(pattern=r"^/[^/:][^:]*:/[^:]*(:ro)?$")]
 Device = Annotated[str, Field(pattern=r"^/dev/[^:]+:/dev/[^:]+:(r|w|rw)$")]
-Volume = Annotated[str, Field(pattern=r"^[a-zA-Z0-9][a-zA-Z0-9_.-]+$")]
 Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 ContainerPort = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,4}(/tcp|/udp)?$")]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
@@ -97,8 +96,6 @@ class ContainersConfig(Section):
     image: str | None = None
     """Image of all nodes; null takes `throwcollect` of this version (`make image`). Another one is pulled if it
     is missing."""
-    volume: Volume | None = None
-    """Volume of the engine that holds the dataset; null writes it to a directory of this machine."""
     router: NodeContainerConfig = NodeContainerConfig()
     """The router."""
     sim: NodeContainerConfig = NodeContainerConfig()

@@ -10,21 +10,19 @@ if TYPE_CHECKING:
     from throwcollect.runs.control import down as down
     from throwcollect.runs.control import scale as scale
     from throwcollect.runs.control import stop as stop
-    from throwcollect.runs.following import Look as Look
+    from throwcollect.runs.following import RunUpdate as RunUpdate
     from throwcollect.runs.following import follow as follow
     from throwcollect.runs.following import wait as wait
     from throwcollect.runs.preparation import prepare as prepare
     from throwcollect.runs.preparation import resume as resume
-    from throwcollect.runs.prepared_run import PreparedRun as PreparedRun
-    from throwcollect.runs.records import Run as Run
+    from throwcollect.runs.run import Run as Run
     from throwcollect.runs.run_record import Summary as Summary
     from throwcollect.runs.run_selection import find as find
 else:
     _PLACES = {
-        "Look": "runs.following:Look",
         "Onlooker": "coordinator.onlooker:Onlooker",
-        "PreparedRun": "runs.prepared_run:PreparedRun",
-        "Run": "runs.records:Run",
+        "Run": "runs.run:Run",
+        "RunUpdate": "runs.following:RunUpdate",
         "Summary": "runs.run_record:Summary",
         "down": "runs.control:down",
         "find": "runs.run_selection:find",

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
+from functools import partial
 from pathlib import Path
 from typing import IO, Literal, cast
 
@@ -25,9 +26,11 @@ from throwcollect.config.values import with_values
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.carried_robot import write_config
+from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
 from throwcollect.interruption import stop_signals
+from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runs.component_container import (
     CONTAINER_ORDERS,
     DESCRIPTION,
@@ -35,10 +38,11 @@ from throwcollect.runs.component_container import (
     check_order,
     launch_container,
 )
-from throwcollect.runs.preparation import MANY_TRIALS, RunRequest, prepare_run, resume
-from throwcollect.runs.prepared_run import PreparedRun
-from throwcollect.runs.records import OpenRun, Records, Run
-from throwcollect.runs.run_record import Kind, Origin, Planning, RunFailure, RunRecord
+from throwcollect.runs.launcher import launch
+from throwcollect.runs.preparation import MANY_TRIALS, prepare, resume
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
+from throwcollect.runs.run_record import Origin, Planning, RunFailure, RunRecord
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import choose, get_runtime
@@ -84,15 +88,16 @@ def begin_run(
     read = load(config, overrides)
     if kind == "session":
         _check_session(read)
-    opened = Records().new(read.name, run=run)
-    directory = opened.directory / "data" if kind == "session" else Path(os.path.realpath(output))
+    made = Records().new(read.name, run=run)
+    directory = made.files / "data" if kind == "session" else output
     record = replace(
-        _make_record(opened, read.name, directory, kind, origin),
+        # The directory of the dataset has to be empty until the plan is made, so logs cannot lie there yet.
+        RunRecord.begin(made.id, read.name, directory, logs=made.files / "logs", kind=kind, origin=origin),
         domain_id=read.run.domain_id,
         simulations=read.run.simulations,
     )
     order = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
-    return _begin(opened, record, _ORDERS.dump_json(order))
+    return _begin(made, record, _ORDERS.dump_json(order))
 
 
 def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Path | None) -> Run:
@@ -101,37 +106,21 @@ def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Pa
     `urdf` is a file with a description of the robot for viewers; None if the component has none.
     """
     check_order(order)
-    opened = Records().new(order.component, run=run)
-    directory = opened.directory / "data"
-    record = _make_record(opened, order.component, directory, "container", origin)
+    made = Records().new(order.component, run=run)
+    directory, logs = made.files / "data", made.files / "logs"
 
     def lay_out() -> None:
         directory.mkdir()
         if urdf is not None:
             shutil.copyfile(urdf, directory / DESCRIPTION)
 
-    return _begin(opened, replace(record, runtime="docker"), CONTAINER_ORDERS.dump_json(order), lay_out)
-
-
-def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin: Origin | None) -> RunRecord:
-    return RunRecord(
-        run=opened.run,
-        name=name,
-        runtime="",
-        directory=str(directory),
-        volume=None,
-        # The directory of the dataset has to be empty until the plan is made, so logs cannot lie there yet.
-        logs=str(opened.directory / "logs"),
-        domain_id=0,
-        started=datetime.now(timezone.utc),
-        launcher=0,
-        simulations=0,
-        kind=kind,
-        origin=origin,
+    record = RunRecord.begin(
+        made.id, order.component, directory, logs=logs, runtime="docker", kind="container", origin=origin
     )
+    return _begin(made, record, CONTAINER_ORDERS.dump_json(order), lay_out)
 
 
-def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
+def _begin(run: Run, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
     """Start the process of a run, write the record with its id, send it the order; `lay_out` makes further files."""
     process: subprocess.Popen[bytes] | None = None
     try:
@@ -141,10 +130,10 @@ def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[
         # The process needs a second until it can handle signals; a request to stop stays blocked until then.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
         try:
-            process = opened.start_process("begin", logs, stdin=subprocess.PIPE)
+            process = run.start_process(logs, stdin=subprocess.PIPE)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        opened.write(replace(record, launcher=process.pid))
+        run.write(replace(record, launcher=process.pid))
         # The process waits for the order before it changes the record, so the record has to be written first.
         with cast(IO[bytes], process.stdin) as pipe:
             pipe.write(order)
@@ -152,51 +141,47 @@ def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[
         if process is not None:
             process.kill()
             process.wait()
-        opened.forget()
+        run.forget()
         if isinstance(error, OSError):
-            raise WorkerError(f"run {opened.run} cannot be begun: {error}") from error
+            raise WorkerError(f"run {run.id} cannot be begun: {error}") from error
         raise
-    # The launcher has inherited the lock. If this process kept it, too, the run would seem to outlive its launcher.
-    opened.close()
-    return Records().get(opened.run)
+    run.close()
+    return run.now()
 
 
-def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
-    """Prepare and launch a run in the process that `begin_run` or `begin_container` has started.
+def carry_out(id: str, lock: int, order: bytes, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+    """Launch a run in the process that `Run.start_process` has started, and prepare it before, if there is an order.
 
-    This process has inherited the locked file and received the order. Signals that ask it to stop were blocked until
-    it called this function; from now on, `interruptions` counts them.
+    This process has inherited the locked file. Signals that ask it to stop may be blocked until it calls this function;
+    from now on, `interruptions` counts them.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
-    records = Records()
-    opened = records.inherit(run, lock)
-    if opened.record.kind == "container":
-        launch_container(opened, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
+    run = Records().inherit(id, lock)
+    if not order:
+        launch(run, interruptions, config=load(config_path(run.context.directory)), onlooker=onlooker)
         return
-    log = NodeLogs(Path(opened.record.logs)).path(LAUNCHER)
+    if run.record.kind == "container":
+        launch_container(run, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
+        return
+    log = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
     # If anything fails before the launch, the error is written into the record, and then the files of the run are
     # removed.
     with ExitStack() as made:
         try:
-            prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
-            planner = _Planner(opened, onlooker, interruptions)
-            prepared = prepare(records, opened, _ORDERS.validate_json(order), planner)
-            if prepared is None:
-                opened.update(ended=datetime.now(timezone.utc), exit_code=0)
-                opened.close()
+            planner = _Planner(run, onlooker, interruptions)
+            if _prepare(run, _ORDERS.validate_json(order), planner) is None:
+                run.update(ended=datetime.now(timezone.utc), exit_code=0)
+                run.close()
                 return
-            made.enter_context(prepared)
-            _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
+            made.enter_context(run)
+            _move_log(log, NodeLogs(Path(run.record.logs)).path(LAUNCHER))
             # The last steps of the preparation do not check for a request to stop, and may have taken long.
             planner.end_if_asked()
         except ThrowcollectError as error:
             end = datetime.now(timezone.utc)
-            opened.update(ended=end, exit_code=error.exit_code, failure=RunFailure.of(error), planning=None)
+            run.update(ended=end, exit_code=error.exit_code, failure=RunFailure.of(error), planning=None)
             raise
-        if prepared.record.run != opened.run:
-            # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
-            opened.forget()
-        prepared.collect(interruptions=interruptions)
+        run.collect(interruptions=interruptions)
 
 
 class _Planner(Onlooker):
@@ -205,7 +190,7 @@ class _Planner(Onlooker):
     It is the onlooker of the preparation, and passes on to the onlooker of the run.
     """
 
-    def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+    def __init__(self, run: Run, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
         self._onlooker = onlooker
         self._run = run
         self._interruptions = interruptions
@@ -252,44 +237,36 @@ def _move_log(before: Path, after: Path) -> None:
         raise WorkerError(f"{after}: the launcher cannot write there: {error.strerror}") from error
 
 
-def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun | None:
-    record = run.record
+def _prepare(run: Run, order: Order, onlooker: Onlooker) -> Run | None:
+    """Prepare a run; None if nothing is left to do."""
+    if run.record.kind == "session":
+        return _prepare_session(run, order, onlooker)
+    cores = count_cores()
     if order.resumed:
-        return resume(
-            order.output,
-            overrides=order.overrides,
-            processes=count_cores(),
-            onlooker=onlooker,
-            run=run,
-        )
-    with load_locating_errors(order.config, order.overrides) as config:
-        request = RunRequest(
-            config,
-            order.config.parent,
-            order.output,
-            record.started,
-            processes=count_cores(),
-            origin=record.origin,
-        )
-        return prepare_run(records, request, onlooker, run=run)
+        return resume(order.output, overrides=order.overrides, processes=cores, onlooker=onlooker, run=run)
+    return prepare(
+        order.config, overrides=order.overrides, output=order.output, processes=cores, onlooker=onlooker, run=run
+    )
 
 
-def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun:
+def _prepare_session(run: Run, order: Order, onlooker: Onlooker) -> Run:
     with load_locating_errors(order.config, order.overrides) as read:
         _check_session(read)
         # Clients of a session act in real time. The file has the factor, as nodes and watchers take it from there.
         config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
-        directory = run.directory / "data"
+        directory = run.context.directory
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
+        reserve_port(config.run).close()
         choice = choose(config, say=onlooker.say, warn=onlooker.warn)
         simulations = choice.runtime.simulations(config)
         # Containers do not see the directory.
         recordings = str(order.output) if choice.name == "local" else None
         run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations, recordings=recordings)
         # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
-        choice.runtime.host(run.place, config, warn=onlooker.warn).close()
-        return PreparedRun(records, run, config, directory, onlooker=onlooker)
+        choice.runtime.host(run.context, config, warn=onlooker.warn).close()
+        launching = partial(launch, config=config, onlooker=onlooker)
+        return run.prepared(config, directory, launching, held=ExitStack(), undo=ExitStack())
 
 
 def _check_session(config: Config) -> None:

@@ -14,9 +14,10 @@ from throwcollect.config.containers import ContainerSpec
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
-from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_selection import require_living
-from throwcollect.runtimes.runtime import Host, Place
+from throwcollect.runtimes.runtime import Host, RunContext
 
 if TYPE_CHECKING:
     from throwcollect.runtimes.docker.component import JoinOptions
@@ -51,23 +52,23 @@ def check_order(order: ContainerOrder) -> None:
         check_container(client, order.spec, order.component)
 
 
-def launch_container(
-    run: OpenRun, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]
-) -> None:
+def launch_container(run: Run, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run."""
     # `serve` imports this module for `check_order`, and should not wait for the launcher's imports.
     from throwcollect.runs.launcher import launch_host
 
-    def host(place: Place) -> Host:
+    def host(context: RunContext) -> Host:
         from throwcollect.runtimes.docker.component import ComponentContainer
 
         joining = None if order.joins is None else _wait_for_router(order.joins, order.spec, interruptions)
-        return ComponentContainer(place, order.component, order.spec, joining, goes_on=_goes_on, warn=onlooker.warn)
+        return ComponentContainer(
+            context, order.component, order.spec, joining, is_running=_is_running, warn=onlooker.warn
+        )
 
     launch_host(run, host, onlooker=onlooker, interruptions=interruptions)
 
 
-def _goes_on(run: str) -> bool:
+def _is_running(run: str) -> bool:
     try:
         return Records().get(run).status == "running"
     except ConfigError:

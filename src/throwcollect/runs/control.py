@@ -5,23 +5,26 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from throwcollect.errors import ConfigError, ConflictError, ThrowcollectError, WorkerError
-from throwcollect.files import StrPath
-from throwcollect.ros.router_endpoint import answers
-from throwcollect.runs.records import Records, Run
-from throwcollect.runs.run_record import RunRecord
-from throwcollect.runs.run_selection import (
-    find_held_runs,
-    id_of,
-    require_living,
-    require_simulations,
+from throwcollect.errors import (
+    ConfigError,
+    ConflictError,
+    NotFoundError,
+    ThrowcollectError,
+    UnreachableError,
+    WorkerError,
 )
-from throwcollect.runtimes.nodes import LAUNCHER
-from throwcollect.runtimes.registry import get_runtime
+from throwcollect.files import StrPath
+from throwcollect.members import names_of
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
+from throwcollect.runs.run_record import RunRecord
+from throwcollect.runs.run_selection import id_of, require_living, require_simulations
+from throwcollect.runtimes.nodes import LAUNCHER, SIMULATIONS
+from throwcollect.runtimes.registry import find_runtime, get_runtime
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
@@ -41,9 +44,10 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
 
     This function waits until the run ends or `keep_on` returns false, and returns the run as it is then.
     """
-    _signal(run.records, require_living(run), signal.SIGTERM)
+    require_living(run)
+    _signal(run, signal.SIGTERM)
     deadline = time.monotonic() + _STOP_S
-    while run.records.lives(run.id) and keep_on():
+    while run.is_locked() and keep_on():
         if time.monotonic() > deadline:
             raise WorkerError(
                 f"run {run.id} has not ended within {_STOP_S:g} s",
@@ -53,43 +57,47 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
     return run.now()
 
 
-def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]]:
+def down(named: StrPath | Run) -> tuple[str, list[str]]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
     `named` is a run, or a name that `find` accepts, or the id of a run without a record whose containers a runtime
-    still holds. A volume that holds the dataset is removed only if `volumes` is true.
+    still holds.
 
     Returns:
-        Id of the run, and names of the containers, networks and volumes that were removed.
+        Id of the run, and names of the containers and networks that were removed.
     """
-    records, held = Records(), find_held_runs()
-    if isinstance(named, Run):
-        run = named.id
-    elif isinstance(named, str) and named in held:
-        run = named
-    else:
-        run = id_of(records, named)
-    record: RunRecord | None = None
+    records = Records()
+    try:
+        run = named.id if isinstance(named, Run) else id_of(records, named)
+    except NotFoundError:
+        run = os.fspath(named)  # type: ignore[arg-type]
+        if "/" in run or not (removed := _remove(run, names_of("runtimes"))):
+            raise
+        return run, removed
     # A run whose record is damaged can be removed, too, but without the record its launcher's process id is unknown.
+    record: RunRecord | None = None
     with suppress(ConfigError):
-        record = records.get(run).record
-    if record is not None:
-        _end_launcher(records, record)
+        found = records.get(run)
+        record = found.record
+        _end_launcher(found)
     taken = records.take(run)
     if taken is None:
         evidence = None if record is None else f"its pid is {record.launcher}"
         raise WorkerError(f"run {run}: its launcher does not end", evidence=evidence)
-    runtime = held[run][0] if run in held else ""
-    if record is not None:
-        runtime = record.runtime
     try:
-        removed = get_runtime(runtime).remove(run, volumes=volumes) if runtime else []
+        removed = _remove(run, names_of("runtimes") if record is None else (record.runtime,))
     except ThrowcollectError:
         # The record stays, so that the command can be repeated.
         taken.close()
         raise
     taken.forget()
     return run, removed
+
+
+def _remove(run: str, runtimes: Iterable[str]) -> list[str]:
+    """Remove everything that runtimes hold of a run; one that cannot be used here holds nothing."""
+    usable = filter(None, map(find_runtime, runtimes))
+    return [name for runtime in usable for name in runtime.remove(run)]
 
 
 def scale(run: Run, simulations: int) -> None:
@@ -100,11 +108,6 @@ def scale(run: Run, simulations: int) -> None:
     require_simulations(run)
     if record.runtime and not get_runtime(record.runtime).can_be_scaled:
         raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
-    if record.endpoint is None:
-        raise ConflictError(f"run {run.id}: is still starting", hint="try again in a moment")
-    record.middleware.joining.settle()
-    from throwcollect.runtimes.node_collection import SIMULATIONS
-
     (result,) = set_parameter(run, [f"/{LAUNCHER}"], SIMULATIONS, simulations)
     if not result.successful:
         raise ConfigError(f"run {run.id}: {result.reason}")
@@ -115,56 +118,38 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
 
     `nodes` are full names, with their namespaces.
     """
-    connection = run.connection
-    if connection is None or not answers(connection.endpoint, patience_s=_ANSWER_S):
-        raise _silent(run, nodes[0])
+    if (connection := run.connection) is None:
+        raise ConflictError(f"run {run.id}: is still starting", hint="try again in a moment")
     connection.middleware.joining.settle()
     from throwcollect.ros import Parameter
     from throwcollect.ros.srv import SetParameters
-    from throwcollect.runtimes.run_listener import take_part
+    from throwcollect.runtimes.run_listener import call_nodes
 
-    with take_part(connection) as (asking, executor):
-        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        futures = []
-        for node in nodes:
-            client = asking.create_client(SetParameters, f"{node}/set_parameters")
-            # A request that is sent before the service is found is lost.
-            if not client.wait_for_service(_ANSWER_S):
-                raise _silent(run, node)
-            futures.append(client.call_async(request))
-        deadline = time.monotonic() + _ANSWER_S
-        for node, future in zip(nodes, futures, strict=True):
-            executor.spin_until_future_complete(future, timeout_sec=max(0.0, deadline - time.monotonic()))
-            if not future.done():
-                raise _silent(run, node)
-        return [future.result().results[0] for future in futures]
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    try:
+        responses = call_nodes(connection, nodes, SetParameters, "set_parameters", request, patience_s=_ANSWER_S)
+    except UnreachableError as error:
+        hint = "throwcollect events tells what became of its nodes"
+        raise WorkerError(f"run {run.id}: {error.message}", hint=hint) from error
+    return [response.results[0] for response in responses]
 
 
-def _silent(run: Run, node: str) -> WorkerError:
-    endpoint = run.record.endpoint
-    who = "its launcher" if node == f"/{LAUNCHER}" else node
-    return WorkerError(
-        f"run {run.id}: {who} does not answer" + (f" over the router at {endpoint}" if endpoint else ""),
-        hint="throwcollect events tells what became of its nodes",
-    )
-
-
-def _end_launcher(records: Records, record: RunRecord) -> None:
+def _end_launcher(run: Run) -> None:
     """End a launcher, and with it its processes: ask it to drain, then to end at once, then kill it."""
     for number, patience_s in ((signal.SIGTERM, _GRACE_S), (signal.SIGTERM, _FORCE_S), (signal.SIGKILL, _FORCE_S)):
-        _signal(records, record, number)
+        _signal(run, number)
         deadline = time.monotonic() + patience_s
-        while records.lives(record.run) and time.monotonic() < deadline:
+        while run.is_locked() and time.monotonic() < deadline:
             time.sleep(_POLL_S)
 
 
-def _signal(records: Records, record: RunRecord, number: signal.Signals) -> None:
+def _signal(run: Run, number: signal.Signals) -> None:
     """Send a signal to a launcher, but never to another process to which its process id was given later."""
     with suppress(ProcessLookupError):
-        # The descriptor is opened before `lives` is called: if the run still lives then, it is the launcher's.
-        process = os.pidfd_open(record.launcher)
+        # The descriptor is opened before the lock is checked: if the run still lives then, it is the launcher's.
+        process = os.pidfd_open(run.record.launcher)
         try:
-            if records.lives(record.run):
+            if run.is_locked():
                 signal.pidfd_send_signal(process, number)
         finally:
             os.close(process)

@@ -10,7 +10,7 @@ from pathlib import Path
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import ConfigError
 from throwcollect.runs.events import EVENTS, Event, parse
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Summary
 from throwcollect.runs.run_selection import describe_death
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
@@ -21,12 +21,12 @@ _READ_S = 0.2
 
 
 @dataclass(frozen=True)
-class Look:
-    """One look at a run, as it was at that moment.
+class RunUpdate:
+    """A run as it was at one moment, and what has happened since the update before.
 
     Attributes:
-        progress: The latest report of the coordinator since the last look; None if there was none.
-        events: Events since the last look.
+        progress: The latest report of the coordinator since the last update; None if there was none.
+        events: Events since the last update.
     """
 
     run: Run
@@ -34,13 +34,13 @@ class Look:
     events: tuple[Event, ...] = ()
 
 
-def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:
+def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[RunUpdate]:
     """Look at a run several times a second until it ends, or `keep_on` returns false.
 
     A program may follow several runs at once.
 
     Yields:
-        A look; the last one shows a run that has ended or died, unless `keep_on` returned false.
+        An update; the last one shows a run that has ended or died, unless `keep_on` returned false.
     """
     run.record.middleware.joining.settle()
     from throwcollect.runtimes.run_listener import RunListener
@@ -49,14 +49,14 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
     events.skip()
     reports: list[Progress] = []
     with RunListener(reports.append) as listener:
-        yield Look(run)
+        yield RunUpdate(run)
         while run.status == "running" and keep_on():
             reports.clear()
             listener.spin(run.connection, _POLL_S)
             # The launcher writes events before the record, so the last record is read before the last events.
             run = run.now()
             happened = tuple(event for event, _ in _read_new_events(events, run))
-            yield Look(run, reports[-1] if reports else None, happened)
+            yield RunUpdate(run, reports[-1] if reports else None, happened)
 
 
 def wait(run: Run) -> Summary:
@@ -90,7 +90,7 @@ def read_logs(
     if unknown := [node for node in nodes if node not in known]:
         raise ConfigError(f"run {run.id}: no node {unknown[0]!r} has printed anything{suggest(unknown[0], files)}")
     tails: dict[str, Tail] = {}
-    for now, last in _look_repeatedly(run, follow=follow, keep_on=keep_on):
+    for now, last in _read_repeatedly(run, follow=follow, keep_on=keep_on):
         files = NodeLogs(Path(now.record.logs)).files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
@@ -108,7 +108,7 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
         An event, and the line of JSON in which it is written.
     """
     tail = Tail(_locate_events(run))
-    for now, _ in _look_repeatedly(run, follow=True, keep_on=keep_on):
+    for now, _ in _read_repeatedly(run, follow=True, keep_on=keep_on):
         yield from _read_new_events(tail, now)
 
 
@@ -126,7 +126,7 @@ def _locate_events(run: Run) -> Path:
     return Path(run.record.logs) / EVENTS
 
 
-def _look_repeatedly(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
+def _read_repeatedly(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
     """Look at a run several times a second while it lives (if it is to be followed), and once at the end.
 
     Yields:

@@ -6,7 +6,6 @@ import os
 import socket
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,12 +18,11 @@ from throwcollect.errors import UnreachableError, WorkerError
 from throwcollect.files import write_file
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.router_endpoint import answers
 from throwcollect.run_key import RunKey
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes
-from throwcollect.runtimes.nodes import LAUNCHER, simulation_name_of, simulation_nodes
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.nodes import CONFIGURATION, LAUNCHER, ROBOT_FILES, simulation_name_of, simulation_nodes
+from throwcollect.runtimes.runtime import RunContext
 from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.wording import format_count
 
@@ -60,8 +58,8 @@ def join_run(
         unpack_robot(files, scratch)
         config = load(scratch / "config.yaml")
         onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
-        place = Place(token.run, scratch, None, scratch / "logs", simulations, Middleware(), key)
-        _simulate(LocalNodes(place, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
+        context = RunContext(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
+        _simulate(LocalNodes(context, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
 
 
 def _simulate(
@@ -73,7 +71,7 @@ def _simulate(
     reports = _Reports(onlooker)
     # Names of nodes have to be unique, and several processes of one machine may join.
     name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
-    roster = simulation_nodes([f"{name}_{index}" for index in range(host.place.simulations)], host.data)
+    roster = simulation_nodes([f"{name}_{index}" for index in range(host.context.simulations)], host.data)
     with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
         supervisor.start()
         while not reports.over and not interruptions():
@@ -112,32 +110,19 @@ class _Reports:
 
 def _read_configuration(connection: Connection, token: JoinToken) -> tuple[str, str]:
     """Ask the launcher of the run for the configuration, and for the files of its robot."""
-    if not answers(connection.endpoint, patience_s=_ANSWER_S):
-        raise WorkerError(
-            f"run {token.run}: no router answers at {connection.endpoint}",
-            hint="is the run over, or does a firewall keep its port closed?",
-        )
     connection.middleware.joining.settle()
     from throwcollect.ros.srv import GetParameters
-    from throwcollect.runtimes.node_collection import CONFIGURATION, ROBOT_FILES
-    from throwcollect.runtimes.run_listener import take_part
+    from throwcollect.runtimes.run_listener import call_nodes
 
-    with ExitStack() as leave:
-        try:
-            node, executor = leave.enter_context(take_part(connection))
-        except UnreachableError as error:
-            # Something accepts connections there, but not with the key of the token.
-            raise WorkerError(
-                f"run {token.run}: the router at {connection.endpoint} does not let this machine in",
-                hint="is that run over, and does another one listen there now? its token is another one",
-            ) from error
-        client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
-        if not client.wait_for_service(_ANSWER_S):
-            raise WorkerError(f"run {token.run}: its launcher cannot be found at {connection.endpoint}")
-        # A request that is sent before the service is found is lost.
-        future = client.call_async(GetParameters.Request(names=[CONFIGURATION, ROBOT_FILES]))
-        executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
-        if not future.done():
-            raise WorkerError(f"run {token.run}: its launcher does not answer at {connection.endpoint}")
-        text, files = (value.string_value for value in future.result().values)
-        return text, files
+    request = GetParameters.Request(names=[CONFIGURATION, ROBOT_FILES])
+    try:
+        (response,) = call_nodes(
+            connection, [f"/{LAUNCHER}"], GetParameters, "get_parameters", request, patience_s=_ANSWER_S
+        )
+    except UnreachableError as error:
+        raise WorkerError(
+            f"run {token.run}: {error.message}",
+            hint="is that run over, or does a firewall keep its port closed? another run has another token",
+        ) from error
+    text, files = (value.string_value for value in response.values)
+    return text, files

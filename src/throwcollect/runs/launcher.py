@@ -3,42 +3,30 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.coordinator.progress import Progress
-from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.summary import explain_loss
-from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError
 from throwcollect.runs.events import EventLog
-from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunFailure, Summary
-from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
-from throwcollect.runtimes.runtime import Host, NodeState, Place, RunEvent
+from throwcollect.runtimes.runtime import Host, NodeState, RunContext, RunEvent
 from throwcollect.wording import command
 
-_POLL_S = 0.05
 _WRITE_PROGRESS_S = 1.0
 
 
-def launch(
-    run: OpenRun,
-    config: Config,
-    *,
-    onlooker: Onlooker,
-    interruptions: Callable[[], int],
-) -> Summary | None:
-    """Launch a prepared run until its last trial has ended, or go on with a run whose launcher died.
+def launch(run: Run, interruptions: Callable[[], int], *, config: Config, onlooker: Onlooker) -> Summary | None:
+    """Launch a prepared run until its last trial has ended.
 
     A run that collects no dataset goes on until the user stops it. This function writes the end of the run into its
     record, and closes the run. `interruptions` tells how often the user has asked to stop: the first time, running
@@ -48,16 +36,16 @@ def launch(
         The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
     """
 
-    def host(place: Place) -> Host:
+    def host(context: RunContext) -> Host:
         run.record.middleware.joining.settle()
-        return get_runtime(run.record.runtime).host(place, config, warn=onlooker.warn)
+        return get_runtime(run.record.runtime).host(context, config, warn=onlooker.warn)
 
     return launch_host(run, host, onlooker=onlooker, interruptions=interruptions, is_open=config.run.open)
 
 
 def launch_host(
-    run: OpenRun,
-    make_host: Callable[[Place], Host],
+    run: Run,
+    make_host: Callable[[RunContext], Host],
     *,
     onlooker: Onlooker,
     interruptions: Callable[[], int],
@@ -68,19 +56,18 @@ def launch_host(
     With `is_open`, anybody can join the run.
     """
     session = _Session(run, onlooker, interruptions)
-    place = run.place
+    context = run.context
     # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always tells an end.
     code, summary = 1, None
     failure: RunFailure | None = RunFailure("internal error")
     host: Host | None = None
     try:
-        host = make_host(place)
-        with hold_lock(place.directory, alone=False):
-            # The nodes and the endpoint in the record may be those of an earlier launcher, and are outdated.
-            run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
+        host = make_host(context)
+        with hold_lock(context.directory, alone=False):
+            run.update(launcher=os.getpid())
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
-        lost = None if summary is None else explain_loss(summary.outcomes, hint=place.way_on)
+        lost = None if summary is None else explain_loss(summary.outcomes, hint=context.resume_command)
         code, failure = (0, None) if lost is None else (lost.exit_code, RunFailure.of(lost))
         return summary
     except ThrowcollectError as error:
@@ -91,10 +78,9 @@ def launch_host(
         code, failure = Interrupted.exit_code, RunFailure("interrupted")
         raise
     finally:
-        # Without a host, nobody has looked for containers of an earlier launcher, so `left` in the record still holds.
-        left = run.record.left if host is None else not host.cleared
+        left = host is not None and not host.cleared
         if left:
-            onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
+            onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.id)} ends them")
         # The end is written into the record before the lock is released; otherwise the run would look dead in between.
         session.end(code, failure, summary, left=left)
         run.close()
@@ -103,13 +89,13 @@ def launch_host(
 class _Session:
     """A `runtime.Session` that writes the record and the events of a run; the run goes on even if that fails."""
 
-    def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+    def __init__(self, run: Run, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
         self.interruptions = interruptions
         self.say = onlooker.say
         self.warn = onlooker.warn
         self._run = run
         self._onlooker = onlooker
-        self._events = EventLog(Path(run.record.logs), run.run)
+        self._events = EventLog(Path(run.record.logs), run.id)
         self._states: list[NodeState] = []
         self._progress: Progress | None = None
         self._written_at = 0.0
@@ -124,9 +110,6 @@ class _Session:
         self._write(lambda: self._events.run_event(event, **details))
         if event == "stopping":
             self._write(lambda: self._run.update(stopping=True))
-
-    def take_over(self, states: Sequence[NodeState]) -> None:
-        self._states = list(states)
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
         if states != self._states:
@@ -150,7 +133,7 @@ class _Session:
         self.event(event, reason=failure and str(failure.error(code)), exit_code=code)
         self._write(
             lambda: self._run.update(
-                nodes=(),
+                nodes=tuple(self._states) if left else (),
                 endpoint=None,
                 progress=self._progress or self._run.record.progress,
                 ended=datetime.now(timezone.utc),
@@ -169,42 +152,3 @@ class _Session:
                 self._failed = True
                 reason = error.message if isinstance(error, ConfigError) else str(error)
                 self._onlooker.warn(f"the record and the events of this run are no longer written: {reason}")
-
-
-def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
-    """Launch a prepared run in this process, which `start_launcher` started, and which inherited the lock."""
-    inherited = Records().inherit(run, lock)
-    config = load(config_path(Path(inherited.record.directory)))
-    launch(inherited, config, onlooker=onlooker, interruptions=interruptions)
-
-
-def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable[[], int]) -> Run:
-    """Launch a prepared run in a process of its own, and return when its nodes are started.
-
-    If the user asks to stop, this function asks the launcher to stop, and waits until it has ended.
-    """
-    try:
-        process = opened.start_process("launch", Path(opened.record.logs), stdin=subprocess.DEVNULL)
-    except OSError as error:
-        raise WorkerError(f"the launcher cannot be started: {error}") from error
-    finally:
-        # The launcher has inherited the lock. If this process kept it, too, the run would seem to outlive its launcher.
-        opened.close()
-    forwarded = 0
-    while (run := records.get(opened.run)).status == "running":
-        if interruptions() > forwarded:
-            forwarded = interruptions()
-            process.terminate()
-        nodes = run.record.nodes
-        # After a request to stop, this waits for the end even if all nodes start, to tell the caller how the run ended.
-        if nodes and all(node.handle for node in nodes) and not forwarded:
-            return run
-        time.sleep(_POLL_S)
-    if run.record.ended is not None:
-        if (failure := run.record.error) is not None:
-            raise failure
-        return run
-    if forwarded:
-        raise Interrupted("interrupted before any node was started")
-    evidence = NodeLogs(Path(run.record.logs)).tail(LAUNCHER)
-    raise WorkerError(f"run {run.id}: its launcher died", evidence=evidence or None)

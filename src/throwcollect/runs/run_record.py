@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +15,7 @@ from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.runtime import NodeState, Place
+from throwcollect.runtimes.runtime import NodeState, RunContext
 
 VERSION: Literal[1] = 1
 """Version of the layout of records."""
@@ -85,8 +86,7 @@ class RunRecord:
     Attributes:
         name: Name of the collection.
         runtime: Name of the runtime; empty until one is chosen.
-        directory: Absolute path of the dataset; if the dataset is in a volume, of the files from which it was made.
-        volume: Name of the volume that holds the dataset; None if a directory does.
+        directory: Absolute path of the dataset.
         logs: Absolute path of the directory with the logs.
         launcher: Process id of the launcher.
         simulations: Number of simulations that the run is to have.
@@ -110,7 +110,6 @@ class RunRecord:
     name: str
     runtime: str
     directory: str
-    volume: str | None
     logs: str
     domain_id: int
     started: datetime
@@ -132,12 +131,28 @@ class RunRecord:
     recordings: str | None = None
     version: Literal[1] = VERSION
 
-    def place(self, key: RunKey) -> Place:
-        """The place of the run, which has this key."""
-        return Place(
+    @classmethod
+    def begin(
+        cls,
+        run: str,
+        name: str,
+        directory: Path,
+        *,
+        logs: Path,
+        runtime: str = "",
+        kind: Kind = "collection",
+        origin: Origin | None = None,
+    ) -> RunRecord:
+        """Make the record of a run for which no runtime is chosen and which this process launches."""
+        now = datetime.now(timezone.utc)
+        context = os.path.realpath(directory)
+        return cls(run, name, runtime, context, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
+
+    def context(self, key: RunKey) -> RunContext:
+        """The context of the run, which has this key."""
+        return RunContext(
             run=self.run,
             directory=Path(self.directory),
-            volume=self.volume,
             logs=Path(self.logs),
             simulations=self.simulations,
             middleware=self.middleware,

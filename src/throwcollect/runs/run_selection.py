@@ -1,4 +1,4 @@
-"""Finds the run that a user names, and runs whose nodes still exist although their launcher has died."""
+"""Finds the run that a user names, and checks what can be done with it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from pathlib import Path
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import StrPath
-from throwcollect.members import names_of
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runtimes.registry import find_runtime, get_runtime
-from throwcollect.runtimes.runtime import HeldRun
 from throwcollect.wording import command, suggest
 
 
@@ -64,35 +62,16 @@ def id_of(records: Records, named: StrPath) -> str:
     return matches[0]
 
 
-def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
-    """Find a run that collects, or has collected, into a directory, and whose nodes still exist without a launcher.
-
-    The run that this process prepares, whose id is `own`, is left out.
-    """
-    for run in reversed(records.into(directory)):
-        if run.id == own:
-            continue
+def refuse_busy(directory: Path, *, own: Run | None = None) -> list[Run]:
+    """Refuse a directory into which a run collects, unless it is `own`; return the runs that have collected into it."""
+    others = [run for run in Records().into(directory) if own is None or run.id != own.id]
+    for run in others:
         if run.status == "running":
-            raise busy_error(run.record)
-        if run.status not in ("died", "abandoned"):
-            continue
-        try:
-            if run.record.runtime and get_runtime(run.record.runtime).is_left(run.id):
-                return run
-        except WorkerError as error:
-            raise WorkerError(
-                f"{directory.absolute()}: containers of run {run.id} may still collect into it: {error.message}",
-                hint=error.hint,
-            ) from error
-    return None
-
-
-def busy_error(record: RunRecord) -> ConflictError:
-    """The error that a run already collects into the directory."""
-    return ConflictError(
-        f"{record.directory}: run {record.run} collects into it",
-        hint=f"{command('wait', '--run', record.run)} follows it",
-    )
+            raise ConflictError(
+                f"{run.record.directory}: run {run.id} collects into it",
+                hint=f"{command('wait', '--run', run.id)} follows it",
+            )
+    return others
 
 
 def describe_death(run: Run) -> WorkerError:
@@ -100,15 +79,15 @@ def describe_death(run: Run) -> WorkerError:
     hint = f"{command('down', '--run', run.id)} cleans up"
     if has_complete_dataset(run):
         return WorkerError(
-            f"run {run.id}: its launcher died, but the dataset is complete: {run.place.dataset}", hint=hint
+            f"run {run.id}: its launcher died, but the dataset is complete: {run.context.directory}", hint=hint
         )
     what = f"run {run.id}: its launcher died"
     # A runtime is chosen after the plan is made, so a run with neither has simulated no trial.
-    is_planned = run.record.runtime != "" or config_path(run.place.directory).is_file()
+    is_planned = run.record.runtime != "" or config_path(run.context.directory).is_file()
     if run.record.kind == "collection" and is_planned:
-        what = f"{what}; finished throws are in {run.place.dataset}"
-        if again := run.place.way_on:
-            hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
+        what = f"{what}; finished throws are in {run.context.directory}"
+        if again := run.context.resume_command:
+            hint = f"{again} goes on where it ended; {hint}"
     return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
 
 
@@ -124,7 +103,7 @@ def has_complete_dataset(run: Run) -> bool:
     # This imports the libraries that read tables, which takes a while and is rarely needed.
     from throwcollect.coordinator.resume import is_complete
 
-    return run.record.volume is None and is_complete(run.place.directory)
+    return is_complete(run.context.directory)
 
 
 def require_living(run: Run) -> RunRecord:
@@ -140,10 +119,3 @@ def require_simulations(run: Run) -> None:
     """Refuse a run that is a container of the catalogue, as it has no simulations."""
     if run.record.kind == "container":
         raise ConflictError(f"run {run.id}: is a container, and has no simulations")
-
-
-def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
-    """Find all runs of which a runtime holds nodes or a network; by the id of a run, the runtime's name and the run."""
-    # A runtime that cannot be used here, as a package is missing or broken, does not keep others from being asked.
-    usable = {name: runtime for name in names_of("runtimes") if (runtime := find_runtime(name)) is not None}
-    return {held.run_id: (name, held) for name, runtime in usable.items() for held in runtime.find_held()}

@@ -6,7 +6,6 @@ import os
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from datetime import datetime, timezone
 from pathlib import Path
 
 from throwcollect.config.loader import load_locating_errors
@@ -27,8 +26,7 @@ from throwcollect.dataset.slices import (
 )
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, Problem
-from throwcollect.runs.preparation import RunRequest, prepare_run
-from throwcollect.runs.records import Records
+from throwcollect.runs.preparation import prepare_run
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
 from throwcollect.wording import command
@@ -50,13 +48,12 @@ def collect_slice(
         directory: Directory of the dataset, with its configuration and its plan.
         slice: The slice.
         overrides: Keys to change that do not influence the data: ``key=value`` pairs, as ``--set`` takes them.
-        onlooker: Is told what goes on.
+        onlooker: Receives the progress.
         interruptions: How often somebody has asked to stop: the first time, running trials are still finished.
 
     Returns:
         Whether there was anything to do.
     """
-    started = datetime.now(timezone.utc)
     directory = Path(directory)
     config = read_frozen_config(directory, overrides)
     plan = Plan.read(directory / PLAN, config).slice_of(slice)
@@ -80,11 +77,10 @@ def collect_slice(
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
-    request = RunRequest(config, directory, attempt, started, plan)
     with ExitStack() as unpublished:
         if scratch is not None:
             unpublished.callback(_keep_recordings, attempt, earlier, directory, slice)
-        with prepare_run(Records(), request, onlooker) as run:
+        with prepare_run(config, attempt, plan, onlooker=onlooker) as run:
             try:
                 summary = run.collect(interruptions=interruptions)
             except Interrupted as error:

@@ -10,8 +10,11 @@ from dataclasses import asdict, dataclass
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.build import build_digest
+from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.ros.router_endpoint import split_address
+from throwcollect.run_key import RunKey
+from throwcollect.trial.conditions import build_of
 
 _START = "tc2."
 """Beginning of every token; the number is the version of the format."""
@@ -38,6 +41,13 @@ class JoinToken:
     tool: str = "spoon"
     task: str = "throw"
     policy: str = ""
+
+    @classmethod
+    def of(cls, run: str, endpoint: str, key: RunKey, config: Config) -> JoinToken:
+        """Make the token of a run with this configuration."""
+        policy = config.task.policy.use if config.task.policy else ""
+        names = config.sim.engine, build_of(config), config.robot.name, config.tool.name, config.task.name, policy
+        return cls(run, endpoint, key.secret.hex(), config.run.domain_id, *names)
 
     def encode(self) -> str:
         """The token as one word."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import Interrupted, LossError, ThrowcollectError
 from throwcollect.runtimes.nodes import COORDINATOR, simulation_name
-from throwcollect.runtimes.runtime import NodeState, Place, Runtime, Session, make_interruption_error
+from throwcollect.runtimes.runtime import NodeState, RunContext, Runtime, Session, make_interruption_error
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
@@ -32,17 +32,13 @@ class InProcessRuntime(Runtime):
 
     can_be_scaled = False
 
-    def in_words(self, config: Config) -> str:
-        """See `Runtime.in_words`."""
+    def describe(self, config: Config) -> str:
+        """See `Runtime.describe`."""
         return "this process, with one simulation"
 
-    def simulations(self, config: Config) -> int:
-        """The only number of simulations that there can be."""
-        return 1
-
-    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> InProcess:
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> InProcess:
         """Make the host of a run in this process."""
-        return InProcess(place, config)
+        return InProcess(context, config)
 
 
 class InProcess:
@@ -50,8 +46,8 @@ class InProcess:
 
     cleared = True
 
-    def __init__(self, place: Place, config: Config) -> None:
-        self._place = place
+    def __init__(self, context: RunContext, config: Config) -> None:
+        self._context = context
         self._config = config
         self._told_at = 0.0
 
@@ -65,7 +61,7 @@ class InProcess:
         from throwcollect.dataset.inspect import info
         from throwcollect.sim.simulator import Simulator
 
-        directory = self._place.directory
+        directory = self._context.directory
         session.event("started", simulations=1)
         with TrialCollection.open(directory, say=session.say) as collection:
             collection.warn = session.warn
@@ -75,13 +71,13 @@ class InProcess:
             finally:
                 simulator.close()
             if not collection.complete:
-                raise make_interruption_error(self._place)
+                raise make_interruption_error(self._context)
 
             def wait() -> None:
                 """Wait for a moment for the process that simulates some trials again."""
                 if session.interruptions() > 1:
                     message = f"interrupted; the throws are in {directory}, the dataset is not finished"
-                    raise Interrupted(message, hint=self._place.way_on)
+                    raise Interrupted(message, hint=self._context.resume_command)
                 time.sleep(_IDLE_S)
 
             # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.

@@ -28,7 +28,7 @@ from throwcollect.runtimes.nodes import (
     node_environment,
     protocol_of,
 )
-from throwcollect.runtimes.runtime import Place, Runtime, Session
+from throwcollect.runtimes.runtime import RunContext, Runtime, Session
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
@@ -41,13 +41,13 @@ _KILLED_S = 5.0
 class LocalRuntime(Runtime):
     """Nodes as child processes of the launcher."""
 
-    def in_words(self, config: Config) -> str:
-        """See `Runtime.in_words`."""
+    def describe(self, config: Config) -> str:
+        """See `Runtime.describe`."""
         return "local processes"
 
-    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
         """Make the host of a run; see `Runtime.host`."""
-        return LocalNodes(place, config)
+        return LocalNodes(context, config)
 
 
 class LocalNodes(NodeHost):
@@ -65,22 +65,21 @@ class LocalNodes(NodeHost):
 
     cleared = True
 
-    def __init__(self, place: Place, config: Config, *, elsewhere: str | None = None) -> None:
-        self.place = place
+    def __init__(self, context: RunContext, config: Config, *, elsewhere: str | None = None) -> None:
+        self.context = context
         self.config = config
-        self.data = str(place.directory)
-        self.logs = NodeLogs(place.logs)
-        self.logs.skip_earlier()
+        self.data = str(context.directory)
+        self.logs = NodeLogs(context.logs)
         self._reserved: socket.socket | None = None
         if elsewhere is not None:
             self.listen = self._endpoint = elsewhere
         else:
             self._reserved = reserve_port(config.run)
             host, port = self._reserved.getsockname()[:2]
-            protocol = protocol_of(config.run, place.middleware)
+            protocol = protocol_of(config.run, context.middleware)
             self.listen = format_endpoint(protocol, host, port)
             self._endpoint = format_endpoint(protocol, reach_from_here(host), port)
-        connection = Connection(self._endpoint, place.key, config.run.domain_id, place.middleware)
+        connection = Connection(self._endpoint, context.key, config.run.domain_id, context.middleware)
         self._environment = {**os.environ, **node_environment(connection)}
         self._processes: dict[str, BaseProcess] = {}
 

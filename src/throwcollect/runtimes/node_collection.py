@@ -17,9 +17,12 @@ from throwcollect.errors import DatasetError, LossError, WorkerError
 from throwcollect.ros import IntegerRange
 from throwcollect.ros.fast_dds import SERVER_REST_S
 from throwcollect.runtimes.nodes import (
+    CONFIGURATION,
     COORDINATOR,
     LAUNCHER,
+    ROBOT_FILES,
     ROUTER,
+    SIMULATIONS,
     NodeExit,
     NodeHost,
     NodeRole,
@@ -31,14 +34,7 @@ from throwcollect.runtimes.nodes import (
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.runtimes.runtime import Session, make_interruption_error
 from throwcollect.runtimes.supervisor import Supervisor
-from throwcollect.wording import format_count
 
-SIMULATIONS = "simulations"
-"""Name of the launcher's parameter."""
-CONFIGURATION = "configuration"
-"""Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
-ROBOT_FILES = "robot_files"
-"""Name of the launcher's parameter that holds the files of a robot that is not installed, see `pack_robot`."""
 MOST_SIMULATIONS = 256
 
 _POLL_S = 0.05
@@ -50,11 +46,11 @@ Something is wrong after the first of these times plus the second one for each s
 
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     """List the nodes of a run: a router, simulations, and a coordinator if the run collects a dataset."""
-    rest_s = SERVER_REST_S if host.place.middleware.is_fast_dds else 0.0
+    rest_s = SERVER_REST_S if host.context.middleware.is_fast_dds else 0.0
     return [
         NodeSpec(ROUTER, ("router", "--listen", host.listen), NodeRole.VITAL, rest_s=rest_s),
-        *simulation_nodes([*map(simulation_name, range(simulations))], host.data, recordings=host.place.recordings),
-        *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.place.collects else []),
+        *simulation_nodes([*map(simulation_name, range(simulations))], host.data, recordings=host.context.recordings),
+        *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.context.collects else []),
     ]
 
 
@@ -78,22 +74,21 @@ class NodeCollection:
     def __init__(self, host: NodeHost, session: Session) -> None:
         self._host = host
         self._session = session
-        self._simulations = self._wanted = host.place.simulations
+        self._simulations = self._wanted = host.context.simulations
         self._set_aside: set[str] = set()
         self._apart_since = math.inf
         self._started_again = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
-        self._listener = RunListener(self._report, name=LAUNCHER, reports=host.place.collects, on_connect=self._offer)
+        self._listener = RunListener(self._report, name=LAUNCHER, reports=host.context.collects, on_connect=self._offer)
 
     def run_to_the_end(self) -> Info | None:
         """See `runtime.Host.collect`."""
         with self._supervisor, self._listener:
-            found = self._host.open()
-            self._session.event("adopted" if found else "started", simulations=self._simulations)
-            self._supervisor.start(found=found)
-            self._session.take_over([state for state in self._supervisor.states() if state.name in found])
+            self._host.open()
+            self._session.event("started", simulations=self._simulations)
+            self._supervisor.start()
             end = self._follow()
-            if not self._host.place.collects:
+            if not self._host.context.collects:
                 return None
             self._check(end)
             # The simulations end while this process reads the dataset.
@@ -119,7 +114,7 @@ class NodeCollection:
             self._session.nodes(self._supervisor.states(), endpoint=self._host.endpoint, simulations=self._simulations)
         if end is None:
             self._session.event("stopping")
-            if not self._host.place.collects:
+            if not self._host.context.collects:
                 return None
             self._session.say("interrupted: finishing the running trials; once more ends at once")
             end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
@@ -128,14 +123,14 @@ class NodeCollection:
         return end
 
     def _check(self, end: NodeExit | None) -> None:
-        place = self._host.place
+        context = self._host.context
         # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
         finished = end is not None and end.code in (0, LossError.exit_code)
         if self._session.interruptions() and not finished:
-            raise make_interruption_error(place)
+            raise make_interruption_error(context)
         if end is not None and not finished:
             kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
-            hint = place.way_on if kind is WorkerError else None
+            hint = context.resume_command if kind is WorkerError else None
             raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
     def _listen(self) -> None:
@@ -167,15 +162,10 @@ class NodeCollection:
             self._session.warn("the coordinator does not see the simulations; all of them are started again")
             self._supervisor.replace([state.name for state in states if state.name != ROUTER])
         else:
-            (router,) = (state for state in states if state.name == ROUTER)
-            died = f"; it was started again {format_count(router.restarts, 'time')}, as it was {router.last_end}"
             raise WorkerError(
                 f"simulations have been ready for {patience_s:g} s, twice, but the coordinator does not see them",
-                evidence=f"they use {self._host.place.middleware.rmw}, and the router at {self._host.endpoint}"
-                + (died if router.restarts else ""),
-                hint="throwcollect logs router shows what it said; it may lack memory"
-                if router.restarts
-                else "a firewall may keep nodes apart; throwcollect doctor shows what is installed",
+                evidence=f"they use {self._host.context.middleware.rmw}, and the router at {self._host.endpoint}",
+                hint="throwcollect logs router shows what it said; a firewall may keep nodes apart",
             )
 
     def _offer(self, node: ros.Node) -> None:

@@ -7,7 +7,6 @@ process and from a container, with every middleware, and even if the launcher ca
 
 from __future__ import annotations
 
-import shutil
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,8 +15,6 @@ from typing import TextIO
 from throwcollect.heartbeat import ready_line
 
 _TAIL_LINES = 40
-_FULL_BYTES = 64 * 1024
-"""A disk with less free space counts as full, because a write that was larger than the free space may have failed."""
 _ORDER = {"launcher": 0, "router": 1, "coordinator": 2}
 """These nodes come first in lists; the simulations follow, sorted by number."""
 
@@ -44,16 +41,12 @@ class NodeLogs:
         return self._directory / f"{name}.log"
 
     def tail(self, name: str) -> str:
-        """Last lines that a node printed, and a remark if the disk is full, so that more may be missing."""
+        """Last lines that a node printed."""
         try:
             with self._open(name) as log:
-                lines = "".join(deque(log, _TAIL_LINES)).strip() + "\n"
-            free = shutil.disk_usage(self._directory).free
+                return "".join(deque(log, _TAIL_LINES)).strip()
         except OSError:
             return ""
-        if free < _FULL_BYTES:
-            lines += f"the disk of {self._directory} is full: {free} bytes are free; free space, and resume"
-        return lines.strip()
 
     def files(self) -> dict[str, Path]:
         """The existing log files by the names of their nodes: launcher, router, coordinator, then simulations."""

@@ -16,7 +16,7 @@ from throwcollect.own_process import SERIAL_LIBRARIES
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 
 if TYPE_CHECKING:
     # Modules that need only the names of nodes should not wait for these imports.
@@ -27,6 +27,12 @@ ROUTER = "router"
 COORDINATOR = "coordinator"
 LAUNCHER = "launcher"
 """Name of the launcher's node; the launcher never runs in a container."""
+SIMULATIONS = "simulations"
+"""Name of the launcher's parameter with the number of simulations."""
+CONFIGURATION = "configuration"
+"""Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
+ROBOT_FILES = "robot_files"
+"""Name of the launcher's parameter that holds the files of a robot that is not installed, see `pack_robot`."""
 
 
 _SIMULATION = "sim_"
@@ -131,7 +137,7 @@ class NodeHost(ABC):
     data: str
     listen: str
     cleared: bool
-    place: Place
+    context: RunContext
     config: Config
     logs: NodeLogs
 
@@ -140,21 +146,17 @@ class NodeHost(ABC):
         """The connection with which this process joins the run; None while it cannot reach the router."""
         if (endpoint := self.endpoint) is None:
             return None
-        return Connection(endpoint, self.place.key, self.config.run.domain_id, self.place.middleware)
+        return Connection(endpoint, self.context.key, self.config.run.domain_id, self.context.middleware)
 
-    def open(self) -> tuple[str, ...]:
-        """Make everything that the nodes need, such as a network.
-
-        Returns:
-            Names of the nodes of a launcher that died, which run on as nodes of this launcher.
-        """
-        return ()
+    def open(self) -> None:
+        """Make everything that the nodes need, such as a network, and skip what earlier runs have logged."""
+        self.logs.skip_earlier()
 
     def info(self) -> Info:
         """Read the summary of the finished dataset."""
         from throwcollect.dataset.inspect import info
 
-        return info(self.place.directory)
+        return info(self.context.directory)
 
     @property
     @abstractmethod
@@ -180,10 +182,6 @@ class NodeHost(ABC):
     @abstractmethod
     def frozen(self) -> frozenset[str]:
         """Names of the nodes that are paused or were stopped by SIGSTOP."""
-
-    def ready(self, name: str) -> bool:
-        """Whether a simulation has ever been ready for trials."""
-        return self.logs.said_ready(name)
 
     @abstractmethod
     def signal(self, name: str, number: signal.Signals) -> None:

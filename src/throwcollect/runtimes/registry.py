@@ -66,7 +66,7 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
         with explain_missing():
             middleware = runtime.prepare(config, launcher, say=say, warn=warn)
         rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
-        say(f"runtime: {runtime.in_words(config)}{rclpy}{note}")
+        say(f"runtime: {runtime.describe(config)}{rclpy}{note}")
         return RuntimeChoice(name, runtime, middleware)
 
     *others, last = candidates = _list_candidates(config)

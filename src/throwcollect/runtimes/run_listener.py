@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from typing import Any
 
 from throwcollect import ros
 from throwcollect.coordinator.progress import Progress
-from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.errors import ConfigError, ThrowcollectError, UnreachableError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.graph_names import make_own_name
 from throwcollect.ros.msg import String
@@ -35,6 +36,40 @@ def take_part(connection: Connection, name: str | None = None) -> Iterator[tuple
         executor = ros.SingleThreadedExecutor(context=context)
         executor.add_node(node)
         yield node, executor
+
+
+def call_nodes(
+    connection: Connection, nodes: Sequence[str], service: type, name: str, request: Any, *, patience_s: float
+) -> list[Any]:
+    """Call a service of several nodes of a run at the same time, and return their responses.
+
+    Args:
+        connection: The way into the run.
+        nodes: Full names of the nodes.
+        service: Type of the service.
+        name: Its name below that of a node.
+        request: The request.
+        patience_s: Longest wait for the router, and then for the nodes [s].
+
+    Raises:
+        UnreachableError: If the router or a node does not answer, or the router does not accept the key.
+    """
+    if not answers(connection.endpoint, patience_s=patience_s):
+        raise UnreachableError(f"no router answers at {connection.endpoint}")
+    with take_part(connection) as (asking, executor):
+        deadline = time.monotonic() + patience_s
+        futures = []
+        for node in nodes:
+            client = asking.create_client(service, f"{node}/{name}")
+            # A request that is sent before the service is found is lost.
+            if not client.wait_for_service(max(0.0, deadline - time.monotonic())):
+                raise UnreachableError(f"{node} cannot be found over the router at {connection.endpoint}")
+            futures.append(client.call_async(request))
+        for node, future in zip(nodes, futures, strict=True):
+            executor.spin_until_future_complete(future, timeout_sec=max(0.0, deadline - time.monotonic()))
+            if not future.done():
+                raise UnreachableError(f"{node} does not answer over the router at {connection.endpoint}")
+        return [future.result() for future in futures]
 
 
 class RunListener:

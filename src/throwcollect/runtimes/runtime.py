@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from throwcollect.coordinator.progress import Progress
     from throwcollect.dataset.summary import Info
 
-RunEvent = Literal["started", "adopted", "scaled", "stopping", "finished", "stopped", "failed"]
+RunEvent = Literal["started", "scaled", "stopping", "finished", "stopped", "failed"]
 Status = Literal["starting", "running", "frozen", "restarting", "lost"]
 
 
@@ -49,43 +49,12 @@ class NodeState:
 
 
 @dataclass(frozen=True)
-class HeldNode:
-    """A node of a run, as its runtime describes it.
-
-    Attributes:
-        status: The runtime's word for the state, such as ``running``, ``paused`` or ``exited``.
-        handle: Id of the node in the runtime.
-    """
-
-    name: str
-    status: str
-    handle: str
-
-
-@dataclass(frozen=True)
-class HeldRun:
-    """A run of which a runtime holds something; any user of the engine may have started it.
-
-    Attributes:
-        source: Absolute path of the dataset's directory, or name of the volume that holds it.
-        version: Version of throwcollect that started the run.
-        nodes: Nodes of the run, sorted by name.
-    """
-
-    run_id: str
-    source: str
-    version: str
-    nodes: tuple[HeldNode, ...]
-
-
-@dataclass(frozen=True)
-class Place:
+class RunContext:
     """The directories of a run on this machine, and how its nodes communicate.
 
     Attributes:
         run: Id of the run.
-        directory: Directory of the dataset; if the dataset is in a volume, of the files from which it is made.
-        volume: Name of the volume that holds the dataset; None if a directory does.
+        directory: Directory of the dataset.
         logs: Directory of the logs.
         simulations: Number of simulations at the start.
         key: The key that the router asks for.
@@ -95,7 +64,6 @@ class Place:
 
     run: str
     directory: Path
-    volume: str | None
     logs: Path
     simulations: int
     middleware: Middleware
@@ -104,20 +72,15 @@ class Place:
     recordings: str | None = None
 
     @property
-    def dataset(self) -> str:
-        """The place of the dataset, in words."""
-        return str(self.directory) if self.volume is None else f"volume {self.volume}, {self.run}"
-
-    @property
-    def way_on(self) -> str | None:
-        """The command that goes on with the dataset once the run is over; None where no command can, as in a volume."""
-        return command("resume", self.directory) if self.collects and not self.volume else None
+    def resume_command(self) -> str | None:
+        """The command that goes on with the dataset once the run is over; None if it collects none."""
+        return command("resume", self.directory) if self.collects else None
 
 
-def make_interruption_error(place: Place) -> Interrupted:
+def make_interruption_error(context: RunContext) -> Interrupted:
     """The error that somebody stopped a collection before every trial had ended."""
-    message = f"interrupted; finished throws are in {place.dataset}, the dataset is not complete"
-    return Interrupted(message, hint=place.way_on)
+    message = f"interrupted; finished throws are in {context.directory}, the dataset is not complete"
+    return Interrupted(message, hint=context.resume_command)
 
 
 @dataclass(frozen=True)
@@ -149,9 +112,6 @@ class Session(Protocol):
 
     def event(self, event: RunEvent, *, simulations: int | None = None) -> None:
         """Write an event of the run."""
-
-    def take_over(self, states: Sequence[NodeState]) -> None:
-        """Take over nodes whose events an earlier launcher has written."""
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
         """Write the states of the nodes, the endpoint of the router, and how many simulations there are to be."""
@@ -188,21 +148,19 @@ class Runtime(ABC):
     Attributes:
         handle: The kind of id that its nodes have, as a noun.
         outlives_launcher: Whether nodes go on without the process that started them.
-        has_volumes: Whether the dataset may be in the volume that ``containers.volume`` names.
-        can_be_scaled: Whether the number of simulations can be changed while a run lives.
+        can_be_scaled: Whether a run may have any number of simulations, which can be changed while it lives.
     """
 
     handle: ClassVar[str] = "pid"
     outlives_launcher: ClassVar[bool] = False
-    has_volumes: ClassVar[bool] = False
     can_be_scaled: ClassVar[bool] = True
 
     @abstractmethod
-    def in_words(self, config: Config) -> str:
+    def describe(self, config: Config) -> str:
         """The runtime in words, as in ``runtime: local processes``."""
 
     @abstractmethod
-    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> Host:
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
         """Make the host of a run, which starts nothing yet; `warn` gets a line of text about each long wait.
 
         Raises:
@@ -238,27 +196,18 @@ class Runtime(ABC):
 
     def simulations(self, config: Config) -> int:
         """Number of simulations with which a run begins."""
-        return config.run.simulations
+        return config.run.simulations if self.can_be_scaled else 1
 
-    def find_held(self) -> list[HeldRun]:
-        """Find the runs of which the runtime holds something; none if it does not answer quickly."""
-        return []
+    def remove(self, run: str) -> list[str]:
+        """Remove everything that the runtime holds of a run, but no directory with a dataset.
 
-    def is_left(self, run: str) -> bool:
-        """Whether the runtime holds nodes of a run whose launcher has ended.
-
-        Raises:
-            WorkerError: If the runtime does not answer in time.
-        """
-        return False
-
-    def remove(self, run: str, *, volumes: bool) -> list[str]:
-        """Remove everything that the runtime holds of a run, but a volume with its dataset only if `volumes` is true.
+        A runtime that has ended holds nothing.
 
         Returns:
-            Names of the containers, networks and volumes that were removed.
+            Names of the containers and networks that were removed.
 
         Raises:
-            WorkerError: If something could not be removed; everything else is removed first.
+            WorkerError: If the runtime does not answer in time, or something could not be removed; everything else is
+                removed first.
         """
         return []

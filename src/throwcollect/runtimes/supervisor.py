@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import time
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import Interrupted, UnreachableError, WorkerError
@@ -53,12 +53,11 @@ class Supervisor:
     def __exit__(self, *_: object) -> None:
         self.host.close()
 
-    def start(self, *, found: Collection[str] = ()) -> None:
-        """Start all nodes, except those (`found`) that a launcher that died has left running."""
+    def start(self) -> None:
+        """Start all nodes."""
         self._start_deadline = time.monotonic() + self._run.start_timeout_s
         for name in self._roster:
-            if name not in found:
-                self._start(name)
+            self._start(name)
 
     def change(self, roster: Sequence[NodeSpec]) -> None:
         """Change the roster: start the nodes that are new, and end those that are not in it any more."""
@@ -89,12 +88,9 @@ class Supervisor:
         end = None
         news = self._end_frozen()
         # Readiness is noted before ends are handled: a simulation that was ready once may be restarted more often.
-        self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
+        self._ready |= {name for name in self._expendables if name in self._ready or self.host.logs.said_ready(name)}
         self._has_worked |= self._ready
         for node in self.host.exits():
-            if node.name not in self._roster:
-                # The node was taken over from an earlier launcher, which had already removed it from the roster.
-                continue
             self._last_end[node.name] = node.reason
             is_main = self._roster[node.name].role is NodeRole.MAIN
             if is_main and not (_may_go_on(node) and self._schedule_restart(node)):

@@ -22,7 +22,8 @@ from throwcollect.dataset.journal import read_commits
 from throwcollect.dataset.manifest import read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe
 from throwcollect.sweep.parquet_file import read_parquet
@@ -106,7 +107,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
     @router.get("/landings")
     def landings(instance: str, first: Annotated[int, Query(ge=0)] = 0) -> LandingPoints:
         """Where throws came down, or pucks rest, of a finished dataset or of one that grows; none for other tasks."""
-        directory = _get_collection(instances, instance).place.directory
+        directory = _get_collection(instances, instance).context.directory
         end = next(reversed(load(config_path(directory)).task.events), "landing")
         columns = (f"{end}_x_m", f"{end}_y_m", "outcome", "trial")
         if _is_finished(directory):
@@ -118,7 +119,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
 
 def _get_collection(instances: Instances, instance: str) -> Run:
     run = instances.get(instance)
-    if run.record.kind != "collection" or run.record.volume is not None:
+    if run.record.kind != "collection":
         raise NotFoundError(f"run {instance} has no dataset in a directory")
     return run
 
@@ -154,7 +155,7 @@ def _is_finished(directory: Path) -> bool:
 def _find_finished(instances: Instances, instance: str) -> Path:
     """Directory of the finished dataset of a run."""
     run = _get_collection(instances, instance)
-    directory = run.place.directory
+    directory = run.context.directory
     if not _is_finished(directory):
         raise ConflictError(f"run {instance}: its dataset is not finished")
     return directory

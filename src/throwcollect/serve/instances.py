@@ -24,7 +24,8 @@ from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component
@@ -101,13 +102,13 @@ class Instances:
         origin = run.record.origin
         with _one_at_a_time():
             check_resumption(run.now())
-            for other in Records().into(run.place.directory):
+            for other in Records().into(run.context.directory):
                 if other.status == "running":
                     raise ConflictError(f"run {other.id} collects into the dataset of run {run.id}")
             if origin is not None and origin.component in self.catalogue.components:
                 _check_room(self.catalogue.get(origin.component))
-            config = config_path(run.place.directory)
-            return begin_run(config, overrides=(), output=run.place.directory, origin=origin, resumed=True)
+            config = config_path(run.context.directory)
+            return begin_run(config, overrides=(), output=run.context.directory, origin=origin, resumed=True)
 
     def stop(self, instance: str, *, force: bool = False) -> None:
         """Ask an instance to finish its running trials and end; by force, end it at once, and forget it.
@@ -146,7 +147,7 @@ class Instances:
         if urdf is not None:
             check_appearance(own, urdf)
         record = _require_living(run)
-        config = load(config_path(run.place.directory))
+        config = load(config_path(run.context.directory))
         nodes = [name_node(config, name) for name in simulations_of(record.nodes)]
         if not nodes:
             raise ConflictError(f"run {run.id}: no simulation runs")

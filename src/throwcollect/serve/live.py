@@ -19,7 +19,8 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, DatasetError, NotFoundError, ThrowcollectError, WorkerError
 from throwcollect.runs.control import set_parameter
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.serve.state import simulations_of
 
 _PARAMETER = "sim.real_time_factor"
@@ -124,7 +125,7 @@ def _runs(run: Run, simulation: str) -> bool:
 
 def _set_speed(run: Run, simulation: str, factor: float | None) -> None:
     """Set the real-time factor of a simulation; None for that of its configuration."""
-    config = load(config_path(run.place.directory))
+    config = load(config_path(run.context.directory))
     value = (config.sim.real_time_factor or _FULL_SPEED) if factor is None else factor
     (result,) = set_parameter(run, [name_node(config, simulation)], _PARAMETER, value)
     if not result.successful:

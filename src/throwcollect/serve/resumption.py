@@ -10,7 +10,7 @@ from pathlib import Path
 from throwcollect.coordinator.resume import is_complete
 from throwcollect.dataset.directory import CONFIG, METADATA
 from throwcollect.errors import ConflictError
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 from throwcollect.wording import command
 
 
@@ -21,10 +21,10 @@ def check_resumption(run: Run, *, is_complete: Callable[[Path], bool] = is_compl
         run: The run, as it is now.
         is_complete: Returns whether nothing is left to collect into a directory.
     """
-    directory = run.place.directory
+    directory = run.context.directory
     if run.status == "running":
         raise ConflictError(f"run {run.id} is still running")
-    if run.record.kind != "collection" or run.record.volume is not None or not os.path.isfile(directory / CONFIG):
+    if run.record.kind != "collection" or not os.path.isfile(directory / CONFIG):
         raise ConflictError(f"run {run.id} has no dataset in a directory to go on with")
     if is_complete(directory):
         raise ConflictError(

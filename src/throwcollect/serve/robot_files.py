@@ -20,7 +20,8 @@ from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.runs.component_container import DESCRIPTION
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 
 _MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
 """URL of a mesh in a description: its package, and its path in that package."""
@@ -32,7 +33,7 @@ _carried: dict[str, Path] = {}
 def description_of(run: Run) -> str:
     """URDF of the robot of a run, with its tool; meshes are ``package://`` URLs."""
     if run.record.kind == "container":
-        path = run.place.directory / DESCRIPTION
+        path = run.context.directory / DESCRIPTION
         if not path.is_file():
             raise NotFoundError(f"run {run.id}: its component has no urdf")
         return read_urdf_text(path)
@@ -76,7 +77,7 @@ def scene_of(run: Run) -> SceneFacts:
 
 def _find_config(run: Run) -> Path:
     """File of the configuration of a run."""
-    path = config_path(run.place.directory)
+    path = config_path(run.context.directory)
     if not path.is_file():
         raise NotFoundError(f"run {run.id} has no configuration yet")
     return path
@@ -115,7 +116,7 @@ def _find_carried(*names: str) -> Path | None:
 def _look_for_carried() -> None:
     for run in Records().all():
         with suppress(OSError):
-            directory = run.place.directory.resolve(strict=True)
+            directory = run.context.directory.resolve(strict=True)
             for name in list_carried(directory):
                 # A link may lead out of the directory.
                 if (file := directory / name).resolve() == file:

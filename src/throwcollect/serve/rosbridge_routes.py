@@ -11,7 +11,8 @@ from fastapi import APIRouter, WebSocket
 
 from throwcollect.errors import ConflictError, ThrowcollectError
 from throwcollect.ros.connection import Connection
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
 from throwcollect.serve.sockets import NOT_FOUND, close, refuse, refuse_ended, wait_for_end

@@ -10,7 +10,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 
 _LOOK_S = 1.0
 

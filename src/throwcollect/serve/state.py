@@ -13,7 +13,8 @@ from pydantic.dataclasses import dataclass
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Kind, Planning
 from throwcollect.runtimes.nodes import is_simulation
 from throwcollect.runtimes.runtime import NodeState
@@ -67,7 +68,7 @@ class InstanceState:
         nodes: Its nodes; none once it has ended, or died with them.
         planning: How far the plan is while it is made; else None.
         progress: How far it has come; None before the first report, and without a coordinator.
-        dataset: Where the dataset is, in words; None if it collects none.
+        dataset: Directory of the dataset; None if it collects none.
         summary: What the dataset holds; None if it is not finished.
         robots: Names of its simulations that run, each of which is the namespace of its topics.
         can_be_resumed: Whether it ended before its last trial, so that clients can continue its dataset.
@@ -194,7 +195,7 @@ def describe(run: Run) -> InstanceState:
         nodes=list(run.nodes),
         planning=record.planning if run.status == "running" else None,
         progress=record.progress,
-        dataset=run.place.dataset if record.kind == "collection" else None,
+        dataset=record.directory if record.kind == "collection" else None,
         summary=record.summary,
         robots=simulations_of(run.nodes),
         can_be_resumed=can_be_resumed(run),

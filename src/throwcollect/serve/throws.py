@@ -23,7 +23,7 @@ from throwcollect.ros import Node
 from throwcollect.ros.msg import UInt8MultiArray
 from throwcollect.ros.nodes.coordinator.showing import SHOWN_QOS, make_shown_topic
 from throwcollect.run_key import Signer
-from throwcollect.runs.records import Run
+from throwcollect.runs.run import Run
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.serve.state import simulations_of
 from throwcollect.sweep.plan import Plan
@@ -100,7 +100,7 @@ class ThrowWatch:
         self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
         self._is_over = threading.Event()
         self._newest: bytes | None = None
-        self._planned = PlannedTrials(run.place.directory)
+        self._planned = PlannedTrials(run.context.directory)
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:

@@ -11,15 +11,15 @@ from typing import Any
 import pytest
 
 from throwcollect.cli import cluster_runs
-from throwcollect.cluster.cluster_run import SlicesLook
+from throwcollect.cluster.cluster_run import SlicesState
 from throwcollect.cluster.slurm import ArrayTask
 from throwcollect.errors import ConfigError
 
 RUN: Any = SimpleNamespace()
 
 
-def look(*tasks: ArrayTask, complete: bool = False) -> SlicesLook:
-    return SlicesLook(frozenset(), tasks, None, complete)
+def look(*tasks: ArrayTask, complete: bool = False) -> SlicesState:
+    return SlicesState(frozenset(), tasks, None, complete)
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_logs_of_a_cluster_run_are_followed_until_it_ends(
     run: Any = SimpleNamespace(directory="data", logs=logs, submission=SimpleNamespace(tasks=2))
     first, second = tmp_path / "7_0.log", tmp_path / "7_1.log"
 
-    def follow(_run: Any, **_: Any) -> Iterator[SlicesLook]:
+    def follow(_run: Any, **_: Any) -> Iterator[SlicesState]:
         yield look()
         logs["0"] = first
         first.write_text("begins\nhal")

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from throwcollect.cluster import cluster_run
-from throwcollect.cluster.cluster_run import ProgressOfSlices, SlicesLook
+from throwcollect.cluster.cluster_run import ProgressOfSlices, SlicesState
 
 
 @pytest.fixture
@@ -33,17 +33,17 @@ def test_the_speed_counts_only_trials_that_ended_since_the_first_look(
     seconds = iter([100.0, 110.0])
     monkeypatch.setattr(cluster_run, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
     progress = ProgressOfSlices(run)
-    looks = [SlicesLook(frozenset(), (), None, complete) for complete in (False, True)]
+    looks = [SlicesState(frozenset(), (), None, complete) for complete in (False, True)]
     assert [progress.at(look).throws_per_s for look in looks] == [0.0, 3.0]
 
 
 def test_the_first_look_at_a_finished_dataset_counts_all_outcomes(run: Any) -> None:
-    progress = ProgressOfSlices(run).at(SlicesLook(frozenset(), (), None, complete=True))
+    progress = ProgressOfSlices(run).at(SlicesState(frozenset(), (), None, complete=True))
     assert (progress.ended, progress.outcomes) == (30, {"landed": 27, "not_released": 3})
 
 
 def test_refused_trials_are_not_counted(run: Any) -> None:
     outcomes = ["landed"] * 27 + ["refused"] * 2 + ["not_released"]
     pq.write_table(pa.table({"outcome": outcomes}), run.directory / "throws.parquet")
-    progress = ProgressOfSlices(run).at(SlicesLook(frozenset(), (), None, complete=True))
+    progress = ProgressOfSlices(run).at(SlicesState(frozenset(), (), None, complete=True))
     assert (progress.ended, progress.failed) == (28, 1)

@@ -48,7 +48,7 @@ scontrol: fatal: Could not establish a configuration source
         slurm.find_tasks()
     assert "resolve_ctls" not in str(caught.value)
     with pytest.raises(ConfigError, match="Slurm has no controller that sbatch can reach") as refused:
-        slurm.check(tmp_path / "script")
+        slurm.submit(tmp_path / "script")
     assert "try: run this on a login node" in str(refused.value)
 
 
@@ -60,6 +60,6 @@ def test_a_refusal_by_slurm_names_the_file_and_option_that_correct_it(
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
     monkeypatch.setenv("XDG_CONFIG_HOME", "/home/me/.config")
     with pytest.raises(ConfigError, match="invalid partition specified: standard") as refused:
-        slurm.check(tmp_path / "script")
+        slurm.submit(tmp_path / "script")
     assert "/home/me/.config/throwcollect/cluster.yaml" in str(refused.value)
     assert "--set cluster." in str(refused.value)

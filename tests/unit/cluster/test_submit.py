@@ -25,7 +25,6 @@ def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monk
         return "12"
 
     monkeypatch.setattr(slurm, "submit", answer)
-    monkeypatch.setattr(slurm, "check", lambda _: None)
     monkeypatch.setattr(slurm, "cancel", cancelled.extend)
     with pytest.raises(WorkerError, match="too many jobs"):
         submit(config, tmp_path / "data", 2, onlooker=SILENT)
@@ -43,7 +42,6 @@ def test_jobs_are_cancelled_if_they_cannot_be_recorded(
     config = write_config(tmp_path, trials=4, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
     numbers, cancelled = iter("123"), list[str]()
     monkeypatch.setattr(slurm, "submit", lambda *_: next(numbers))
-    monkeypatch.setattr(slurm, "check", lambda _: None)
     monkeypatch.setattr(slurm, "cancel", cancelled.extend)
     monkeypatch.setattr(module, "write_submission", fail)
     with pytest.raises(DatasetError, match="No space left"):

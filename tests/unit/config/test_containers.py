@@ -21,7 +21,6 @@ FULL = """\
 run: {simulations: 1, runtime: docker}
 containers:
   image: lab/throws:2
-  volume: throws_1
   router: {ports: {80: 8080, 53/udp: 5353}}
   coordinator: {mounts: [/a:/b], options: {gpus: -1}}
   sim:
@@ -56,7 +55,6 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("section", "message"),
     [
-        ("volume: a b", "volume: should match pattern"),
         ("sim: {memory: 512MB}", "sim.memory: should match pattern"),
         ("sim: {cpuset: 0-}", "sim.cpuset: should match pattern"),
         *((f"sim: {{mounts: ['{mount}']}}", "sim.mounts.0: should match pattern") for mount in ("a:/b", "/a", "//:/b")),
@@ -78,5 +76,5 @@ def test_every_container_option_is_a_keyword_of_the_docker_sdk(option: str) -> N
 
 
 def test_keys_of_containers_do_not_change_the_dataset() -> None:
-    containers = ContainersConfig(image="other", volume="throws")
+    containers = ContainersConfig(image="other")
     assert Config(containers=containers).without_run() == Config()

@@ -15,7 +15,8 @@ from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerError
 from throwcollect.runs import background
 from throwcollect.runs.background import begin_run, carry_out
-from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -136,7 +137,7 @@ def test_a_run_that_cannot_be_begun_leaves_no_record_and_no_process(
     def fail(*_: object) -> None:
         raise ConfigError("the disk is full")
 
-    monkeypatch.setattr(OpenRun, "write", fail)
+    monkeypatch.setattr(Run, "write", fail)
     with pytest.raises(ConfigError, match="the disk is full"):
         begin(config, tmp_path)
     assert processes[0].poll() is not None

@@ -13,7 +13,8 @@ from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
 from throwcollect.runs import control, records
 from throwcollect.runs.control import scale
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.runtimes.node_collection import MOST_SIMULATIONS, offer_scaling
 from throwcollect.runtimes.nodes import LAUNCHER
@@ -25,7 +26,7 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
 
 
-RECORD = RunRecord("a-0123", "a", "local", "/a", None, "/a/logs", 0, datetime.now(timezone.utc), 1, 2)
+RECORD = RunRecord("a-0123", "a", "local", "/a", "/a/logs", 0, datetime.now(timezone.utc), 1, 2)
 
 
 def living(endpoint: str | None, runtime: str = "local") -> Run:
@@ -97,12 +98,12 @@ def test_a_launcher_that_does_not_end_is_named_unless_the_record_of_its_run_is_d
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = Records().new("a")
-    run.write(replace(living(None).record, run=run.run, launcher=os.getpid()))
+    run.write(replace(living(None).record, run=run.id, launcher=os.getpid()))
     monkeypatch.setattr(records, "_LOCK_PATIENCE_S", 0.0)
     monkeypatch.setattr(control, "_end_launcher", lambda *_: None)
     for pid in (f"its pid is {os.getpid()}", None):
-        with pytest.raises(WorkerError, match=f"run {run.run}: its launcher does not end") as caught:
-            control.down(run.run)
+        with pytest.raises(WorkerError, match=f"run {run.id}: its launcher does not end") as caught:
+            control.down(run.id)
         assert caught.value.evidence == pid
-        (tmp_path / "state" / "runs" / f"{run.run}.json").write_text("{")
+        (tmp_path / "state" / "runs" / f"{run.id}.json").write_text("{")
     run.close()

@@ -7,7 +7,8 @@ import pytest
 
 from throwcollect.runs.events import EventLog
 from throwcollect.runs.following import follow, read_logs
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -19,7 +20,7 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
     first, later = tmp_path / "first", tmp_path / "data" / "logs"
     now = datetime.now(timezone.utc)
     run = Records().new("small")
-    run.write(RunRecord(run.run, "small", "", str(tmp_path / "data"), None, str(first), 0, now, os.getpid(), 1))
+    run.write(RunRecord(run.id, "small", "", str(tmp_path / "data"), str(first), 0, now, os.getpid(), 1))
     first.mkdir()
     (first / "launcher.log").write_text("plan: 3 trials\n")
     EventLog(later, "of-an-earlier-run").run_event("started", simulations=1)
@@ -28,7 +29,7 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
         run.update(logs=str(later), runtime="local")
         (first / "launcher.log").rename(later / "launcher.log")
         (later / "sim_0.log").write_text("ready\n")
-        EventLog(later, run.run).run_event("started", simulations=1)
+        EventLog(later, run.id).run_event("started", simulations=1)
 
     steps = iter([lambda: None, launch, lambda: run.update(ended=now, exit_code=0)])
 
@@ -36,7 +37,7 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
         next(steps, lambda: None)()
         return True
 
-    return Records().get(run.run), go_on
+    return Records().get(run.id), go_on
 
 
 def test_logs_are_followed_when_they_move_to_the_dataset(planned: tuple[Run, Callable[[], bool]]) -> None:

@@ -54,7 +54,6 @@ def read_files(directory: Path) -> dict[str, bytes]:
     ("overrides", "problem"),
     [
         (["run.runtime=docker"], "no Docker engine answers"),
-        (["run.runtime=docker", "containers.volume=throws"], "no Docker engine answers"),
     ],
 )
 def test_a_failed_resume_leaves_a_finished_dataset_unchanged(

@@ -12,7 +12,7 @@ import pytest
 
 from throwcollect import runs
 from throwcollect.errors import ConflictError, Interrupted
-from throwcollect.runs.prepared_run import PreparedRun
+from throwcollect.runs.run import Run
 from throwcollect.state_directory import STATE_VARIABLE
 
 YAML = """\
@@ -22,25 +22,25 @@ run: {runtime: inprocess, replay: 0}
 sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}
 """
 
-launched_again = pytest.mark.parametrize("launch", [PreparedRun.collect, PreparedRun.start])
+launched_again = pytest.mark.parametrize("launch", [Run.collect, Run.start])
 
 
 @pytest.fixture
-def prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PreparedRun:
+def prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     (tmp_path / "small.yaml").write_text(YAML)
     return runs.prepare(tmp_path / "small.yaml", output=tmp_path / "data")
 
 
 @launched_again
-def test_launching_a_prepared_run_twice_is_refused(prepared: PreparedRun, launch) -> None:
+def test_launching_a_prepared_run_twice_is_refused(prepared: Run, launch) -> None:
     with prepared as run:
         summary = run.collect()
-        with pytest.raises(ConflictError, match=f"run {run.record.run}: was launched already"):
+        with pytest.raises(ConflictError, match=f"run {run.id}: was launched already"):
             launch(run)
-    with pytest.raises(ConflictError, match=f"run {run.record.run}: was launched already"):
+    with pytest.raises(ConflictError, match=f"run {run.id}: was launched already"):
         launch(run)
-    assert runs.wait(runs.find(run.record.run)) == summary
+    assert runs.wait(runs.find(run.id)) == summary
 
 
 def call_later(act: Callable[[], object]) -> Callable[[], int]:
@@ -58,13 +58,13 @@ def call_later(act: Callable[[], object]) -> Callable[[], int]:
 
 
 @pytest.fixture
-def many(prepared: PreparedRun, tmp_path: Path) -> PreparedRun:
+def many(prepared: Run, tmp_path: Path) -> Run:
     """A run that lasts until somebody stops it."""
     return runs.prepare(tmp_path / "small.yaml", output=tmp_path / "many", overrides=["trials=300"])
 
 
 def test_stopping_a_run_that_a_program_collects_drains_it_and_leaves_the_program_alive(
-    many: PreparedRun, tmp_path: Path
+    many: Run, tmp_path: Path
 ) -> None:
     def stop() -> None:
         stopped.append(runs.stop(runs.find(tmp_path / "many")))
@@ -79,16 +79,16 @@ def test_stopping_a_run_that_a_program_collects_drains_it_and_leaves_the_program
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-def test_a_run_that_ctrl_c_ends_in_a_program_was_interrupted(many: PreparedRun, tmp_path: Path) -> None:
+def test_a_run_that_ctrl_c_ends_in_a_program_was_interrupted(many: Run, tmp_path: Path) -> None:
     with many as run, pytest.raises(KeyboardInterrupt):
         run.collect(interruptions=call_later(lambda: signal.raise_signal(signal.SIGINT)))
     record = runs.find(tmp_path / "many").record
     assert (record.exit_code, record.failure and record.failure.message) == (Interrupted.exit_code, "interrupted")
 
 
-def test_a_run_in_another_thread_handles_no_signals(prepared: PreparedRun) -> None:
+def test_a_run_in_another_thread_handles_no_signals(prepared: Run) -> None:
     with prepared as run:
         thread = threading.Thread(target=run.collect)
         thread.start()
         thread.join()
-    assert runs.wait(runs.find(run.record.run)).outcomes
+    assert runs.wait(runs.find(run.id)).outcomes

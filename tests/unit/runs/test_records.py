@@ -11,7 +11,8 @@ import pytest
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import ConfigError
-from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunFailure, RunRecord, Summary
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.state_directory import STATE_VARIABLE
@@ -34,19 +35,18 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat(follow_symlinks=False).st_mode)
 
 
-def record(run: OpenRun, **fields: object) -> RunRecord:
+def record(run: Run, **fields: object) -> RunRecord:
     values = {
         "name": "small",
         "runtime": "local",
         "directory": "/data/small",
-        "volume": None,
         "logs": "/data/small/logs",
         "domain_id": 0,
         "started": NOW,
         "launcher": 1,
         "simulations": 2,
     }
-    return RunRecord(run=run.run, **{**values, **fields})  # type: ignore[arg-type]
+    return RunRecord(run=run.id, **{**values, **fields})  # type: ignore[arg-type]
 
 
 def remember(records: Records, **fields: object) -> str:
@@ -54,19 +54,19 @@ def remember(records: Records, **fields: object) -> str:
     run = records.new("small")
     run.write(record(run, **fields))
     run.close()
-    return run.run
+    return run.id
 
 
 def test_a_written_and_updated_record_can_be_read_again(state: Path) -> None:
     run = Records().new("small")
     written = record(run, nodes=(NODE,), progress=PROGRESS, endpoint="tcp/127.0.0.1:1", summary=SUMMARY)
     run.write(written)
-    assert Records().get(run.run).record == written
+    assert Records().get(run.id).record == written
     run.update(progress=replace(PROGRESS, ended=5), failure=RunFailure("ä"))
-    assert Records().get(run.run).record == replace(
+    assert Records().get(run.id).record == replace(
         written, progress=replace(PROGRESS, ended=5), failure=RunFailure("ä")
     )
-    assert Records().ids() == [run.run]
+    assert Records().ids() == [run.id]
 
 
 def test_the_id_of_a_run_begins_with_the_name_of_its_collection_and_is_unique(
@@ -75,31 +75,31 @@ def test_the_id_of_a_run_begins_with_the_name_of_its_collection_and_is_unique(
     draws = iter(["aaaa", "aaaa", "bbbb"])
     monkeypatch.setattr("throwcollect.runs.records.secrets.token_hex", lambda _: next(draws))
     records = Records()
-    assert [records.new("small").run, records.new("small").run] == ["small-aaaa", "small-bbbb"]
+    assert [records.new("small").id, records.new("small").id] == ["small-aaaa", "small-bbbb"]
 
 
 def test_a_run_without_a_record_is_not_found(state: Path) -> None:
     records = Records()
     run = records.new("small")
     assert records.ids() == []
-    with pytest.raises(ConfigError, match=f"no run {run.run}"):
-        records.get(run.run)
+    with pytest.raises(ConfigError, match=f"no run {run.id}"):
+        records.get(run.id)
 
 
 def test_a_run_lives_as_long_as_its_lock_is_held(state: Path) -> None:
     records = Records()
     run = records.new("small")
     run.write(record(run))
-    assert (records.lives(run.run), records.get(run.run).status) == (True, "running")
+    assert records.get(run.id).status == "running"
     run.close()
-    assert (records.lives(run.run), records.get(run.run).status) == (False, "died")
+    assert records.get(run.id).status == "died"
 
 
 def test_a_killed_launcher_releases_its_run_even_if_its_pid_is_in_use(state: Path) -> None:
     code = (
         "import sys; from throwcollect.runs.records import Records; sys.path.insert(0, sys.argv[1])\n"
         "from test_records import record; run = Records().new('small'); run.write(record(run, launcher=1))\n"
-        "print(run.run, flush=True); sys.stdin.read()"
+        "print(run.id, flush=True); sys.stdin.read()"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code, str(Path(__file__).parent)], stdin=-1, stdout=-1, text=True
@@ -119,13 +119,13 @@ def test_a_run_is_handed_to_another_process_without_ever_seeming_dead(state: Pat
     run = records.new("small")
     run.write(record(run))
     with subprocess.Popen(["/bin/cat"], stdin=-1, pass_fds=[run.lock]) as process:
-        inherited = records.inherit(run.run, os.dup(run.lock))
+        inherited = records.inherit(run.id, os.dup(run.lock))
         run.close()
         inherited.close()
-        assert records.lives(run.run)
+        assert run.is_locked()
         process.kill()
         process.wait()
-    assert not records.lives(run.run)
+    assert not run.is_locked()
 
 
 def test_only_one_process_can_take_over_a_dead_run(state: Path) -> None:
@@ -152,7 +152,7 @@ def test_runs_are_found_by_any_spelling_of_their_directory(
     run.close()
     monkeypatch.chdir(tmp_path / "configs")
     for spelling in (tmp_path / "data", Path("../data"), tmp_path / "link", Path("../configs/../link")):
-        assert [found.id for found in records.into(spelling)] == [run.run]
+        assert [found.id for found in records.into(spelling)] == [run.id]
     assert records.into(tmp_path / "configs") == []
 
 
@@ -161,7 +161,7 @@ def test_forgetting_a_run_removes_all_its_files_except_the_dataset(state: Path, 
     records = Records()
     run = records.new("small")
     run.write(record(run, directory=str(tmp_path / "data")))
-    (run.directory / "logs").mkdir(parents=True)
+    (run.files / "logs").mkdir(parents=True)
     run.forget()
     assert list((state / "runs").iterdir()) == []
     assert (tmp_path / "data").exists()
@@ -219,9 +219,9 @@ def test_the_files_and_directories_of_a_run_are_private(state: Path) -> None:
     finally:
         os.umask(before)
     runs = state / "runs"
-    assert (mode(runs), mode(run.directory), mode(run.key.directory)) == (0o700, 0o700, 0o700)
+    assert (mode(runs), mode(run.files), mode(run.key.directory)) == (0o700, 0o700, 0o700)
     files = [path for path in runs.rglob("*") if path.is_file()]
-    assert sorted(path.name for path in files) == ["certificate.pem", "key.pem", f"{run.run}.json", f"{run.run}.lock"]
+    assert sorted(path.name for path in files) == ["certificate.pem", "key.pem", f"{run.id}.json", f"{run.id}.lock"]
     assert {mode(path) for path in files} == {0o600}
 
 

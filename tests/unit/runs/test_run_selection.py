@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 from tests.unit.runtimes.docker.engine import Engine, engine_at
 
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.runs.records import Records, Run
+from throwcollect.coordinator.onlooker import SILENT
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, NotFoundError, ThrowcollectError, WorkerError
+from throwcollect.runs.control import down
+from throwcollect.runs.preparation import end_left
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunFailure, RunRecord
 from throwcollect.runs.run_selection import (
-    find_held_runs,
-    find_left_in,
     find_run_to_change,
     find_run_to_watch,
     require_living,
@@ -44,7 +46,6 @@ def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
             "name": name,
             "runtime": "local",
             "directory": str(tmp_path / name),
-            "volume": None,
             "logs": "logs",
             "domain_id": 0,
             "started": NOW - timedelta(hours=age_h),
@@ -52,7 +53,7 @@ def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
             "simulations": 2,
             "ended": NOW if status == "ended" else None,
         }
-        run.write(RunRecord(run=run.run, **{**values, **fields}))  # type: ignore[arg-type]
+        run.write(RunRecord(run=run.id, **{**values, **fields}))  # type: ignore[arg-type]
         if status == "lives":
             held.callback(run.close)
         else:
@@ -75,7 +76,6 @@ def test_a_run_is_found_by_the_directory_of_its_dataset(
 ) -> None:
     make("a", "ended", age_h=2, directory=str(tmp_path / "data"))
     latest = make("b", "ended", age_h=1, directory=str(tmp_path / "data"))
-    make("c", "ended", directory=str(tmp_path / "data"), volume="other")
     monkeypatch.chdir(tmp_path)
     assert find_run_to_change("data").record == latest
     assert find_run_to_change(str(tmp_path / "data")).record == latest
@@ -158,8 +158,9 @@ def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
 def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:
     make("a", "lives")
     with pytest.raises(ConfigError, match=r"/a: run a-0123 collects into it\n  try: throwcollect wait --run a-0123"):
-        find_left_in(records, tmp_path / "a")
-    assert find_left_in(records, tmp_path / "b") is None
+        end_left(tmp_path / "a", SILENT)
+    end_left(tmp_path / "a", SILENT, own=records.get("a-0123"))
+    end_left(tmp_path / "b", SILENT)
 
 
 @pytest.fixture
@@ -170,33 +171,22 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
 
 
 @pytest.mark.parametrize(
-    ("fields", "nodes", "left"),
+    ("fields", "ends"),
     [
-        ({"runtime": "docker"}, ["router", "coordinator"], True),
-        ({"runtime": "docker"}, ["sim_0"], True),
-        ({"runtime": "docker"}, [], False),
-        ({"runtime": "local"}, ["coordinator"], False),
-        ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
+        ({"runtime": "docker"}, True),
+        ({"runtime": "local"}, False),
+        ({"runtime": "docker", "ended": NOW}, False),
         # The launcher gave up and could not remove the containers.
-        ({"runtime": "docker", "ended": NOW, "left": True}, ["sim_0"], True),
-        ({"runtime": "docker", "ended": NOW, "left": True}, [], False),
+        ({"runtime": "docker", "ended": NOW, "left": True}, True),
     ],
 )
-def test_a_dead_run_counts_as_left_only_if_containers_of_it_remain(
-    fields: dict[str, object],
-    nodes: list[str],
-    left: bool,
-    records: Records,
-    make: Make,
-    tmp_path: Path,
-    engine: Engine,
+def test_containers_of_a_dead_launcher_are_ended_before_another_run_uses_its_directory(
+    fields: dict[str, object], ends: bool, records: Records, make: Make, tmp_path: Path, engine: Engine
 ) -> None:
-    record = make("a", "died", **fields)
-    for name in nodes:
-        engine.create(f"throwcollect-a-0123-{name}", {RUN_LABEL: "a-0123", NODE_LABEL: name})
-    run = find_left_in(records, tmp_path / "a")
-    assert (run is not None) == left
-    assert run is None or run.record == record
+    make("a", "died", **fields)
+    engine.create("throwcollect-a-0123-sim_0", {RUN_LABEL: "a-0123", NODE_LABEL: "sim_0"})
+    end_left(tmp_path / "a", SILENT)
+    assert (engine.names() == []) == ends
 
 
 def test_the_directory_of_a_dead_docker_run_is_refused_if_the_engine_is_silent(
@@ -208,7 +198,7 @@ def test_the_directory_of_a_dead_docker_run_is_refused_if_the_engine_is_silent(
     with pytest.raises(
         WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
     ):
-        find_left_in(records, tmp_path / "a")
+        end_left(tmp_path / "a", SILENT)
 
 
 def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
@@ -216,7 +206,8 @@ def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
 ) -> None:
     make("a", "died", runtime="docker")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    assert find_left_in(records, tmp_path / "a") is None
+    end_left(tmp_path / "a", SILENT)
+    assert down("a") == ("a-0123", [])
 
 
 def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
@@ -230,6 +221,9 @@ def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
     assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
 
 
-def test_without_a_docker_engine_no_held_runs_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    assert find_held_runs() == {}
+def test_containers_of_a_run_without_a_record_are_removed_by_its_id(records: Records, engine: Engine) -> None:
+    engine.create("throwcollect-b-4567-sim_0", {RUN_LABEL: "b-4567", NODE_LABEL: "sim_0"})
+    with pytest.raises(NotFoundError, match="no run 'b'"):
+        down("b")
+    assert down("b-4567") == ("b-4567", ["throwcollect-b-4567-sim_0"])
+    assert engine.names() == []

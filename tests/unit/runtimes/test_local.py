@@ -19,7 +19,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.runtimes import local
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 
 LAUNCHER = """
 import sys
@@ -34,12 +34,12 @@ sys.stdin.read()
 """
 
 
-def place(directory: Path) -> Place:
-    return Place("run", directory, None, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
+def context(directory: Path) -> RunContext:
+    return RunContext("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
 
 
 def nodes(directory: Path, **run: object) -> LocalNodes:
-    return LocalNodes(place(directory), Config.model_validate({"run": run}))
+    return LocalNodes(context(directory), Config.model_validate({"run": run}))
 
 
 def node(code: str, name: str = "node") -> NodeSpec:
@@ -108,12 +108,12 @@ def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNo
 
 
 def test_the_readiness_and_the_log_of_a_node_outlive_it(runtime: LocalNodes) -> None:
-    assert not runtime.ready("node")
+    assert not runtime.logs.said_ready("node")
     runtime.start(node("print('node is ready', flush=True); import time; time.sleep(60)"))
-    until(lambda: runtime.ready("node"))
+    until(lambda: runtime.logs.said_ready("node"))
     runtime.signal("node", signal.SIGTERM)
     wait_for_end(runtime)
-    assert runtime.ready("node")
+    assert runtime.logs.said_ready("node")
     assert runtime.logs.tail("node") == "node is ready"
 
 

@@ -19,16 +19,16 @@ from throwcollect.extras import MissingExtraError
 from throwcollect.members import names_of
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.registry import AUTOMATIC, choose, get_runtime
-from throwcollect.runtimes.runtime import Host, Place, Runtime
+from throwcollect.runtimes.runtime import Host, RunContext, Runtime
 
 
 class Cluster(Runtime):
     """A runtime of another package."""
 
-    def in_words(self, config: Config) -> str:
+    def describe(self, config: Config) -> str:
         return "a cluster"
 
-    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> Host:
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
         raise ConfigError("no cluster here")
 
 
@@ -59,10 +59,8 @@ def test_a_runtime_describes_itself_and_holds_nothing_of_an_unknown_run(
 ) -> None:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     member = get_runtime(name)
-    assert member.in_words(Config())
+    assert member.describe(Config())
     assert member.simulations(Config()) in (1, Config().run.simulations)
-    assert member.find_held() == []
-    assert member.is_left("never-0000") is False
     assert member.outlives_launcher == (name == "docker")
 
 

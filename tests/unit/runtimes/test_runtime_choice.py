@@ -5,6 +5,7 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
+from docker.client import DockerClient
 
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.run import RunConfig
@@ -157,7 +158,7 @@ def test_requested_rclpy_that_containers_cannot_have_is_an_error(
 @pytest.mark.parametrize("host", ["tcp://192.0.2.7:2375", "ssh://lab"])
 def test_an_engine_on_another_machine_is_not_used(choose, monkeypatch: pytest.MonkeyPatch, host: str) -> None:
     monkeypatch.setenv("DOCKER_HOST", host)
-    monkeypatch.setattr(docker_engine, "connect", lambda **_: Mock(info=lambda: {"Name": "lab"}))
+    monkeypatch.setattr(DockerClient, "from_env", lambda **_: Mock(info=lambda: {"Name": "lab"}))
     problem = f"the Docker engine at {host} is on another machine, lab, without directories of this one"
     assert choose("auto") == ("local", [f"runtime: local processes (auto, as {problem})"])
     with pytest.raises(WorkerError, match=problem) as caught:

@@ -1,6 +1,6 @@
 import math
 import signal
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from throwcollect.runtimes import supervisor as module
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeHost, NodeSpec
-from throwcollect.runtimes.runtime import NodeState, Place
+from throwcollect.runtimes.runtime import NodeState, RunContext
 from throwcollect.runtimes.supervisor import Supervisor
 
 SIMULATIONS = ("sim_0", "sim_1")
@@ -61,7 +61,7 @@ class FakeRuntime(NodeHost):
 
     def __init__(self) -> None:
         self.config = Config()
-        self.place = Place("run", Path("/data"), None, Path("/logs"), 2, Middleware(), RunKey(Path("/key")))
+        self.context = RunContext("run", Path("/data"), Path("/logs"), 2, Middleware(), RunKey(Path("/key")))
         self.commands: list[tuple[str, tuple[str, ...]]] = []
         self.signals: list[tuple[str, signal.Signals]] = []
         self.stopped: list[tuple[str, float]] = []
@@ -127,10 +127,10 @@ def runtime() -> FakeRuntime:
     return FakeRuntime()
 
 
-def supervise(runtime: FakeRuntime, *, found: Collection[str] = (), simulations: int = 2, **run: int) -> Supervisor:
+def supervise(runtime: FakeRuntime, *, simulations: int = 2, **run: int) -> Supervisor:
     """A supervisor whose simulations are ready."""
     supervisor = Supervisor(runtime, RunConfig(**run), roster(runtime, simulations))
-    supervisor.start(found=found)
+    supervisor.start()
     runtime.logs.ready_ones |= set(SIMULATIONS)
     supervisor.poll()
     return supervisor
@@ -233,7 +233,7 @@ def test_a_run_fails_if_its_router_has_no_restarts_left(runtime: FakeRuntime, cl
 
 
 def test_a_lost_discovery_server_is_restarted_only_after_eleven_seconds(runtime: FakeRuntime, clock: Clock) -> None:
-    runtime.place = replace(runtime.place, middleware=Middleware("rclpy", "rmw_fastrtps_cpp"))
+    runtime.context = replace(runtime.context, middleware=Middleware("rclpy", "rmw_fastrtps_cpp"))
     supervisor = Supervisor(runtime, RunConfig(), roster(runtime, 2))
     supervisor.start()
     runtime.die(ROUTER)

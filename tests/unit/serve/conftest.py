@@ -12,7 +12,8 @@ import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
 from tests.e2e.collection import FAST, collect_here, write_config
 
-from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
@@ -83,28 +84,27 @@ def client(served: Served) -> TestClient:
     return served.client()
 
 
-Remember = Callable[..., OpenRun]
+Remember = Callable[..., Run]
 
 
 @pytest.fixture
 def remember(tmp_path: Path) -> Iterator[Remember]:
     """Makes records; a run that `lives` is one whose lock this process holds."""
-    opened: list[OpenRun] = []
+    opened: list[Run] = []
 
-    def make(name: str = "small-0001", *, lives: bool = True, **fields: Any) -> OpenRun:
+    def make(name: str = "small-0001", *, lives: bool = True, **fields: Any) -> Run:
         run = Records().new("small", run=name)
         values = {
             "name": "small",
             "runtime": "local",
             "directory": str(tmp_path / "datasets" / name),
-            "volume": None,
             "logs": str(tmp_path / "datasets" / name / "logs"),
             "domain_id": 0,
             "started": datetime.now(timezone.utc),
             "launcher": 2**22,
             "simulations": 2,
         }
-        run.write(RunRecord(run=run.run, **{**values, **fields}))
+        run.write(RunRecord(run=run.id, **{**values, **fields}))
         if lives:
             opened.append(run)
         else:

@@ -12,7 +12,8 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, make_end_fields
 
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 
 URL = "/api/v1/collections"
 
@@ -126,12 +127,11 @@ def test_files_of_an_unfinished_dataset_are_refused(client: TestClient, director
     remember("growing", directory=str(directory))
     remember("torn", **make_end_fields(exit_code=3))
     remember("session", **make_end_fields(kind="session"))
-    remember("volume", **make_end_fields(volume="v"))
     for what in ("files", "files/config.yaml", "dataset.tar", "report"):
         found = {name: client.get(f"{URL}/{name}/{what}").status_code for name in ("growing", "torn")}
         assert found == {"growing": 409, "torn": 409}, what
     for what in ("files", "files/config.yaml", "dataset.tar", "report", "landings"):
-        for name in ("session", "volume", "nobody", ".."):
+        for name in ("session", "nobody", ".."):
             assert client.get(f"{URL}/{name}/{what}").status_code == 404, (name, what)
 
 

@@ -11,7 +11,8 @@ from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served, make_end_fields
 
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin, RunFailure
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import instances as instances_module

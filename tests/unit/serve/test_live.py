@@ -11,7 +11,8 @@ import pytest
 from tests.unit.serve.conftest import CONFIG, Remember, make_end_fields
 
 from throwcollect.errors import NotFoundError, WorkerError
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import live
 from throwcollect.serve.live import restore_abandoned, slow_down

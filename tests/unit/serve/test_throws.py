@@ -24,7 +24,8 @@ from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import looks_of
 from throwcollect.ros.connection import Connection
-from throwcollect.runs.records import Records, Run
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.serve import throws
 from throwcollect.serve.throws import PlannedTrials, ThrowWatch, encode_throw
 

@@ -52,7 +52,7 @@ def test_a_swept_and_a_fixed_value_give_the_same_digest():
         {"trials": 9},
         {"sweep": SweepConfig(parameters={"scene.gravity_mps2": Range(min=9, max=10)})},
         {"run": RunConfig(simulations=7)},
-        {"containers": ContainersConfig(volume="throws", sim=NodeContainerConfig(memory="512m"))},
+        {"containers": ContainersConfig(image="other", sim=NodeContainerConfig(memory="512m"))},
         {"cluster": ClusterConfig(partition="long")},
         {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
         {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
@@ -92,6 +92,6 @@ def test_values_and_seed_of_a_trial_change_only_its_digest():
 
 
 def test_the_digest_of_a_configuration_leaves_out_how_it_is_run():
-    otherwise = Config(run=RunConfig(simulations=9), containers=ContainersConfig(volume="throws"))
+    otherwise = Config(run=RunConfig(simulations=9), containers=ContainersConfig(image="other"))
     assert config_digest(otherwise) == config_digest(Config())
     assert config_digest(Config(name="other")) != config_digest(Config())

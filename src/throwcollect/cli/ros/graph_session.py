@@ -16,7 +16,7 @@ from throwcollect.wording import suggest
 
 if TYPE_CHECKING:
     from throwcollect.ros.connection import Connection
-    from throwcollect.runs.records import Run
+    from throwcollect.runs.run import Run
 
 _WAIT_S = 0.2
 """Longest single wait: rclpy handles signals only between two waits."""

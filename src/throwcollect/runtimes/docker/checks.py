@@ -12,38 +12,24 @@ from docker.errors import ImageNotFound
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
-from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runtimes.docker.address import engine_address
 from throwcollect.runtimes.docker.container_options import (
-    RUN_LABEL,
-    RunPlace,
     image,
     mount_source,
-    section_of,
 )
 from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors
 from throwcollect.runtimes.docker.host_paths import DEVICES, is_allowed_device, refusal
-from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
 from throwcollect.state_directory import state_directory
 
-_NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
 
-
-def check(client: DockerClient, place: RunPlace, config: Config) -> str:
-    """Check the image, the mounts, the networks, and the router's port of a run.
+def check(client: DockerClient, config: Config) -> str:
+    """Check the image, the mounts and the networks of a run.
 
     Returns:
         Id of the image, which is a SHA-256 of its content.
     """
-    with engine_errors("the Docker engine cannot be asked"):
-        # If a launcher died, its router still occupies the port. This run takes over that router, and its port.
-        begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
-    sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
-    image_id = _check(client, image(config), sections)
-    if config.run.router_port and not begun:
-        # The engine binds the port later; trying it here gives an error that names the key of the configuration.
-        reserve_port(config.run).close()
-    return image_id
+    kinds = ("router", "sim", "coordinator")
+    return _check(client, image(config), {f"containers.{kind}": getattr(config.containers, kind) for kind in kinds})
 
 
 def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:

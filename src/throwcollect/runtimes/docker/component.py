@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from docker.client import DockerClient
 from docker.types import EndpointConfig, Mount
 
 from throwcollect.config.containers import ContainerSpec
@@ -16,29 +14,27 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker import watch
 from throwcollect.runtimes.docker.checks import check_container
 from throwcollect.runtimes.docker.container_options import (
     API_VERSION,
     JOINED_LABEL,
     KEY,
     ROUTER_PORT,
-    RunPlace,
     container_options,
+    key_mount,
+    network_of,
 )
-from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, find_other_machine
-from throwcollect.runtimes.docker.docker_nodes import end_in_words
-from throwcollect.runtimes.docker.node_container import NodeContainer
-from throwcollect.runtimes.docker.watch import EngineClock, EngineWatch
+from throwcollect.runtimes.docker.containers import ANSWER_S, Containers
+from throwcollect.runtimes.docker.docker_engine import connect
+from throwcollect.runtimes.docker.docker_nodes import describe_container_end
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
-from throwcollect.runtimes.runtime import NodeState, Place, Session
+from throwcollect.runtimes.runtime import NodeState, RunContext, Session
 from throwcollect.wording import command
 
 CONTAINER = "container"
 """Name of the only node of such a run."""
 _POLL_S = 0.1
-_GRACE_S = 3
 _OVER_S = 3.0
 """When a run ends, a container that joined it loses the router up to this time before the record shows the end."""
 
@@ -66,20 +62,16 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
             f"run {run}: is on Fast DDS, which containers of the catalogue cannot join",
             hint="run.ros: embedded, or RMW_IMPLEMENTATION=rmw_zenoh_cpp for rclpy",
         )
+    key = key_mount(connection.key)
     if runtime == "docker":
-        place = RunPlace(run, "")
         endpoint = f"{connection.endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}"
-        return JoinOptions(run, _environment(connection, endpoint), place.key_mount(read_only=True), place.network)
-    if (other := find_other_machine()) is not None:
-        problem = f"run {run}: its nodes are processes of this machine, which containers on {other} cannot reach"
-        raise ConfigError(problem)
+        return JoinOptions(run, _environment(connection, endpoint), key, network_of(run))
     if spec.section.ports or spec.section.networks:
         raise ConfigError(
             f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",
             expected="a component without ports and networks",
             hint="leave them out in the catalogue, or have the run in containers: run.runtime: docker",
         )
-    key = Mount(target=str(KEY.directory), source=str(connection.key.directory), type="bind", read_only=True)
     return JoinOptions(run, _environment(connection, connection.endpoint), key, None)
 
 
@@ -89,12 +81,12 @@ def _environment(connection: Connection, endpoint: str) -> Mapping[str, str]:
 
 
 class ComponentContainer:
-    """Runs one container until it ends or somebody asks to stop; a `runtime.Host`.
+    """Runs one container until it ends or the user asks to stop; a `runtime.Host`.
 
     Args:
-        place: The place of the run that consists of this container.
+        context: The run that consists of this container.
         joining: The options for the run that the container joins; None if it joins none.
-        goes_on: Returns whether the run with an id goes on; it is called again and again.
+        is_running: Returns whether the run with an id is running; it is called again and again.
         warn: Gets a line of text when the engine is silent for long.
 
     Raises:
@@ -104,39 +96,33 @@ class ComponentContainer:
 
     def __init__(
         self,
-        place: Place,
+        context: RunContext,
         component: str,
         spec: ContainerSpec,
         joining: JoinOptions | None,
         *,
-        goes_on: Callable[[str], bool],
+        is_running: Callable[[str], bool],
         warn: Callable[[str], None],
     ) -> None:
         self.cleared = False
         self._spec = spec
         self._joining = joining
-        self._goes_on = goes_on
-        self._place = RunPlace(place.run, str(place.directory))
-        self._logs = NodeLogs(place.logs)
-        self._watch: EngineWatch | None = None
-        with ExitStack() as undo:
-            self._clock = EngineClock(warn)
-            undo.callback(self._clock.close)
-            self._client: DockerClient = connect(timeout_s=watch.SILENCE_S)
-            self._clock.attend(self._client)
-            check_container(self._client, spec, component)
-            undo.pop_all()
-        self._container = NodeContainer(self._client, CONTAINER, self._logs.path(CONTAINER), self._clock)
+        self._is_running = is_running
+        self._context = context
+        self._logs = NodeLogs(context.logs)
+        client = connect(timeout_s=ANSWER_S)
+        check_container(client, self._spec, component)
+        self._containers = Containers(client, context.run, self._logs, warn)
 
     def collect(self, session: Session) -> None:
-        """Run the container until it ends, somebody asks to stop, or the run that it has joined ends; then close."""
+        """Run the container until it ends, the user asks to stop, or the run that it has joined ends; then close."""
         try:
-            self._watch = EngineWatch(self._client, self._place, self._clock)
+            self._containers.open()
             session.event("started")
             # Up to version 1.43 of the engine's API, a container is made in one network, and joins others afterwards.
-            self._container.start(self._options(), networks=self._networks[1:])
+            self._containers.start(CONTAINER, self._options(), networks=self._networks[1:])
             while not session.interruptions():
-                session.nodes([self._look()], endpoint=None, simulations=0)
+                session.nodes([self._state()], endpoint=None, simulations=0)
                 if self._has_ended(session):
                     return
                 time.sleep(_POLL_S)
@@ -146,20 +132,7 @@ class ComponentContainer:
 
     def close(self) -> None:
         """End the container, and remove it, unless the engine is silent or refuses."""
-        self._container.renounce()
-        while not self._clock.given_up and self._watch is not None and not self._container.wait_begun(_POLL_S):
-            pass
-        try:
-            self._container.end(_GRACE_S)
-            with suppress(*ENGINE_ERRORS):
-                # The filter is a regular expression, and names begin with a slash in the engine.
-                name = f"^/{self._place.container(CONTAINER)}$"
-                self.cleared = not self._client.api.containers(all=True, filters={"name": name})
-        finally:
-            if self._watch is not None:
-                self._watch.close()
-            self._container.close()
-            self._clock.close()
+        self.cleared = self._containers.close()
 
     @property
     def _networks(self) -> list[str]:
@@ -172,12 +145,12 @@ class ComponentContainer:
     @property
     def _is_left_behind(self) -> bool:
         """Whether the run that the container has joined has ended."""
-        return self._joining is not None and not self._goes_on(self._joining.run)
+        return self._joining is not None and not self._is_running(self._joining.run)
 
     def _options(self) -> dict[str, Any]:
         joining, spec = self._joining, self._spec
         options = container_options(
-            self._place,
+            self._context,
             spec.image,
             CONTAINER,
             spec.section,
@@ -197,36 +170,35 @@ class ComponentContainer:
             options["networking_config"] = {first: EndpointConfig(API_VERSION)}
         return options
 
-    def _look(self) -> NodeState:
-        handle = self._container.handle
-        state = self._watch.state(handle) if self._watch is not None else None
-        if handle is None:
+    def _state(self) -> NodeState:
+        if (handle := self._containers.handle(CONTAINER)) is None:
             return NodeState(CONTAINER, "starting", 0, None, None)
+        state = self._containers.state(CONTAINER)
         frozen = state is not None and state.status == "paused"
         return NodeState(CONTAINER, "frozen" if frozen else "running", 0, handle[:12], None)
 
     def _has_ended(self, session: Session) -> bool:
         """Whether the container has ended well, or the run that it has joined has ended."""
-        container = self._container
-        if self._clock.given_up:
+        containers = self._containers
+        containers.warn_if_silent()
+        if containers.given_up:
             raise WorkerError(
-                f"the Docker engine has not answered for {self._clock.silent_s:.0f} s",
-                hint=f"once it answers, {command('down', '--run', self._place.run_id)} ends the container",
+                f"the Docker engine has not answered for {containers.silent_s:.0f} s",
+                hint=f"once it answers, {command('down', '--run', self._context.run)} ends the container",
             )
-        if container.failure is not None:
-            raise WorkerError(f"the container of {self._spec.image} cannot be started: {container.failure}")
-        state = self._watch.state(container.handle) if self._watch is not None else None
+        if (failure := containers.failure(CONTAINER)) is not None:
+            raise WorkerError(f"the container of {self._spec.image} cannot be started: {failure}")
+        state = containers.state(CONTAINER)
         if state is not None and state.ended:
-            container.wait_log()
             # The end of the joined run may have made the container fail; the record of that run shows it a bit later.
             deadline = time.monotonic() + _OVER_S
             while state.code != 0 and self._joining and not self._is_left_behind and time.monotonic() < deadline:
                 time.sleep(_POLL_S)
             if state.code == 0 or self._is_left_behind:
                 return True
+            reason = describe_container_end(state, self._spec.section.memory)
             raise WorkerError(
-                f"the container of {self._spec.image} has ended: {end_in_words(state, self._spec.section.memory)}",
-                evidence=self._logs.tail(CONTAINER) or None,
+                f"the container of {self._spec.image} has ended: {reason}", evidence=self._logs.tail(CONTAINER) or None
             )
         if self._joining is not None and self._is_left_behind:
             session.say(f"run {self._joining.run} has ended, so the container that had joined it ends, too")

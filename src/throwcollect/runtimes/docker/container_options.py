@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +20,15 @@ from throwcollect.ros.router_endpoint import LOOPBACK
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeSpec, is_simulation, node_environment, protocol_of
+from throwcollect.runtimes.runtime import RunContext
 from throwcollect.version import __version__
 
 RUN_LABEL = "throwcollect.run"
 NODE_LABEL = "throwcollect.node"
 DIRECTORY_LABEL = "throwcollect.directory"
 VERSION_LABEL = "throwcollect.version"
-KEY_LABEL = "throwcollect.key"
-"""Marks the volume that holds the key of a run."""
 JOINED_LABEL = "throwcollect.joined"
 """Label with the id of the run that a component's container has joined, and with which it ends."""
-LOG_LABEL = "throwcollect.log-offset"
-"""Size of a node's log file when this container began to write to it [bytes]."""
 
 ROUTER_PORT = 7447
 
@@ -42,57 +38,29 @@ KEY = RunKey(Path("/key"))
 
 API_VERSION = "1.41"
 _PIDS = 512
+_TMP = "/tmp"  # noqa: S108 - a file system of the container's own
 _TMPFS = "rw,noexec,nosuid,size=64m"
 _LOG_SIZE = {"max-size": "10m", "max-file": "2"}
 
 
-@dataclass(frozen=True)
-class RunPlace:
-    """The names of all containers, networks, volumes and labels that an engine holds for a run.
+def network_of(run: str) -> str:
+    """Name of the network of a run."""
+    return f"throwcollect-{run}"
 
-    `source` is the place of the dataset: absolute path of a directory of this machine, or name of a volume.
-    """
 
-    run_id: str
-    source: str
+def container_of(run: str, node: str) -> str:
+    """Name of the container of a node."""
+    return f"throwcollect-{run}-{node}"
 
-    @property
-    def in_volume(self) -> bool:
-        """Whether the dataset lies in a volume."""
-        return not self.source.startswith("/")
 
-    @property
-    def data(self) -> str:
-        """Directory of the dataset, as nodes see it; a volume may hold those of several runs."""
-        return f"{DATA}/{self.run_id}" if self.in_volume else DATA
+def labels(context: RunContext) -> dict[str, str]:
+    """Labels of everything that is made for a run."""
+    return {RUN_LABEL: context.run, DIRECTORY_LABEL: str(context.directory.resolve()), VERSION_LABEL: __version__}
 
-    @property
-    def network(self) -> str:
-        """Name of the run's network."""
-        return f"throwcollect-{self.run_id}"
 
-    @property
-    def key_volume(self) -> str:
-        """Name of the volume that holds the run's key."""
-        return f"throwcollect-{self.run_id}-key"
-
-    def container(self, node: str) -> str:
-        """Name of a node's container."""
-        return f"throwcollect-{self.run_id}-{node}"
-
-    def labels(self, node: str | None = None) -> dict[str, str]:
-        """Labels of everything that is made for the run, or for one of its nodes."""
-        labels = {RUN_LABEL: self.run_id, DIRECTORY_LABEL: self.source, VERSION_LABEL: __version__}
-        return labels if node is None else {**labels, NODE_LABEL: node}
-
-    def mount(self, *, read_only: bool) -> Mount:
-        """The mount of the dataset, or of the volume in which it lies."""
-        kind = "volume" if self.in_volume else "bind"
-        return Mount(target=DATA, source=self.source, type=kind, read_only=read_only)
-
-    def key_mount(self, *, read_only: bool) -> Mount:
-        """The mount of the volume with the run's key."""
-        return Mount(target=str(KEY.directory), source=self.key_volume, type="volume", read_only=read_only)
+def key_mount(key: RunKey) -> Mount:
+    """The mount of the directory of a key, whose files only their owner can read."""
+    return Mount(target=str(KEY.directory), source=str(key.directory), type="bind", read_only=True)
 
 
 def router_endpoint(config: Config, middleware: Middleware) -> str:
@@ -116,65 +84,42 @@ def publishes_port(config: Config) -> bool:
     return bool(config.run.router_port or any(section.ports for section in sections))
 
 
-def confine(place: RunPlace, image: str) -> dict[str, Any]:
-    """Keywords for `containers.create` that every container of a run gets, so that it can do little but compute."""
-    return {
-        "image": image,
-        "labels": place.labels(),
-        "environment": {"HOME": "/tmp"},  # noqa: S108 - the one place in the container that can be written
-        "user": f"{os.getuid()}:{os.getgid()}",
-        # The kernel keeps signals without a handler from process 1, which also has to reap orphans. An init does both.
-        "init": True,
-        "read_only": True,
-        "tmpfs": {"/tmp": _TMPFS},  # noqa: S108
-        "cap_drop": ["ALL"],
-        "security_opt": ["no-new-privileges"],
-        "pids_limit": _PIDS,
-        "stop_signal": "SIGTERM",
-        "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
-    }
-
-
 def node_options(
-    node: NodeSpec,
-    *,
-    place: RunPlace,
-    config: Config,
-    middleware: Middleware,
-    image_id: str,
-    address: str | None = None,
+    node: NodeSpec, *, context: RunContext, config: Config, image_id: str, address: str | None = None
 ) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
     The configuration may bind the node to another core. The id of the image goes into the dataset's provenance; the
     address is that in the run's network, None for any.
     """
-    section = section_of(config, node.name)
+    section, network = section_of(config, node.name), network_of(context.run)
+    directory = str(context.directory.resolve())
+    endpoint = router_endpoint(config, context.middleware)
     own = {
-        **node_environment(Connection(router_endpoint(config, middleware), KEY, config.run.domain_id, middleware)),
+        **node_environment(Connection(endpoint, KEY, config.run.domain_id, context.middleware)),
         # Otherwise nodes would write a random id and /data into the provenance, which mean nothing outside.
         HOST_VARIABLE: socket.gethostname(),
         IMAGE_VARIABLE: image_id,
-        DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
+        DIRECTORY_VARIABLE: directory,
         "THROWCOLLECT_NODE": node.name,
     }
-    mounts = [place.key_mount(read_only=True)]
+    mounts = [key_mount(context.key)]
     if node.name != ROUTER:
-        mounts.append(place.mount(read_only=node.name != COORDINATOR))
-    options = container_options(place, image(config), node.name, section, environment=own, mounts=mounts)
+        mounts.append(Mount(target=DATA, source=directory, type="bind", read_only=node.name != COORDINATOR))
+    options = container_options(context, image(config), node.name, section, environment=own, mounts=mounts)
     if node.name == ROUTER and config.run.router_port:
         options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
     return {
         **options,
         "command": list(node.arguments),
-        "network": place.network,
-        "networking_config": {place.network: EndpointConfig(API_VERSION, aliases=[node.name], ipv4_address=address)},
+        "network": network,
+        "networking_config": {network: EndpointConfig(API_VERSION, aliases=[node.name], ipv4_address=address)},
         "cpuset_cpus": section.cpuset or (None if node.core is None else str(node.core)),
     }
 
 
 def container_options(
-    place: RunPlace,
+    context: RunContext,
     image: str,
     node: str,
     section: NodeContainerConfig,
@@ -182,22 +127,31 @@ def container_options(
     environment: Mapping[str, str],
     mounts: Sequence[Mount],
 ) -> dict[str, Any]:
-    """Keywords for `containers.create` for a node or a component.
+    """Keywords for `containers.create` for a node or a component, which can do little but compute.
 
-    Options of its section of the configuration, or of the catalogue, replace those of `confine`.
+    Options of its section of the configuration, or of the catalogue, replace the general ones.
     """
-    general = confine(place, image)
     options: dict[str, Any] = dict(section.options)
     if "gpus" in options:
         options["device_requests"] = [DeviceRequest(count=options.pop("gpus"), capabilities=[["gpu"]])]
     chosen = {key: str(value) for key, value in section.environment.items()}
     return {
-        **general,
+        "image": image,
+        "user": f"{os.getuid()}:{os.getgid()}",
+        # The kernel keeps signals without a handler from process 1, which also has to reap orphans. An init does both.
+        "init": True,
+        "read_only": True,
+        "cap_drop": ["ALL"],
+        "security_opt": ["no-new-privileges"],
+        "pids_limit": _PIDS,
+        "stop_signal": "SIGTERM",
+        "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
         **options,
-        "name": place.container(node),
-        "labels": {**options.get("labels", {}), **place.labels(node)},
-        "environment": {**general["environment"], **chosen, **environment},
-        "tmpfs": _with_tmpfs(general["tmpfs"], options.get("tmpfs", {})),
+        "name": container_of(context.run, node),
+        "labels": {**options.get("labels", {}), **labels(context), NODE_LABEL: node},
+        # Nothing but /tmp can be written in the container.
+        "environment": {"HOME": _TMP, **chosen, **environment},
+        "tmpfs": _with_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
         "mounts": [*mounts, *map(_bind, section.mounts)],
         "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},

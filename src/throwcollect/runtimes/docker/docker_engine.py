@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 
 from docker.client import DockerClient
 from docker.errors import APIError, DockerException, ImageNotFound
-from requests.exceptions import Timeout
 from urllib3.exceptions import HTTPError
-from urllib3.exceptions import TimeoutError as PoolTimeoutError
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.address import engine_address, no_answer
@@ -31,66 +30,44 @@ ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDec
 
 PATIENCE_S = 30.0
 """Time that a request waits for an answer of the engine by default."""
-
-_TIMEOUTS = (Timeout, PoolTimeoutError, TimeoutError)
+_SYSTEM_ERROR = re.compile(r"Error\(\d+, '([^']+)'\)")
 
 
 def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
-    """Connect to the engine at `engine_address`; each request waits for `timeout_s` [s] at most."""
-    # Not all versions of the client look at the context.
-    environment = {**os.environ, "DOCKER_HOST": engine_address()}
-    try:
-        return DockerClient.from_env(timeout=timeout_s, environment=environment)
-    except ENGINE_ERRORS as error:
-        raise no_answer(in_words(error)) from error
+    """Connect to the engine at `engine_address`; each request waits for `timeout_s` [s] at most.
 
-
-def find_other_machine() -> str | None:
-    """Find the name of the machine on which the engine runs; None if that is this machine.
-
-    Containers on another machine have no directories of this one, and processes of this one do not reach them. An
-    engine with a socket in the file system is here; one that is reached by TCP or SSH says where it is.
+    An engine of another machine is refused: its containers have no directories of this one, and processes of this one
+    do not reach them. One with a socket in the file system is here; one that is reached by TCP or SSH says where it is.
     """
-    if engine_address().startswith("unix:"):
-        return None
-    with closing(connect()) as client, engine_errors("the Docker engine does not say where it runs"):
-        name = str(client.info()["Name"])
-    return None if name == socket.gethostname() else name
+    # Not all versions of the client look at the context.
+    address = engine_address()
+    try:
+        client = DockerClient.from_env(timeout=timeout_s, environment={**os.environ, "DOCKER_HOST": address})
+        machine = socket.gethostname() if address.startswith("unix:") else str(client.info()["Name"])
+    except ENGINE_ERRORS as error:
+        raise no_answer(describe_error(error)) from error
+    if machine != socket.gethostname():
+        raise WorkerError(
+            f"the Docker engine at {address} is on another machine, {machine}, without directories of this one",
+            hint=f"run throwcollect on {machine}, or use processes: --runtime local",
+        )
+    return client
 
 
-def in_words(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """The reason that the engine, or else the operating system, gives for an error."""
     if isinstance(error, APIError):
         return str(error.explanation or error).strip()
     if timed_out(error):
         return "no answer in time"
-    for cause in _causes(error):
-        if isinstance(cause, OSError) and isinstance(cause.strerror, str):
-            return cause.strerror
-    return str(error) or type(error).__name__
+    # The client puts errors of the system into the arguments of its own, and these into messages.
+    system = _SYSTEM_ERROR.findall(str(error))
+    return system[-1] if system else str(error) or type(error).__name__
 
 
 def timed_out(error: BaseException) -> bool:
     """Whether the engine did not answer in time, as opposed to refusing or being gone."""
-    return any(isinstance(cause, _TIMEOUTS) for cause in _causes(error))
-
-
-def _causes(error: BaseException) -> Iterator[object]:
-    """All causes of an exception, and the exception itself, each after the exceptions that it wraps."""
-    cause: BaseException | None = error
-    while cause is not None:
-        yield from _inside(cause)
-        yield cause
-        cause = cause.__cause__ or cause.__context__
-
-
-def _inside(error: BaseException) -> Iterator[object]:
-    """The exceptions that an exception wraps as its arguments, at any depth."""
-    for argument in error.args:
-        for part in argument if isinstance(argument, tuple) else (argument,):
-            yield part
-            if isinstance(part, BaseException):
-                yield from _inside(part)
+    return isinstance(error, TimeoutError) or "timed out" in str(error)
 
 
 @contextmanager
@@ -99,7 +76,7 @@ def engine_errors(what: str, *, hint: str | None = None) -> Iterator[None]:
     try:
         yield
     except ENGINE_ERRORS as error:
-        raise WorkerError(f"{what}: {in_words(error)}", hint=hint) from error
+        raise WorkerError(f"{what}: {describe_error(error)}", hint=hint) from error
 
 
 def default_tag() -> str:

@@ -2,50 +2,39 @@
 
 from __future__ import annotations
 
-import math
 import signal
-import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from ipaddress import ip_network
 
 from docker.client import DockerClient
-from docker.errors import NotFound
 from docker.types import IPAMConfig, IPAMPool
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.ros.router_endpoint import LOOPBACK, format_endpoint
-from throwcollect.runtimes.docker import watch
 from throwcollect.runtimes.docker.checks import check
 from throwcollect.runtimes.docker.container_options import (
-    NODE_LABEL,
+    DATA,
     ROUTER_PORT,
-    RUN_LABEL,
-    RunPlace,
+    container_of,
+    labels,
+    network_of,
     node_options,
     publishes_port,
     router_endpoint,
     section_of,
 )
+from throwcollect.runtimes.docker.containers import ANSWER_S, Containers, ContainerState
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
-from throwcollect.runtimes.docker.held_runs import remove
-from throwcollect.runtimes.docker.node_container import LOG_S, NodeContainer
-from throwcollect.runtimes.docker.volume import dataset_info, place_directory, place_key
-from throwcollect.runtimes.docker.watch import ContainerState, EngineClock, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
-from throwcollect.runtimes.runtime import Place, Session
+from throwcollect.runtimes.runtime import RunContext, Session
 from throwcollect.wording import command
 
-_BEGIN_S = 30.0
-"""Time to wait for the start of a container; only the end of a run waits longer."""
-_POLL_S = 0.2
 _ROUTER_HOST = -2
 """Index of the last address of a range, except for that of broadcasts."""
-_AT_ONCE = 8
 _SIGNALLED = 128
 """Exit codes above this are those of a signal."""
 
@@ -53,10 +42,10 @@ _SIGNALLED = 128
 class DockerNodes(NodeHost):
     """Runs nodes as containers that can do little but compute; see `nodes.NodeHost`.
 
-    Containers, networks and volumes carry the run's id as a label, by which another process finds them again.
+    Containers and networks carry the run's id as a label, by which `down` finds them if the launcher dies.
 
     Args:
-        place: The place of the run; its id has to be unique on the engine.
+        context: The run; its id has to be unique on the engine.
         warn: Gets a line of text when the engine is silent for long.
         client: Client of the engine; None connects to the one that `engine_address` finds.
 
@@ -67,31 +56,21 @@ class DockerNodes(NodeHost):
 
     def __init__(
         self,
-        place: Place,
+        context: RunContext,
         config: Config,
         *,
         warn: Callable[[str], None] = lambda _line: None,
         client: DockerClient | None = None,
     ) -> None:
-        self.place = place
+        self.context = context
         self.config = config
-        self.listen = router_endpoint(config, place.middleware)
+        self.listen = router_endpoint(config, context.middleware)
         self.cleared = False
-        self._place = RunPlace(place.run, place.volume or str(place.directory.resolve()))
-        self.data = self._place.data
-        self.logs = NodeLogs(place.logs)
-        self._watch: EngineWatch | None = None
-        self._nodes: dict[str, NodeContainer] = {}
-        self._beginning: list[NodeContainer] = []
-        self._ended_at: dict[str, float] = {}
-        with ExitStack() as undo:
-            self._clock = EngineClock(warn)
-            # The clock has a thread, which would go on counting and warning if making this host failed.
-            undo.callback(self._clock.close)
-            self._client = client or connect(timeout_s=watch.SILENCE_S)
-            self._clock.attend(self._client)
-            self._image_id = check(self._client, self._place, config)
-            undo.pop_all()
+        self.data = DATA
+        self.logs = NodeLogs(context.logs)
+        self._client = client or connect(timeout_s=ANSWER_S)
+        self._image_id = check(self._client, config)
+        self._containers = Containers(self._client, context.run, self.logs, warn)
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
@@ -100,34 +79,13 @@ class DockerNodes(NodeHost):
 
         return NodeCollection(self, session).run_to_the_end()
 
-    def open(self) -> tuple[str, ...]:
-        """Make the run's network and volumes if they do not exist, watch its containers, and take over existing ones.
-
-        Returns:
-            Names of the nodes whose containers exist already; the next `exits` reports those that have ended.
-        """
-        place = self._place
+    def open(self) -> None:
+        """Make the run's network, and watch its containers; see `NodeHost.open`."""
         hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
-        with engine_errors(f"run {place.run_id} cannot be prepared on the Docker engine", hint=hint):
-            if place.in_volume:
-                try:
-                    self._client.volumes.get(place.source)
-                except NotFound:
-                    self._client.volumes.create(place.source, labels=place.labels())
-            # If the network exists, an earlier launcher made it and the volume with the key, and its nodes use both.
-            if not self._client.networks.list(filters={"label": f"{RUN_LABEL}={place.run_id}"}):
-                # Both steps wait for the engine, so they are done side by side.
-                with ThreadPoolExecutor(1) as pool:
-                    placing = pool.submit(place_key, self._client, place, self.config, self.place.key)
-                    self._create_network()
-                    placing.result()
-        self._watch = EngineWatch(self._client, place, self._clock)
-        found = self._adopt()
-        if not found:
-            self.logs.skip_earlier()
-        if place.in_volume and not found:
-            place_directory(self._client, place, self.config, self.place.directory)
-        return found
+        with engine_errors(f"run {self.context.run} cannot be prepared on the Docker engine", hint=hint):
+            self._create_network()
+        super().open()
+        self._containers.open()
 
     def _create_network(self) -> None:
         """Make the run's network; on Fast DDS, the router has to be able to keep its address there.
@@ -135,49 +93,31 @@ class DockerNodes(NodeHost):
         Nodes on Fast DDS look up the address of their discovery server only once. A container can choose its address
         only in a network whose range was named, so a first network serves to find a free range.
         """
-        place = self._place
-        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": place.labels()}
-        network = self._client.networks.create(place.network, **options)
-        if self.place.middleware.is_fast_dds:
+        name = network_of(self.context.run)
+        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": labels(self.context)}
+        network = self._client.networks.create(name, **options)
+        if self.context.middleware.is_fast_dds:
             network.reload()
             pool = IPAMPool(subnet=network.attrs["IPAM"]["Config"][0]["Subnet"])
             network.remove()
-            self._client.networks.create(place.network, ipam=IPAMConfig(pool_configs=[pool]), **options)
+            self._client.networks.create(name, ipam=IPAMConfig(pool_configs=[pool]), **options)
 
     def _address_of(self, node: NodeSpec) -> str | None:
         """The address that a node is to have in the run's network; None if it may be any."""
-        if node.name != ROUTER or not self.place.middleware.is_fast_dds:
+        if node.name != ROUTER or not self.context.middleware.is_fast_dds:
             return None
         with engine_errors("the engine does not say which addresses the run's network has"):
-            network = self._client.networks.get(self._place.network)
+            network = self._client.networks.get(network_of(self.context.run))
         # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
-
-    def _adopt(self) -> tuple[str, ...]:
-        """Take over the containers of a launcher that died, and return the names of their nodes."""
-        filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
-        with engine_errors(f"the nodes of run {self._place.run_id} cannot be found"):
-            for container in self._client.containers.list(all=True, filters=filters):
-                name = container.labels[NODE_LABEL]
-                # `start` replaces a container that was created but never started.
-                if name not in self._nodes and container.status != "created":
-                    # The next `exits` has to know the state: a container that has ended sends no further event.
-                    self._opened.look(container.id)
-                    self._nodes[name] = self._node(name)
-                    self._nodes[name].adopt(container)
-        return self.running()
-
-    def info(self) -> Info:
-        """Read the summary of the finished dataset."""
-        return dataset_info(self._client, self._place, self.config) if self._place.in_volume else super().info()
 
     @property
     def endpoint(self) -> str | None:
         """See `NodeHost.endpoint`."""
-        state = self._state(ROUTER)
+        state = self._containers.state(ROUTER)
         if state is None or state.ended:
             return None
-        protocol = protocol_of(self.config.run, self.place.middleware)
+        protocol = protocol_of(self.config.run, self.context.middleware)
         if self.config.run.router_port:
             return format_endpoint(protocol, LOOPBACK, self.config.run.router_port)
         return format_endpoint(protocol, state.address, ROUTER_PORT) if state.address else None
@@ -186,136 +126,82 @@ class DockerNodes(NodeHost):
         """Begin to start a node; if it cannot be started, one of the next `exits` reports it."""
         options = node_options(
             node,
-            place=self._place,
+            context=self.context,
             config=self.config,
-            middleware=self.place.middleware,
             image_id=self._image_id,
             address=self._address_of(node),
         )
-        container = self._nodes[node.name] = self._node(node.name)
-        container.start(options, networks=section_of(self.config, node.name).networks)
+        self._containers.start(node.name, options, networks=section_of(self.config, node.name).networks)
 
     def handle(self, name: str) -> str | None:
         """Short id of a running node's container; None if the container does not run (yet)."""
-        node = self._nodes.get(name)
-        return node.handle[:12] if node and node.handle else None
+        handle = self._containers.handle(name)
+        return handle and handle[:12]
 
     def running(self) -> tuple[str, ...]:
         """See `NodeHost.running`."""
-        return tuple(self._nodes)
+        return self._containers.nodes
 
     def exits(self) -> list[NodeExit]:
         """The nodes that ended, or could not be started, since the last call."""
-        if self._clock.given_up:
+        self._containers.warn_if_silent()
+        if self._containers.given_up:
             raise self._make_silence_error()
-        ends = [end for node in self._nodes.values() if (end := self._find_end(node)) is not None]
+        ends = [end for name in self._containers.nodes if (end := self._find_end(name)) is not None]
         for end in ends:
-            del self._nodes[end.name]
+            self._containers.forget(end.name)
         return ends
 
     def frozen(self) -> frozenset[str]:
         """Names of the nodes whose containers are paused."""
-        return frozenset(name for name in self._nodes if (state := self._state(name)) and state.status == "paused")
-
-    def ready(self, name: str) -> bool:
-        """Whether a simulation has ever announced that it is ready, or passes its health check."""
-        state = self._state(name)
-        return (state is not None and state.healthy) or self.logs.said_ready(name)
+        states = {name: self._containers.state(name) for name in self._containers.nodes}
+        return frozenset(name for name, state in states.items() if state and state.status == "paused")
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node once it runs, unless it has ended."""
-        if (node := self._nodes.get(name)) is None:
-            return
-        node.wait_begun(_BEGIN_S)
-        if node.handle is not None:
+        if (handle := self._containers.wait_started(name)) is not None:
             with suppress(*ENGINE_ERRORS):
-                self._client.api.kill(node.handle, int(number))
+                self._client.api.kill(handle, int(number))
 
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """End nodes and remove their containers: with SIGTERM, then after `grace_s`, in whole seconds, by force."""
-        nodes = [self._nodes.pop(name) for name in names if name in self._nodes]
-        # The engine cannot end a container that it is still starting; `close` waits for such a container.
-        self._beginning += [node for node in nodes if not node.begun]
-        with ThreadPoolExecutor(_AT_ONCE) as pool:
-            for node in nodes:
-                pool.submit(self._end, node, math.ceil(grace_s))
+        self._containers.remove(names, grace_s=grace_s)
 
     def close(self) -> None:
-        """End all nodes, the router last, and remove everything that was made for the run but its volume.
+        """End all nodes, the router last, and remove everything that was made for the run.
 
-        Afterwards, `cleared` tells whether the engine has removed all containers.
+        Afterwards, `cleared` is true if the engine has removed all containers.
         """
-        if not self._clock.given_up:
-            self.stop([name for name in self._nodes if name != ROUTER])
-            self.stop([ROUTER])
-        while not self._clock.given_up and any(not node.wait_begun(_POLL_S) for node in self._beginning):
-            pass
-        if not self._clock.given_up:
-            self._remove()
-        if self._watch is not None:
-            self._watch.close()
-        self._clock.close()
-        for node in self._nodes.values():
-            node.close()
-
-    def _remove(self) -> None:
-        # The network cannot be removed while somebody else's container is in it.
-        with suppress(WorkerError):
-            remove(self._client, self._place.run_id, volumes=False)
-        filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
-        with suppress(*ENGINE_ERRORS):
-            self.cleared = not self._client.api.containers(all=True, filters=filters)
+        self.cleared = self._containers.close()
 
     def _make_silence_error(self) -> WorkerError:
         """The error of a silent engine, with the containers that may still run there, and how to go on."""
-        place = self._place
-        left = ", ".join(map(place.container, self._nodes)) or "none"
-        hint = f"once it answers, {command('down', '--run', place.run_id)} ends them"
-        if not place.in_volume:
-            hint += f", and {command('resume', place.source)} goes on with them"
+        context = self.context
+        left = ", ".join(container_of(context.run, node) for node in self._containers.nodes) or "none"
+        hint = (
+            f"once it answers, {command('down', '--run', context.run)} ends them, "
+            f"and {command('resume', context.directory)} goes on without them"
+        )
         return WorkerError(
-            f"the Docker engine has not answered for {self._clock.silent_s:.0f} s; "
-            f"finished throws are safe in {place.source}",
-            evidence="\n".join(filter(None, (self._opened.last_error, f"containers that may run on: {left}"))),
+            f"the Docker engine has not answered for {self._containers.silent_s:.0f} s; "
+            f"finished throws are safe in {context.directory}",
+            evidence="\n".join(filter(None, (self._containers.last_error, f"containers that may run on: {left}"))),
             hint=hint,
         )
 
-    def _node(self, name: str) -> NodeContainer:
-        return NodeContainer(self._client, name, self.logs.path(name), self._clock)
-
-    @property
-    def _opened(self) -> EngineWatch:
-        if self._watch is None:
-            raise WorkerError(f"run {self._place.run_id} is not open on the Docker engine")
-        return self._watch
-
-    def _state(self, name: str) -> ContainerState | None:
-        node = self._nodes.get(name)
-        return self._opened.state(node.handle) if node else None
-
-    def _find_end(self, node: NodeContainer) -> NodeExit | None:
-        """How a node ended; None while it runs, or its last lines are not yet in its log."""
-        if node.failure is not None:
-            return NodeExit(node.name, None, f"cannot be started: {node.failure}", self.logs.tail(node.name))
-        state = self._opened.state(node.handle)
+    def _find_end(self, name: str) -> NodeExit | None:
+        """How a node ended; None while it runs."""
+        if (failure := self._containers.failure(name)) is not None:
+            return NodeExit(name, None, f"cannot be started: {failure}", self.logs.tail(name))
+        state = self._containers.state(name)
         if state is None or not state.ended:
-            self._ended_at.pop(node.name, None)
             return None
-        now = time.monotonic()
-        if not node.log_complete and now - self._ended_at.setdefault(node.name, now) < LOG_S:
-            return None
-        self._ended_at.pop(node.name, None)
-        memory = section_of(self.config, node.name).memory
-        return NodeExit(node.name, state.code, end_in_words(state, memory), self.logs.tail(node.name))
-
-    def _end(self, node: NodeContainer, grace_s: int) -> None:
-        if not node.wait_begun(_BEGIN_S):
-            node.renounce()
-        node.end(grace_s)
+        reason = describe_container_end(state, section_of(self.config, name).memory)
+        return NodeExit(name, state.code, reason, self.logs.tail(name))
 
 
-def end_in_words(state: ContainerState, memory: str | None) -> str:
-    """Say in words how a container with this memory limit ended."""
+def describe_container_end(state: ContainerState, memory: str | None) -> str:
+    """How a container with this memory limit ended."""
     if state.code is None:
         return "its container was removed"
     # `out_of_memory` alone proves nothing: the kernel may have killed another process, and the container went on.

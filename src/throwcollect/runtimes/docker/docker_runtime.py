@@ -1,4 +1,4 @@
-"""The runtime ``docker``: whether an engine can be used, and which runs it holds.
+"""The runtime ``docker``: whether an engine can be used, and the end of everything that it holds of a run.
 
 The client of the engine is imported only when it is needed, because most commands only ask whether there is an engine.
 """
@@ -13,7 +13,7 @@ from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket
-from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
+from throwcollect.runtimes.runtime import Check, RunContext, Runtime
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 _PROBE_S = 3.0
 """With ``run.runtime: auto``, an engine that takes longer to answer is not used."""
-_LOOK_S = 2.0
 
 
 class DockerRuntime(Runtime):
@@ -29,19 +28,18 @@ class DockerRuntime(Runtime):
 
     handle = "container"
     outlives_launcher = True
-    has_volumes = True
 
-    def in_words(self, config: Config) -> str:
-        """See `Runtime.in_words`."""
+    def describe(self, config: Config) -> str:
+        """See `Runtime.describe`."""
         from throwcollect.runtimes.docker.container_options import image
 
         return f"Docker containers of {image(config)}"
 
-    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
         """Make the host of a run; see `Runtime.host`."""
         from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 
-        return DockerNodes(place, config, warn=warn)
+        return DockerNodes(context, config, warn=warn)
 
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
@@ -54,7 +52,6 @@ class DockerRuntime(Runtime):
 
         name, patience_s = image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
         with closing(docker.connect(timeout_s=patience_s)) as client:
-            _refuse_other_machine()
             docker.ensure(client, name, say=say)
             if docker.is_outdated(client, name):
                 finding = f"the image {name} was made from other sources than these"
@@ -71,7 +68,6 @@ class DockerRuntime(Runtime):
         tag = docker.default_tag()
         try:
             with closing(docker.connect(timeout_s=_PROBE_S)) as client, docker.engine_errors("the Docker engine fails"):
-                _refuse_other_machine()
                 engine = client.version()["Version"]
                 found = f"Docker {engine} answers at {engine_address()}"
                 if not docker.is_there(client, tag):
@@ -84,50 +80,21 @@ class DockerRuntime(Runtime):
             return Check("docker", "note", f"{error.message}; runs use processes")
         return Check("docker", "ok", f"{found}, with the image {tag}")
 
-    def find_held(self) -> list[HeldRun]:
-        """See `Runtime.find_held`; none if there is no client, or the engine does not answer quickly."""
+    def remove(self, run: str) -> list[str]:
+        """Remove containers and network; see `Runtime.remove`."""
         if not (is_installed("docker") and has_socket()):
             return []
-        from throwcollect.runtimes.docker.docker_engine import connect
-        from throwcollect.runtimes.docker.held_runs import find_held_runs
-
-        try:
-            with closing(connect(timeout_s=_LOOK_S)) as client:
-                return find_held_runs(client)
-        except WorkerError:
-            return []
-
-    def is_left(self, run: str) -> bool:
-        """Whether the engine holds containers of a run; false if the engine has ended, which ends its containers."""
+        from throwcollect.runtimes.docker.containers import remove
         from throwcollect.runtimes.docker.docker_engine import connect, timed_out
-        from throwcollect.runtimes.docker.held_runs import find_held_runs
 
         try:
-            with closing(connect()) as client:
-                return any(found.nodes for found in find_held_runs(client) if found.run_id == run)
+            client = connect()
         except WorkerError as error:
             if error.__cause__ is None or not timed_out(error.__cause__):
-                return False
+                return []
             raise WorkerError(error.message, hint="try again once the Docker engine answers") from error
-
-    def remove(self, run: str, *, volumes: bool) -> list[str]:
-        """Remove containers, network, key and, if asked for, the dataset's volume; see `Runtime.remove`."""
-        from throwcollect.runtimes.docker.docker_engine import connect
-        from throwcollect.runtimes.docker.held_runs import remove
-
-        with closing(connect()) as client:
-            return remove(client, run, volumes=volumes)
-
-
-def _refuse_other_machine() -> None:
-    """Refuse an engine of another machine."""
-    from throwcollect.runtimes.docker.docker_engine import find_other_machine
-
-    if (other := find_other_machine()) is not None:
-        raise WorkerError(
-            f"the Docker engine at {engine_address()} is on another machine, {other}, without directories of this one",
-            hint=f"run throwcollect on {other}, or use processes: --runtime local",
-        )
+        with closing(client):
+            return remove(client, run)
 
 
 def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:

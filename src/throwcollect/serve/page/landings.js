@@ -61,7 +61,7 @@ export class Landings {
       if (id !== this.#id) return;
       // Without a connection, the landings are requested again later.
       if (error.status === 0) this.#ended = -1;
-      // The server cannot read a dataset in a volume of a container engine; the map keeps the throws that were shown.
+      // If the dataset cannot be read, the map keeps the throws that were shown.
       else this.#hasAll = Boolean(this.instance.summary);
     }
   }

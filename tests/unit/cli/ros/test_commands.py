@@ -41,7 +41,8 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.records import Records
+from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunRecord
 
 String: Any = get_message("std_msgs/msg/String")
@@ -239,13 +240,12 @@ def test_without_a_router_commands_say_that_there_is_no_session(
     assert "--run RUN" in said.err
 
 
-def write_record(run: OpenRun, directory: Path, endpoint: str, **fields: Any) -> None:
+def write_record(run: Run, directory: Path, endpoint: str, **fields: Any) -> None:
     record = RunRecord(
-        run=run.run,
+        run=run.id,
         name="throws",
         runtime="local",
         directory=str(directory / "data"),
-        volume=None,
         logs=str(directory),
         domain_id=0,
         started=datetime.now(timezone.utc),
@@ -270,16 +270,16 @@ def test_commands_join_a_run_by_its_name_or_directory(
         f"THROWCOLLECT_KEY={run.key.directory} RMW_IMPLEMENTATION=rmw_zenoh_cpp\n"
     )
     assert say("env") == (0, line, "")
-    for named in (run.run, "thr", str(tmp_path / "data")):
+    for named in (run.id, "thr", str(tmp_path / "data")):
         assert "/robot/states" in say("topic", "list", "--run", named).out.splitlines()
         assert say("env", "--run", named) == (0, line, "")
-    rejected = say("action", "send", FOLLOW, FJT.TYPE, "{}", "--run", run.run)
-    assert f"the log of the node says why: throwcollect ros topic echo -f /rosout --run {run.run}\n" in rejected.err
+    rejected = say("action", "send", FOLLOW, FJT.TYPE, "{}", "--run", run.id)
+    assert f"the log of the node says why: throwcollect ros topic echo -f /rosout --run {run.id}\n" in rejected.err
     run.update(endpoint=None)
     for command in (("topic", "list"), ("env",)):
-        assert say(*command, "--run", run.run).code == 3
+        assert say(*command, "--run", run.id).code == 3
     run.close()
-    assert "its launcher died" in say("topic", "list", "--run", run.run).err
+    assert "its launcher died" in say("topic", "list", "--run", run.id).err
 
 
 def test_env_for_a_run_on_fast_dds_writes_a_profile_that_only_its_owner_can_read(

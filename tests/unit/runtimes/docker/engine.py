@@ -22,6 +22,7 @@ class Engine:
     Attributes:
         containers: What the engine knows of each container.
         asked: Requests in the order in which they came, such as ``POST /containers/create``.
+        printed: Lines that each container has printed, by its name.
         withheld: Requests that match are not answered before `answer_all`; None for none.
         root: The engine's data root.
     """
@@ -32,7 +33,7 @@ class Engine:
         self.withheld: str | None = None
         self.root = "/var/lib/docker"
         self.released = threading.Event()
-        self.closed = threading.Event()
+        self.printed: dict[str, list[str]] = {}
 
     def answer_all(self) -> None:
         """Answer the withheld requests and all later ones."""
@@ -51,6 +52,13 @@ class Engine:
             if each["Name"] == name:
                 each["State"] |= {"Status": "exited", "Running": False, "ExitCode": code}
 
+    def log(self, key: str, tail: str) -> bytes:
+        """The last lines of a container, or all, with their times, as the engine sends them."""
+        lines = self.printed.get(self.containers[key]["Name"], []) if key in self.containers else []
+        stamped = [f"2026-01-01T00:00:00.{number:09}Z {line}\n".encode() for number, line in enumerate(lines)]
+        shown = stamped if tail == "all" else stamped[-int(tail) :]
+        return b"".join(b"\x01\0\0\0" + len(line).to_bytes(4, "big") + line for line in shown)
+
     def answer(self, method: str, path: str, query: dict[str, list[str]], body: Any) -> tuple[int, Any]:
         """Status and document."""
         match method, *path.strip("/").split("/"):
@@ -60,12 +68,6 @@ class Engine:
                 return 200, {"DockerRootDir": self.root}
             case "GET", "networks":
                 return 200, []
-            case "POST", "volumes", "create":
-                return 201, {"Name": body["Name"], "Labels": body["Labels"]}
-            case "GET", "volumes":
-                return 200, {"Volumes": []}
-            case "GET", "volumes", name:
-                return 200, {"Name": name}
             case "POST", "networks", "create":
                 return 201, {"Id": "net"}
             case "GET", "networks", name:
@@ -76,7 +78,15 @@ class Engine:
                 name = query.get("name", ["without-name"])[0]
                 return 201, {"Id": self.create(name, body["Labels"]), "Warnings": []}
             case "GET", "containers", "json":
-                return 200, [self._list_entry(each) for each in self.containers.values()]
+                wanted = [label.split("=") for label in json.loads(query.get("filters", ["{}"])[0]).get("label", [])]
+                return 200, [
+                    self._list_entry(each)
+                    for each in self.containers.values()
+                    if all(
+                        each["Config"]["Labels"].get(key) in (value or [each["Config"]["Labels"].get(key)])
+                        for key, *value in wanted
+                    )
+                ]
             case _, "containers", key, *action:
                 return self._on_container(method, key, action)
         return 404, {"message": f"no {method} {path}"}
@@ -97,7 +107,9 @@ class Engine:
 
     def _list_entry(self, container: dict[str, Any]) -> dict[str, Any]:
         labels, state = container["Config"]["Labels"], container["State"]["Status"]
-        return {"Id": container["Id"], "Names": [f"/{container['Name']}"], "Labels": labels, "State": state}
+        names = [f"/{container['Name']}"]
+        networks = container["NetworkSettings"]
+        return {"Id": container["Id"], "Names": names, "Labels": labels, "State": state, "NetworkSettings": networks}
 
     def _on_container(self, method: str, key: str, action: list[str]) -> tuple[int, Any]:
         if key not in self.containers:
@@ -130,11 +142,12 @@ class _Handler(BaseHTTPRequestHandler):
         self.engine.asked.append(asked)
         if self.engine.withheld is not None and re.search(self.engine.withheld, asked):
             self.engine.released.wait()
-        if path == "/events" or path.endswith("/logs"):
-            self._stream(for_s=None if path == "/events" else 0.05)
-            return
-        status, document = self.engine.answer(self.command, path, parse_qs(parts.query), body)
-        content = b"" if document is None else json.dumps(document).encode()
+        if path.endswith("/logs"):
+            key = path.split("/")[2]
+            status, content = 200, self.engine.log(key, parse_qs(parts.query)["tail"][0])
+        else:
+            status, document = self.engine.answer(self.command, path, parse_qs(parts.query), body)
+            content = b"" if document is None else json.dumps(document).encode()
         self.send_response(status)
         self.send_header("Content-Type", "application/json")
         self.send_header("Content-Length", str(len(content)))
@@ -142,14 +155,6 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(content)
 
     do_GET = do_POST = do_PUT = do_DELETE = _answer  # noqa: N815
-
-    def _stream(self, for_s: float | None) -> None:
-        """Answer with a stream in which there are no events and no output."""
-        self.send_response(200)
-        self.send_header("Transfer-Encoding", "chunked")
-        self.end_headers()
-        self.engine.closed.wait(for_s)
-        self.close_connection = True
 
     def address_string(self) -> str:
         return "engine"
@@ -176,6 +181,5 @@ def engine_at(path: Path) -> Iterator[Engine]:
         try:
             yield engine
         finally:
-            engine.closed.set()
             engine.answer_all()
             server.shutdown()

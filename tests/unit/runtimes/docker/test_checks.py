@@ -13,7 +13,6 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.runtimes.docker import checks as docker_checks
 from throwcollect.runtimes.docker.checks import check
-from throwcollect.runtimes.docker.container_options import RunPlace
 from throwcollect.runtimes.docker.docker_engine import connect
 
 Check = Callable[..., list[str]]
@@ -36,7 +35,7 @@ def problems(engine: Engine) -> Check:
         config = Config.model_validate({"containers": {"image": "image", "sim": section}})
         with closing(connect()) as client:
             try:
-                check(client, RunPlace("run", "/data"), config)
+                check(client, config)
             except ConfigError as error:
                 return [str(problem).removeprefix("containers.sim.") for problem in error.problems]
         return []

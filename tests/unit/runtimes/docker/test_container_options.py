@@ -9,20 +9,19 @@ import throwcollect
 from rclzenoh.session_config import client_override
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
-from throwcollect.runtimes.docker.container_options import RunPlace, image, mount_source, node_options, publishes_port
+from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker.container_options import image, mount_source, node_options, publishes_port
 from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.runtimes.nodes import NodeRole, NodeSpec
+from throwcollect.runtimes.runtime import RunContext
 
-DIRECTORY = RunPlace("throws-1a2b", "/home/me/data set")
-VOLUME = RunPlace("throws-1a2b", "datasets")
+PLACE = RunContext("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
 
 
-def options(
-    name: str, place: RunPlace = DIRECTORY, *, core: int | None = None, run: Any = None, **containers: Any
-) -> dict[str, Any]:
+def options(name: str, *, core: int | None = None, run: Any = None, **containers: Any) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
     node = NodeSpec(name, ("command", "--option"), NodeRole.EXPENDABLE, core)
-    return node_options(node, place=place, config=config, middleware=Middleware(), image_id="sha256:12ab")
+    return node_options(node, context=PLACE, config=config, image_id="sha256:12ab")
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])
@@ -49,7 +48,6 @@ def test_a_container_gets_the_name_of_its_node_and_the_address_of_the_router() -
     assert environment["THROWCOLLECT_HOST"] == socket.gethostname()
     assert environment["THROWCOLLECT_IMAGE"] == "sha256:12ab"
     assert environment["THROWCOLLECT_DIRECTORY"] == "/home/me/data set"
-    assert options("sim_3", VOLUME)["environment"]["THROWCOLLECT_DIRECTORY"] == ""
     assert made["labels"] == {
         "throwcollect.run": "throws-1a2b",
         "throwcollect.node": "sim_3",
@@ -59,21 +57,20 @@ def test_a_container_gets_the_name_of_its_node_and_the_address_of_the_router() -
 
 
 def test_only_the_coordinator_can_write_the_dataset_and_simulations_can_read_it() -> None:
-    def mounts(name: str, place: RunPlace) -> list[tuple[str, str, str, bool]]:
-        found = options(name, place)["mounts"][1:]
+    def mounts(name: str) -> list[tuple[str, str, str, bool]]:
+        found = options(name)["mounts"][1:]
         return [(each["Type"], each["Source"], each["Target"], each["ReadOnly"]) for each in found]
 
-    assert mounts("coordinator", DIRECTORY) == [("bind", "/home/me/data set", "/data", False)]
-    assert mounts("sim_0", DIRECTORY) == [("bind", "/home/me/data set", "/data", True)]
-    assert mounts("sim_0", VOLUME) == [("volume", "datasets", "/data", True)]
-    assert mounts("router", VOLUME) == []
+    assert mounts("coordinator") == [("bind", "/home/me/data set", "/data", False)]
+    assert mounts("sim_0") == [("bind", "/home/me/data set", "/data", True)]
+    assert mounts("router") == []
 
 
 def test_every_node_gets_the_key_of_the_run_in_a_read_only_mount() -> None:
     for name in ("router", "sim_0", "coordinator"):
         made = options(name)
         mount = made["mounts"][0]
-        assert (mount["Type"], mount["Source"]) == ("volume", "throwcollect-throws-1a2b-key")
+        assert (mount["Type"], mount["Source"]) == ("bind", "/state/key")
         assert (mount["Target"], mount["ReadOnly"]) == ("/key", True)
         assert made["environment"]["THROWCOLLECT_KEY"] == "/key"
         assert 'connect_private_key="/key/key.pem"' in made["environment"]["ZENOH_CONFIG_OVERRIDE"]

@@ -3,10 +3,10 @@ from pathlib import Path
 import pytest
 import requests
 from docker.errors import APIError, DockerException
-from urllib3.exceptions import ReadTimeoutError
+from urllib3.exceptions import ProtocolError, ReadTimeoutError
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.docker_engine import connect, engine_errors, in_words
+from throwcollect.runtimes.docker.docker_engine import connect, describe_error, engine_errors
 
 
 def api_error(explanation: str) -> APIError:
@@ -18,7 +18,7 @@ def api_error(explanation: str) -> APIError:
     [
         (api_error("port is already allocated"), "port is already allocated"),
         (
-            requests.ConnectionError("Connection aborted.", ConnectionRefusedError(111, "Connection refused")),
+            requests.ConnectionError(ProtocolError("Aborted.", ConnectionRefusedError(111, "Connection refused"))),
             "Connection refused",
         ),
         (DockerException("something else"), "something else"),
@@ -28,7 +28,7 @@ def api_error(explanation: str) -> APIError:
     ],
 )
 def test_an_error_of_the_docker_engine_is_raised_in_plain_words(error: Exception, words: str) -> None:
-    assert in_words(error) == words
+    assert describe_error(error) == words
     with pytest.raises(WorkerError, match=f"^sim_0: {words}$"), engine_errors("sim_0"):
         raise error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,12 +15,12 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker import docker_engine as docker_engine
+from throwcollect.runtimes.docker import containers
 from throwcollect.runtimes.docker import docker_nodes as module
-from throwcollect.runtimes.docker import watch as docker_watch
+from throwcollect.runtimes.docker.containers import ContainerState
 from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import RunContext
 
 CONFIG = Config.model_validate({"containers": {"image": "image"}})
 
@@ -29,10 +30,10 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     path = tmp_path / "engine.sock"
     monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
     # All times are about a hundredth of the real ones.
-    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
-    monkeypatch.setattr(docker_watch, "_TICK_S", 0.025)
-    monkeypatch.setattr(docker_watch, "_WARN_S", 0.3)
-    monkeypatch.setattr(docker_watch, "SILENCE_S", 1.0)
+    monkeypatch.setattr(containers, "_POLL_S", 0.02)
+    monkeypatch.setattr(containers, "_WARN_S", 0.2)
+    monkeypatch.setattr(containers, "SILENCE_S", 1.0)
+    monkeypatch.setattr(module, "ANSWER_S", 0.5)
     with engine_at(path) as engine:
         yield engine
 
@@ -52,7 +53,7 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
         key.create()
         made.append(
             DockerNodes(
-                Place("run-1a2b", directory, None, tmp_path / "logs", 1, Middleware(), key),
+                RunContext("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
                 CONFIG,
                 warn=warnings.append,
             )
@@ -99,13 +100,13 @@ def test_giving_up_a_silent_engine_names_left_containers_and_how_to_go_on(
     until(lambda: runtime.handle("sim_0"), runtime=runtime)
     engine.withheld = "."
     with pytest.raises(
-        WorkerError, match=rf"has not answered for 1 s; finished throws are safe in {tmp_path}/my data"
+        WorkerError, match=rf"has not answered for [12] s; finished throws are safe in {tmp_path}/my data"
     ) as caught:
         until(lambda: False, runtime=runtime)
-    assert caught.value.evidence == "containers that may run on: throwcollect-run-1a2b-sim_0"
+    assert caught.value.evidence == "no answer in time\ncontainers that may run on: throwcollect-run-1a2b-sim_0"
     resume = f"throwcollect resume '{tmp_path}/my data'"
     assert caught.value.hint == (
-        f"once it answers, throwcollect down --run run-1a2b ends them, and {resume} goes on with them"
+        f"once it answers, throwcollect down --run run-1a2b ends them, and {resume} goes on without them"
     )
     runtime.close()
     assert not runtime.cleared
@@ -113,33 +114,59 @@ def test_giving_up_a_silent_engine_names_left_containers_and_how_to_go_on(
 
 
 def test_a_container_that_is_created_late_is_removed_at_the_end(
-    engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
+    engine: Engine, make: Callable[[], DockerNodes]
 ) -> None:
-    monkeypatch.setattr(module, "_BEGIN_S", 0.1)
     runtime = make()
     engine.withheld = "POST /containers/create"
     runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
     until(lambda: engine.withheld in engine.asked)
-    runtime.stop(["sim_0"])
-    engine.answer_all()
+    answering = threading.Timer(0.1, engine.answer_all)
+    answering.start()
     runtime.close()
+    answering.join()
     assert engine.names() == []
     assert runtime.cleared
 
 
+def test_the_output_of_a_container_is_in_the_log_once_and_before_its_end_is_known(
+    engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(containers, "_TAIL_LINES", 3)
+    runtime = make()
+    runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
+    name = "throwcollect-run-1a2b-sim_0"
+    log = runtime.logs.path("sim_0")
+    engine.printed[name] = ["one", "sim_0 is ready"]
+    until(lambda: runtime.logs.said_ready("sim_0"), runtime=runtime)
+    # More lines than the engine is asked for at first.
+    engine.printed[name] += [str(number) for number in range(9)]
+    until(lambda: log.read_text().endswith("8\n"), runtime=runtime)
+    engine.printed[name].append("the end")
+    engine.end(name, 3)
+    (end,) = until(lambda: not runtime.running(), runtime=runtime)
+    assert (end.code, end.log) == (3, log.read_text().strip())
+    assert log.read_text().splitlines() == engine.printed[name]
+
+
 @pytest.mark.parametrize(
-    ("code", "words"),
+    ("state", "memory", "words"),
     [
-        (0, "exit code 0"),
-        (128, "exit code 128"),
+        (ContainerState("exited", 0), None, "exit code 0"),
+        (ContainerState("exited", 128), None, "exit code 128"),
         # A node that is asked to stop ends with this code by itself.
-        (130, "exit code 130"),
-        (137, "ended by SIGKILL"),
-        (163, "ended by signal 35"),
-        (255, "exit code 255"),
-        (None, "its container was removed"),
+        (ContainerState("exited", 130), None, "exit code 130"),
+        (ContainerState("exited", 137), "512m", "ended by SIGKILL"),
+        (ContainerState("exited", 163), None, "ended by signal 35"),
+        (ContainerState("exited", 255), None, "exit code 255"),
+        (ContainerState("exited", 137, out_of_memory=True), "512m", "ran out of memory (limit 512m)"),
+        (ContainerState("exited", 137, out_of_memory=True), None, "ran out of memory"),
+        # Another process of the container ran out of memory.
+        (ContainerState("exited", 5, out_of_memory=True), "512m", "exit code 5"),
+        (ContainerState("removed"), None, "its container was removed"),
     ],
 )
-def test_the_end_of_a_container_is_told_by_its_signal_or_its_exit_code(code: int | None, words: str) -> None:
-    state = docker_watch.ContainerState("exited", code)
-    assert module.end_in_words(state, None) == words
+def test_the_end_of_a_container_is_described_by_its_signal_or_exit_code(
+    state: ContainerState, memory: str | None, words: str
+) -> None:
+    assert state.ended
+    assert module.describe_container_end(state, memory) == words
