@@ -47,7 +47,10 @@ def address(tmp_path: Path) -> Iterator[str]:
     # Slow enough to be stopped half-way, and to leave the processor to the browser.
     write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
     catalogue = tmp_path / "catalogue.yaml"
-    catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
+    catalogue.write_text(
+        "components: {throws: {pretty_name: Throws, config: small.yaml}, "
+        "hands: {pretty_name: Hands, session: small.yaml}}\n"
+    )
     make_model(tmp_path / "models" / "quick")
     with serve(catalogue, tmp_path / "datasets", tmp_path / "models") as told:
         yield told["page"]
@@ -88,6 +91,27 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert {urlsplit(url).netloc for url in tab.requests if not url.startswith(("data:", "blob:"))} == {
             urlsplit(address).netloc
         }
+        assert find_own_errors(tab) == []
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_a_session_is_recorded_by_a_button(address: str) -> None:
+    with browse(address, width=390, height=800, features={"prefers-reduced-motion": "reduce"}) as tab:
+        load(tab)
+        start = "document.querySelector('button[aria-label=\"Start Hands\"]')"
+        tab.evaluate(f"{start}.form.querySelector('input').value = '1'; {start}.click()")
+        button, note = (f"document.querySelector('#{name}')" for name in ("record", "view-note"))
+        tab.wait_for(f"!{button}.hidden && {button}.ariaDisabled === 'false' && throwcollect.live.simulations.size")
+        # The service may not be known yet.
+        again = f"/^$|is not recorded/.test({note}.textContent) && ({note}.textContent = 'asked', {button}.click())"
+        tab.wait_for(f"({again}, {button}.textContent === 'Stop recording')")
+        assert "into" in tab.evaluate(f"{note}.textContent")
+        tab.evaluate(f"{button}.click()")
+        tab.wait_for(f"{button}.textContent === 'Record'")
+        assert "nothing has moved" in tab.evaluate(f"{note}.textContent")
+        # A session outlives its server.
+        press(tab, f"Stop {tab.evaluate('throwcollect.watching.id')}")
+        tab.wait_for("document.querySelector('#ended .status')?.textContent.startsWith('has ended')", every_s=1)
         assert find_own_errors(tab) == []
 
 
@@ -153,7 +177,10 @@ def test_the_page_works_without_a_network(tmp_path: Path) -> None:
         pytest.skip("may make no network namespace; root may")
     write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
     catalogue = tmp_path / "catalogue.yaml"
-    catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
+    catalogue.write_text(
+        "components: {throws: {pretty_name: Throws, config: small.yaml}, "
+        "hands: {pretty_name: Hands, session: small.yaml}}\n"
+    )
     command = [*unshare, sys.executable, "-m", "tests.e2e.offline_page", catalogue, tmp_path]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=240, check=False)
     assert done.returncode == 0

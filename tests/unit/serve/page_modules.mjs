@@ -140,6 +140,29 @@ test("a topic is advertised once for each connection, and a refusal is reported"
   assert.deepEqual(told, ["may only look"]);
 });
 
+test("a call gets its answer, the reason of its failure, or the loss of the connection", async () => {
+  const sent = [];
+  let events;
+  const bridge = new Rosbridge({ openRosbridge: (_run, given) => {
+    events = given;
+    return { send: (text) => sent.push(JSON.parse(text)) };
+  } }, "run");
+  const call = () => bridge.call("/sim_0/record", "std_srvs/srv/SetBool", { data: true });
+  await assert.rejects(call, /no connection/);
+  events.opened();
+  const answers = [call(), call(), call(), call()];
+  assert.equal(new Set(sent.map(({ id }) => id)).size, 4);
+  const answer = (i, rest) => events.receive(JSON.stringify({ op: "service_response", id: sent[i].id, ...rest }));
+  answer(1, { result: false, values: "no such service" });
+  answer(0, { result: true, values: { success: true, message: "records" } });
+  events.receive(JSON.stringify({ op: "status", level: "error", id: sent[2].id, msg: "may only look" }));
+  events.lost();
+  assert.equal((await answers[0]).message, "records");
+  await assert.rejects(answers[1], /no such service/);
+  await assert.rejects(answers[2], /may only look/);
+  await assert.rejects(answers[3], /connection to the run is lost/);
+});
+
 test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp", () => {
   const sphere = new SphereGeometry(1, 64, 32);
   const coarse = coarsen(sphere, 0.3);

@@ -45,6 +45,8 @@ export class Live {
   refused = () => {};
   #instance = null;
   #alone = "";
+  /** Simulations of the run whose recording this page has begun. */
+  #recorded = new Set();
 
   /**
    * @param {object} parts
@@ -65,6 +67,7 @@ export class Live {
       this.tell("");
       this.#follow();
     });
+    get("record").addEventListener("click", () => this.#record());
     document.addEventListener("visibilitychange", () => this.#follow());
   }
 
@@ -106,6 +109,7 @@ export class Live {
     const run = isSeen ? instance.id : null;
     if (run !== this.#run) this.#connect(run);
     this.#showButton(instance, isSeen);
+    this.#showRecord(instance, isSeen);
     const isSession = instance?.kind === "session";
     const wanted = !isSeen ? [] : isSession ? this.view.shown : this.#wanted && this.#alone ? [this.#alone] : [];
     for (const name of [...this.simulations]) if (!wanted.includes(name)) this.#leave(name);
@@ -122,7 +126,43 @@ export class Live {
     setText(button, isPressed ? "Live: back to replays" : "Live");
   }
 
+  /** @returns {string} the simulation of a session that the button records: the one that is shown, if it is one */
+  get #recordable() {
+    if (this.#run === null || this.#instance?.kind !== "session") return "";
+    return this.#alone || (this.#instance.robots.length === 1 ? this.#instance.robots[0] : "");
+  }
+
+  #showRecord(instance, isSeen) {
+    const button = get("record");
+    const isRecorded = this.#recorded.has(this.#recordable);
+    button.hidden = !isSeen || instance.kind !== "session";
+    button.setAttribute("aria-disabled", String(!this.#recordable));
+    button.setAttribute("aria-pressed", String(isRecorded));
+    setText(button, isRecorded ? "Stop recording" : "Record");
+  }
+
+  /** Begin or end the recording of what clients do with a simulation. */
+  async #record() {
+    const name = this.#recordable;
+    if (!name) {
+      this.tell("choose one simulation first: each records its own episodes");
+      return;
+    }
+    const begins = !this.#recorded.has(name);
+    try {
+      const { message } = await this.#bridge.call(`/${name}/record`, "std_srvs/srv/SetBool", { data: begins });
+      // What is recorded already, by this page before it was loaded anew or by another client, can be ended here.
+      if (begins) this.#recorded.add(name);
+      else this.#recorded.delete(name);
+      this.tell(`${name}: ${message}`);
+    } catch ({ message }) {
+      this.tell(`${name} is not recorded: ${message}`);
+    }
+    this.#showRecord(this.#instance, true);
+  }
+
   #connect(run) {
+    this.#recorded.clear();
     for (const name of [...this.simulations]) this.#leave(name);
     this.#bridge?.close();
     this.#bridge = null;

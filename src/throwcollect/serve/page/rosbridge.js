@@ -7,6 +7,8 @@ export class Rosbridge {
   #socket;
   #topics = new Map();
   #advertised = new Map();
+  /** @type {Map<string, {resolve: (values: any) => void, reject: (error: Error) => void}>} calls without an answer yet */
+  #calls = new Map();
   #open = false;
 
   /**
@@ -28,6 +30,8 @@ export class Rosbridge {
       receive: (text) => this.#take(JSON.parse(text), events),
       lost: () => {
         this.#open = false;
+        for (const { reject } of this.#calls.values()) reject(new Error("the connection to the run is lost"));
+        this.#calls.clear();
         events.lost?.();
       },
     });
@@ -65,6 +69,23 @@ export class Rosbridge {
     this.#send({ op: "publish", id: `publish-${topic}`, topic, msg: message });
   }
 
+  /**
+   * Call a service.
+   * @param {string} service
+   * @param {string} type such as std_srvs/srv/SetBool
+   * @param {object} args
+   * @returns {Promise<any>} the response
+   * @throws {Error} if there is no connection, or the service fails
+   */
+  call(service, type, args) {
+    if (!this.#open) return Promise.reject(new Error("there is no connection to the run"));
+    const id = `call-${crypto.randomUUID?.() ?? Math.random()}`;
+    return new Promise((resolve, reject) => {
+      this.#calls.set(id, { resolve, reject });
+      this.#send({ op: "call_service", id, service, type, args });
+    });
+  }
+
   close() {
     this.#socket.close();
   }
@@ -83,6 +104,12 @@ export class Rosbridge {
 
   #take(message, { refused }) {
     if (message.op === "status" && message.level === "error" && message.id?.startsWith("publish-")) refused?.(message.msg);
+    const call = this.#calls.get(message.id);
+    if (call && (message.op === "service_response" || message.level === "error")) {
+      this.#calls.delete(message.id);
+      if (message.result) call.resolve(message.values);
+      else call.reject(new Error(message.msg ?? String(message.values)));
+    }
     if (message.op === "publish") this.#topics.get(message.topic)?.hear(message.msg);
   }
 }
