@@ -38,6 +38,7 @@ PLACES: dict[str, tuple[float, int, str]] = {
     "dataset": (3.2, 6, "the files"),
     "sweep": (2.9, 7, "the plan"),
     "tasks": (2.6, 8, "motion and judging"),
+    "sensing": (4.9, 8, "cameras, lidars"),
     "episode": (2.2, 9, "samples ↔ bytes"),
     "robots": (2.5, 10, "what a robot is"),
     "ros_installation": (-0.55, 11, "is ROS 2 here?"),

@@ -1,4 +1,4 @@
-"""An image with packages, made as docs/containers.md says: its nodes collect with another robot, by motions and by a policy."""
+"""An image with packages, made as docs/containers.md says: nodes collect with its robot, and with its policy."""
 
 from __future__ import annotations
 

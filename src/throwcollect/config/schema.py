@@ -23,6 +23,7 @@ from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.scene import BALL, AnyBody, BallConfig, BodyName, FileBodyConfig, SceneConfig
 from throwcollect.config.section import Section, any_of
+from throwcollect.config.sensors import AnySensor, SensorName
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
 from throwcollect.config.task_config import TaskConfig, UntilConfig
 from throwcollect.config.tool_config import ToolConfig
@@ -174,6 +175,8 @@ class Config(Section):
     """What varies from trial to trial."""
     record: Annotated[RecordConfig, Key(Effect.PHYSICS)] = RecordConfig()
     """What is recorded."""
+    sensors: Annotated[dict[SensorName, AnySensor], Field(max_length=32), Key(Effect.ENCODING, swept=False)] = {}
+    """Cameras and lidars that see the recorded states, by name; the name is that of topics and frames."""
     run: Annotated[RunConfig, Key(Effect.RUN, operator=True)] = RunConfig()
     """How it is run."""
     containers: Annotated[ContainersConfig, Key(Effect.RUN, operator=True)] = ContainersConfig()
@@ -192,6 +195,10 @@ class Config(Section):
                 yield "task.policy.rate_hz", sentence
             if "controller_state" in self.record.topics:
                 yield "record.topics", "should not hold controller_state, as task.policy commands the joints"
+        for name, sensor in self.sensors.items():
+            if self.record.rate_hz % sensor.rate_hz:
+                sentence = f"should divide record.rate_hz, {self.record.rate_hz}, got {sensor.rate_hz}"
+                yield f"sensors.{name}.rate_hz", sentence
         if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
             yield "robot.locked", f"should not hold joints that task.end moves, got {', '.join(moving)}"
         for joint in self.robot.joint_offsets:

@@ -102,6 +102,15 @@ def list_operator_keys() -> tuple[str, ...]:
     return tuple(_find_operator_keys(Config))
 
 
+def with_sensors(config: Config, sensors: Mapping[str, Any]) -> Config:
+    """Make a copy of a configuration with other sensors: sections by name, as they are in YAML.
+
+    Raises:
+        ConfigError: If a section is wrong.
+    """
+    return _validate(type(config), {**config.__dict__, "sensors": dict(sensors)}, (), strict=False)
+
+
 def reason_not_sweepable(config: Config, key: str) -> str | None:
     """Say why a sweep may not vary a key; None when it may.
 
@@ -165,11 +174,16 @@ def _change(section: AnySection, changes: Mapping[str, Any], location: Location)
         if part not in values:
             raise _make_unknown_key_error((*location, part), list(values))
         values[part] = _replace(values[part], change, (*location, part))
+    # Strictly, so that a text in quotes is not taken for a number.
+    return _validate(type(section), values, location, strict=True)
+
+
+def _validate(section: type[AnySection], values: Mapping[str, Any], location: Location, *, strict: bool) -> AnySection:
+    """Make a section of its values; Pydantic does not validate sections among them again."""
     try:
-        # Strictly, so that a text in quotes is not taken for a number. Pydantic does not validate sections again.
-        return type(section).model_validate(values, strict=True)
+        return section.model_validate(values, strict=strict)
     except ValidationError as error:
-        found = find_problems(error, type(section), values)
+        found = find_problems(error, section, values)
         problems = [Problem(sentence, join_key((*location, *place))) for place, sentence in found.items()]
         raise ConfigError(problems) from error
 

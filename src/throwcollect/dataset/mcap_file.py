@@ -1,7 +1,8 @@
 """One MCAP file of a dataset, written record by record.
 
 The file starts with all schemas and channels and a chunk with the latched messages. Each episode is one uninterrupted
-run of records: its chunk, the message indexes, and a Metadata record named `EPISODE` that says what it is.
+run of records: its chunks, each with message indexes, and a Metadata record named `EPISODE` that says what it is. The
+first chunk has the samples, and those behind it what sensors saw.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import itertools
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,17 +59,17 @@ def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], lis
 
 @dataclass(frozen=True)
 class RecordGroup:
-    """Records that follow each other without a gap: a chunk, its message indexes, and maybe a Metadata record.
+    """Records that follow each other without a gap: chunks with their message indexes, and maybe a Metadata record.
 
     Attributes:
-        chunk_index: Index of the chunk, as if the run began at offset 0.
+        chunk_indexes: Indexes of the chunks, as if the run began at offset 0.
         counts: Number of messages on each channel, by its number.
         metadata_length: Size of the Metadata record at the end [bytes]; 0 if there is none.
         offset: Where the run begins in a file [bytes], if it lies in one.
     """
 
     data: bytes
-    chunk_index: records.ChunkIndex
+    chunk_indexes: tuple[records.ChunkIndex, ...]
     counts: Mapping[int, int]
     metadata_length: int
     offset: int = 0
@@ -76,8 +77,9 @@ class RecordGroup:
     @property
     def length(self) -> int:
         """Size of the records [bytes]."""
-        index = self.chunk_index
-        return int(index.chunk_length + index.message_index_length) + self.metadata_length
+        last = self.chunk_indexes[-1]
+        end = last.chunk_start_offset + last.chunk_length + last.message_index_length
+        return int(end) + self.metadata_length
 
     @property
     def end(self) -> int:
@@ -86,30 +88,41 @@ class RecordGroup:
 
     @property
     def start_ns(self) -> int:
-        """Time of the first message of its chunk [ns]."""
-        return int(self.chunk_index.message_start_time)
+        """Time of the first message of its first chunk [ns]."""
+        return int(self.chunk_indexes[0].message_start_time)
 
     @classmethod
-    def of(cls, chunk: Chunk, indexes: Mapping[int, bytes], metadata: bytes = b"") -> RecordGroup:
-        """Make the run of a chunk with its Message Index records by channel, and of a Metadata record."""
-        offsets, offset = {}, chunk.record_size
-        for channel, index in indexes.items():
-            offsets[channel] = offset
-            offset += len(index)
-        chunk_index = records.ChunkIndex(
-            chunk_length=chunk.record_size,
-            chunk_start_offset=0,
-            compression="zstd",
-            compressed_size=len(chunk.data),
-            message_end_time=chunk.end_ns,
-            message_index_length=offset - chunk.record_size,
-            message_index_offsets=offsets,
-            message_start_time=chunk.start_ns,
-            uncompressed_size=chunk.uncompressed_size,
-        )
-        counts = {channel: count_indexed(index) for channel, index in indexes.items()}
-        data = b"".join((chunk.record_header(), chunk.data, *indexes.values(), metadata))
-        return cls(data, chunk_index, counts, len(metadata))
+    def of(cls, chunks: Iterable[Chunk], metadata: bytes = b"") -> RecordGroup:
+        """Make the run of chunks with their Message Index records, and of a Metadata record."""
+        chunk_indexes, counts, parts, start = [], Counter[int](), [], 0
+        for chunk in chunks:
+            offsets, offset = {}, start + chunk.record_size
+            for channel, index in chunk.indexes.items():
+                offsets[channel] = offset
+                offset += len(index)
+                counts[channel] += count_indexed(index)
+            chunk_indexes.append(
+                records.ChunkIndex(
+                    chunk_length=chunk.record_size,
+                    chunk_start_offset=start,
+                    compression="zstd",
+                    compressed_size=len(chunk.data),
+                    message_end_time=chunk.end_ns,
+                    message_index_length=offset - start - chunk.record_size,
+                    message_index_offsets=offsets,
+                    message_start_time=chunk.start_ns,
+                    uncompressed_size=chunk.uncompressed_size,
+                )
+            )
+            parts += [chunk.record_header(), chunk.data, *chunk.indexes.values()]
+            start = offset
+        return cls(b"".join((*parts, metadata)), tuple(chunk_indexes), counts, len(metadata))
+
+    def indexes_from(self, start: int) -> Iterator[records.ChunkIndex]:
+        """Make the indexes of the chunks of the run if it begins at an offset of a file [bytes]."""
+        for index in self.chunk_indexes:
+            offsets = {channel: start + offset for channel, offset in index.message_index_offsets.items()}
+            yield replace(index, chunk_start_offset=start + index.chunk_start_offset, message_index_offsets=offsets)
 
 
 def episode_run(episode: Episode) -> RecordGroup:
@@ -120,8 +133,11 @@ def episode_run(episode: Episode) -> RecordGroup:
         "records_sha256": episode.chunk.records_sha256,
         "header": episode.header_json,
     }
+    if episode.sensors:
+        facts["sensors_sha256"] = " ".join(chunk.records_sha256 for chunk in episode.sensors)
     metadata = encode_records(records.Metadata(name=EPISODE, metadata=facts))
-    return RecordGroup.of(episode.chunk, episode.message_indexes, metadata)
+    state = replace(episode.chunk, indexes=episode.message_indexes)
+    return RecordGroup.of((state, *episode.sensors), metadata)
 
 
 class McapFile:
@@ -148,9 +164,7 @@ class McapFile:
 
     def append(self, run: RecordGroup) -> None:
         """Write a run of records, such as that of an episode."""
-        offsets = {channel: self.size + offset for channel, offset in run.chunk_index.message_index_offsets.items()}
-        index = replace(run.chunk_index, chunk_start_offset=self.size, message_index_offsets=offsets)
-        self._chunk_indexes.append(index)
+        self._chunk_indexes += run.indexes_from(self.size)
         self._counts.update(run.counts)
         if run.metadata_length:
             start = self.size + run.length - run.metadata_length
@@ -229,4 +243,4 @@ def encode_latched_run(channels: Channels, stamp_ns: int) -> RecordGroup:
     }
     contents = b"".join(messages)
     data = zstandard.ZstdCompressor(level=_LATCHED_LEVEL).compress(contents)
-    return RecordGroup.of(Chunk.of(contents, data, start_ns=stamp_ns, end_ns=stamp_ns), indexes)
+    return RecordGroup.of([replace(Chunk.of(contents, data, start_ns=stamp_ns, end_ns=stamp_ns), indexes=indexes)])

@@ -27,7 +27,7 @@ from throwcollect.dataset.mcap_file import RecordGroup, episode_run
 from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, RECORD_PREFIX_BYTES, Chunk
 from throwcollect.episode.episode_message import Episode, header_from_json
-from throwcollect.episode.message_table import MessageTable
+from throwcollect.episode.message_table import MessageTable, check_frames
 from throwcollect.episode.topics import Rows
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
@@ -105,28 +105,39 @@ class McapContents:
         size = Chunk.read_announced_size(self._data[offset : offset + CHUNK_HEADER_BYTES])
         return Chunk.parse(memoryview(self._data[offset : offset + size]))
 
-    def episode(self, offset: int) -> tuple[Episode, int]:
-        """Read the episode whose chunk begins at an offset; returns it, and where its records end."""
+    def episode(self, offset: int, *, sensors: bool = False) -> tuple[Episode, int]:
+        """Read the episode whose chunk begins at an offset; returns it, and where its records end.
+
+        The chunks of its sensors are read if they are asked for.
+        """
         try:
             chunk = self.chunk(offset)
-            facts = self.record(offset + chunk.record_size)
-            while facts.opcode == Opcode.MESSAGE_INDEX:
+            begin = facts = self.record(offset + chunk.record_size)
+            while facts.opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK):
+                if begin.opcode == Opcode.MESSAGE_INDEX and facts.opcode == Opcode.CHUNK:
+                    begin = facts
                 facts = self.record(facts.end)
             data = self._data[facts.offset + RECORD_PREFIX_BYTES : facts.end]
             stated = records.Metadata.read(ReadDataStream(io.BytesIO(data))).metadata
             header, sha256 = header_from_json(stated["header"]), stated["records_sha256"]
-            if facts.opcode != Opcode.METADATA or not is_digest(sha256):
+            hashes = stated.get("sensors_sha256", "").split()
+            if facts.opcode != Opcode.METADATA or not all(map(is_digest, (sha256, *hashes))):
                 raise ValueError(sha256)
+            seen: list[Chunk] = []
+            if sensors and hashes:
+                seen = Chunk.parse_run(memoryview(self._data[begin.offset : facts.offset]), hashes)
         except (EndOfFile, struct.error, ValueError, KeyError) as error:
             raise DatasetError("the metadata of the episode are not readable", place=f"byte {offset}") from error
         except DatasetError as error:
             raise error.locate(place=f"byte {offset}") from error
-        return Episode(header, replace(chunk, records_sha256=sha256)), facts.end
+        return Episode(header, replace(chunk, records_sha256=sha256), sensors=tuple(seen)), facts.end
 
     def whole_episode(self, offset: int) -> WholeEpisode:
         """Read the episode whose chunk begins at an offset, and compare all its bytes with what the writer writes."""
-        episode, end = self.episode(offset)
+        episode, end = self.episode(offset, sensors=True)
         episode.chunk.check_records()
+        for chunk in episode.sensors:
+            check_frames(chunk)
         run = episode_run(episode)
         if run.data != self._data[offset:end]:
             raise DatasetError("its message indexes or metadata do not fit its chunk", place=f"byte {offset}")
@@ -165,11 +176,11 @@ class EpisodePlace(NamedTuple):
     start_ns: int
     samples: int
 
-    def read(self) -> Episode:
-        """Read the episode from its file."""
+    def read(self, *, sensors: bool = False) -> Episode:
+        """Read the episode from its file, with what its sensors saw if that is asked for."""
         with open_mcap(self.path) as contents:
             try:
-                episode, _ = contents.episode(self.offset)
+                episode, _ = contents.episode(self.offset, sensors=sensors)
                 self._check_start(episode.chunk)
             except DatasetError as error:
                 raise error.locate(self.path, f"byte {self.offset}") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import is_target
-from throwcollect.config.values import column_of
+from throwcollect.config.values import column_of, with_sensors, with_values
 from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
 from throwcollect.dataset.motion import Body, Joints
+from throwcollect.dataset.sensors import SensorFrames
 from throwcollect.dataset.throws_table import Row, body_state
 from throwcollect.dataset.trajectories import (
     BODY_COMPONENTS,
@@ -25,14 +26,17 @@ from throwcollect.dataset.trajectories import (
     TIMES,
     name_components,
 )
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import list_body_fields, read_column
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.topics import Rows, rotate
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
-from throwcollect.robots.description import robot_of
+from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
+from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
@@ -230,8 +234,8 @@ class Throw:
         """Release, apex and landing, and the contacts of the object."""
         return Events(self.row, self)
 
-    def read_episode(self) -> Episode:
-        """Read its episode, with everything that was recorded.
+    def read_episode(self, *, sensors: bool = False) -> Episode:
+        """Read its episode, with everything that was recorded; what sensors saw only if that is asked for.
 
         Raises:
             DatasetError: If it has none, or it is damaged.
@@ -243,7 +247,49 @@ class Throw:
                 path=Path(self._source),
                 hint="leave such trials out: dataset.recorded",
             )
-        return self._episode.read() if isinstance(self._episode, EpisodePlace) else self._episode
+        return self._episode.read(sensors=sensors) if isinstance(self._episode, EpisodePlace) else self._episode
+
+    @cached_property
+    def sensors(self) -> dict[str, SensorFrames]:
+        """What the sensors of the configuration saw, by name of the sensor; frames are read when they are asked for.
+
+        Raises:
+            DatasetError: If the throw has no episode, or it is damaged.
+        """
+        with self.locating_damage():
+            seen = self.read_episode(sensors=True).sensors
+            # A throw in memory is not rendered before somebody looks.
+            return self._open_sensors(self.config, seen or self._render(self.config))
+
+    @property
+    def config(self) -> Config:
+        """The configuration with the values of this trial."""
+        return with_values(self._config, self.parameters)
+
+    def render(self, sensors: Mapping[str, Mapping[str, Any]]) -> dict[str, SensorFrames]:
+        """Render what other sensors see of the recorded samples.
+
+        Args:
+            sensors: Sections of sensors by name, as below the key ``sensors`` of a configuration.
+
+        Returns:
+            Their frames, as in `sensors`.
+
+        Raises:
+            DatasetError: If the throw has no episode, or it is damaged.
+            ConfigError: If a section is wrong, or a link does not exist.
+        """
+        config = with_sensors(self.config, sensors)
+        with self.locating_damage():
+            return self._open_sensors(config, self._render(config))
+
+    def _render(self, config: Config) -> tuple[Chunk, ...]:
+        header, samples = self._recording
+        return SensorRecorder(Channels(config, full_description(config))).record(config, header.trial, samples)
+
+    def _open_sensors(self, config: Config, chunks: Sequence[Chunk]) -> dict[str, SensorFrames]:
+        header = self._recording[0]
+        return {name: SensorFrames(name, config, header, chunks) for name in config.sensors}
 
     @cached_property
     def _recording(self) -> tuple[EpisodeHeader, Samples]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,7 @@ from throwcollect.dataset.mcap_reader import McapContents, WholeEpisode, open_mc
 from throwcollect.dataset.shard import rewrite
 from throwcollect.dataset.throws_table import Row, ThrowsTable, place_columns
 from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import count_indexed
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, find_infinite_columns
 from throwcollect.errors import ConfigError, DatasetError
@@ -143,6 +145,7 @@ class _RecordingCheck:
             config = self._plan.config_of(trial)
             if (found := tuple(episode.table.columns)) != channels.numbers:
                 yield f"has the channels {list(found)} instead of {list(channels.numbers)}"
+            yield from find_sensor_problems(episode, config, channels)
             if (start_ns := config.trial_start_ns(episode.header.trial)) != episode.header.start_ns:
                 yield f"starts at {episode.header.start_ns} ns, the trial's slot of time at {start_ns} ns"
             if infinite := list(find_infinite_columns(episode.samples())):
@@ -156,6 +159,20 @@ class _RecordingCheck:
             yield str(error)
             return
         yield from _compare_rows(row, expected)
+
+
+def find_sensor_problems(episode: Episode, config: Config, channels: Channels) -> Iterator[str]:
+    """Find channels of sensors with another number of frames than they should have, a sentence each."""
+    expected = Counter[int]()
+    for name, topics in channels.sensors.items():
+        stride = config.record.rate_hz // config.sensors[name].rate_hz
+        expected.update(dict.fromkeys(topics, len(range(0, episode.header.samples, stride))))
+    found = Counter[int]()
+    for chunk in episode.sensors:
+        found.update({number: count_indexed(index) for number, index in chunk.indexes.items()})
+    for number in sorted(found.keys() | expected.keys()):
+        if found[number] != expected[number]:
+            yield f"has {found[number]} frames on channel {number} instead of {expected[number]}"
 
 
 def _planned_columns(trial: Trial) -> Row:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
 from throwcollect.arguments import check_bounds, refuse_argument
-from throwcollect.config.values import column_of
+from throwcollect.config.schema import Config
+from throwcollect.config.values import column_of, with_sensors
 from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import data_card
@@ -35,8 +36,11 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath, new_directory, replacing, write_all, write_file
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
+from throwcollect.sensing.recorder import SensorRecorder
+from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.plan import Plan
+from throwcollect.wording import command
 
 
 @dataclass(frozen=True)
@@ -64,16 +68,19 @@ class Copy(NamedTuple):
     trial: int
 
 
-def derive(sources: Sequence[Dataset], output: Path, *, offered: int) -> Derived:
+def derive(
+    sources: Sequence[Dataset], output: Path, *, offered: int, sensors: Mapping[str, Any] | None = None
+) -> Derived:
     """Make the dataset that consists of copies of the throws of some others, at least one, that have an episode.
 
     Args:
         sources: Those throws of each source that are wanted.
         output: Directory of the new dataset, new or empty; nothing is left there after an error.
         offered: Number of all trials of the sources.
+        sensors: Sections of sensors that see the throws in place of those that were recorded; None for these.
     """
     with new_directory(output) as directory:
-        copied, digest = _write(sources, directory)
+        copied, digest = _write(sources, directory, sensors)
     without = sum((Counter(count_without_episode(source)) for source in sources), Counter[str]())
     return Derived(copied, offered, dict(sorted(without.items())), digest)
 
@@ -84,25 +91,41 @@ def count_without_episode(dataset: Dataset) -> dict[str, int]:
     return dict(sorted(Counter(throws.filter(throws["shard"].is_null())["outcome"].to_pylist()).items()))
 
 
-def _write(sources: Sequence[Dataset], directory: Path) -> tuple[int, str]:
+def _write(sources: Sequence[Dataset], directory: Path, sensors: Mapping[str, Any] | None) -> tuple[int, str]:
     """Write the dataset; returns the number of its trials, and its digest."""
     began = time.monotonic()
     plan, firsts = join_plans([source.plan for source in sources])
+    if sensors is not None:
+        plan = replace(plan, config=with_sensors(plan.config, sensors))
+    elif any(source.config.sensors != plan.config.sensors for source in sources):
+        raise ConfigError(
+            "the datasets have different sensors", hint=f"{command('dataset', 'render-sensors')} makes them alike"
+        )
     copies = sorted(
         Copy(first + trial, number, trial)
         for number, (source, first) in enumerate(zip(sources, firsts, strict=True))
         for trial in source.recorded.throws["trial"].to_pylist()
     )
     _check_copies(copies, plan)
-    channels = _read_channels(sources)
+    channels = _read_channels(sources, plan.config)
     create(directory, plan, listed=plan.trials.points if plan.config.sweep.file else None)
     carry_robot(sources[0].config, directory)
     table = ThrowsTable.of(plan)
     tables, recordings = [], []
     progress = log_progress(copies, len(copies), "trial", "written")
+    throws_of = [sources[copy.source].throw(copy.trial) for copy in copies]
+    processes = 1 if sensors is None else limit_processes(count_cores(), len(copies))
+    # Episodes are read in order, one after the other, as they are written; pictures are rendered by all cores.
+    episodes = work_side_by_side(
+        [*zip(throws_of, map(plan.config_of, (plan.trial(copy.number) for copy in copies)), strict=True)],
+        _begin_reading,
+        (None if sensors is None else channels,),
+        processes=processes,
+        doing="renders",
+    )
     for name, members in groupby(progress, key=lambda copy: shard_of(plan, copy.number)):
         held = [(copy.number, sources[copy.source].throw(copy.trial)) for copy in members]
-        runs = ((number, episode_run(_read(throw))) for number, throw in held)
+        runs = ((number, episode_run(next(episodes))) for number, _ in held)
         with replacing(directory / name) as descriptor:
             write = partial(write_all, descriptor)
             finished = write_runs(write, channels, runs, name=name)
@@ -136,22 +159,37 @@ def _check_copies(copies: Sequence[Copy], plan: Plan) -> None:
         )
 
 
-def _read_channels(sources: Sequence[Dataset]) -> Channels:
+def _read_channels(sources: Sequence[Dataset], config: Config) -> Channels:
     """Find what is recorded; recordings hold the description of their robot, so its package need not be installed."""
     robots = dict.fromkeys(source.robot_description() or full_description(source.config) for source in sources)
     if len(robots) > 1:
         raise ConfigError("the recordings of the datasets describe different robots or tools")
-    return Channels(sources[0].config, *robots)
+    return Channels(config, *robots)
 
 
 def _read(throw: Throw) -> Episode:
     with throw.locating_damage():
-        episode = throw.read_episode()
+        episode = throw.read_episode(sensors=True)
         # The copy gets hashes of its own, which would make damage look as if it had been recorded.
         episode.chunk.check_records()
         if episode.digest != throw["digest"]:
             raise DatasetError(f"digest {episode.digest}", expected=f"{throw['digest']} as throws.parquet says")
         return episode
+
+
+def _begin_reading(channels: Channels | None) -> Callable[[tuple[Throw, Config]], Episode]:
+    """Make the function that reads the episode of a throw; with channels, their sensors see it anew."""
+    recorder = None if channels is None else SensorRecorder(channels)
+
+    def read(piece: tuple[Throw, Config]) -> Episode:
+        throw, config = piece
+        episode = _read(throw)
+        if recorder is not None:
+            seen = recorder.record(config, episode.header.trial, episode.samples())
+            episode = Episode(episode.header, episode.chunk, sensors=seen)
+        return episode
+
+    return read
 
 
 def _make_row(plan: Plan, number: int, row: Row) -> Row:
@@ -221,10 +259,35 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
     dataset = Dataset.open(directory)
+    return derive([_choose(dataset, where)], Path(output), offered=len(dataset))
+
+
+def _choose(dataset: Dataset, where: str) -> Dataset:
+    """Choose the throws that fulfil a condition; there has to be one with an episode."""
     chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where").fill_null(False)))
     if not len(chosen.recorded):
-        raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
-    return derive([chosen], Path(output), offered=len(dataset))
+        raise refuse_argument("where", f"no trial of {dataset.directory} that has an episode fulfils {where!r}")
+    return chosen
+
+
+def render_sensors(
+    directory: StrPath, output: StrPath, sensors: Mapping[str, Any], *, where: str | None = None
+) -> Derived:
+    """Copy a dataset, and let other sensors see its throws, as if it had been collected with them.
+
+    Args:
+        directory: The dataset.
+        output: Directory of the new one.
+        sensors: Sections of sensors by name, as below the key ``sensors`` of a configuration; may be empty.
+        where: Condition on columns of the table of throws; None for all trials.
+
+    Raises:
+        ConfigError: If a section or the condition is wrong, or the directory cannot be used.
+        DatasetError: If the dataset is damaged, or the new one cannot be written.
+    """
+    dataset = Dataset.open(directory)
+    chosen = dataset if where is None else _choose(dataset, where)
+    return derive([chosen], Path(output), offered=len(dataset), sensors=sensors)
 
 
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:

@@ -9,6 +9,15 @@ from typing import Literal
 from rclzenoh.interfaces import get_message, serialize
 from throwcollect.config.schema import Config
 from throwcollect.episode.frames import FrameTree, read_frames
+from throwcollect.episode.sensor_topics import (
+    TF_ID,
+    SensorTopic,
+    label_channels,
+    label_names,
+    make_label_info,
+    optical_frames,
+    sensor_topics,
+)
 from throwcollect.episode.topics import (
     Topic,
     clock,
@@ -27,7 +36,6 @@ TF_STATIC_ID = 2
 JOINT_STATES_ID = 3
 OBJECT_ODOMETRY_ID = 4
 _CLOCK_ID = 5
-_TF_ID = 6
 _FIRST_CONTROLLER_ID = 7
 POLICY_COMMAND_ID = 199
 FIRST_BODY_ID = 200
@@ -95,27 +103,33 @@ class Channels:
     """The channels of the recordings of a configuration.
 
     Attributes:
-        latched: Channels with one message per file: ``/robot_description`` and ``/tf_static``.
+        latched: Channels with one message per file: ``/robot_description``, ``/tf_static``, and what the numbers of
+            segmentations mean.
         recorded: Channels with one message per sample, in the order of their numbers, with their topics.
+        sensors: The topics of each sensor by number of the channel; they have one message for each of its frames.
         robot: URDF text of the robot.
 
     Raises:
         ConfigError: If the text is not a URDF.
     """
 
-    latched = (
-        Channel(ROBOT_DESCRIPTION_ID, "/robot_description", "std_msgs/msg/String", _LATCHED),
-        Channel(TF_STATIC_ID, "/tf_static", "tf2_msgs/msg/TFMessage", _LATCHED),
-    )
-
     def __init__(self, config: Config, urdf: str) -> None:
         self.robot, self._config = urdf, config
         self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
         topics = _make_topics(config, self._frames)
         self.recorded: dict[Channel, Topic] = {
-            Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == _TF_ID else _SAMPLED): topic
+            Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == TF_ID else _SAMPLED): topic
             for number, topic in sorted(topics.items())
         }
+        self.sensors: dict[str, dict[int, SensorTopic]] = sensor_topics(config)
+        self.latched = (
+            Channel(ROBOT_DESCRIPTION_ID, "/robot_description", "std_msgs/msg/String", _LATCHED),
+            Channel(TF_STATIC_ID, "/tf_static", "tf2_msgs/msg/TFMessage", _LATCHED),
+            *(
+                Channel(number, topic, "vision_msgs/msg/LabelInfo", _LATCHED)
+                for number, topic in label_channels(config).items()
+            ),
+        )
 
     def __reduce__(self) -> tuple[type[Channels], tuple[Config, str]]:
         # Topics hold functions, which cannot be sent to another process.
@@ -124,7 +138,12 @@ class Channels:
     @property
     def all(self) -> tuple[Channel, ...]:
         """All channels, by number."""
-        return (*self.latched, *self.recorded)
+        every = {channel.id: channel for channel in (*self.latched, *self.recorded)}
+        for topics in self.sensors.values():
+            for number, topic in topics.items():
+                qos = _TRANSFORMS if number == TF_ID else _SAMPLED
+                every.setdefault(number, Channel(number, topic.name, topic.type_name, qos))
+        return tuple(every[number] for number in sorted(every))
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -133,10 +152,13 @@ class Channels:
 
     def encode_latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
         """Encode the CDR messages of the latched channels; `stamp_ns` is the stamp of the static transforms [ns]."""
-        description, static = self.latched
+        description, static, *labelled = self.latched
+        fixed = (*self._frames.fixed, *optical_frames(self._config))
+        labels = label_names(self._config, self._frames.links)
         return {
             description: serialize(get_message(description.type_name)(data=self.robot)),
-            static: serialize(make_fixed_transforms(self._frames.fixed, stamp_ns)),
+            static: serialize(make_fixed_transforms(fixed, stamp_ns)),
+            **{channel: serialize(make_label_info(labels)) for channel in labelled},
         }
 
 
@@ -150,7 +172,7 @@ def _make_topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     if "clock" in chosen:
         topics[_CLOCK_ID] = clock()
     if "tf" in chosen:
-        topics[_TF_ID] = transforms(frames.moving, robot.joints, bodies)
+        topics[TF_ID] = transforms(frames.moving, robot.joints, bodies)
     if "controller_state" in chosen:
         moved = {robot.controller_of(joint) for joint in config.task.end}
         # All controllers are counted, so that each has the same number in every dataset, whichever ones are recorded.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import struct
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -31,9 +31,9 @@ CHUNK_HEADER_BYTES = _CHUNK_HEADER.size
 CHUNK_MARK_OFFSET = 37
 CHUNK_MARK = struct.pack("<I4s", len(_COMPRESSION), _COMPRESSION)
 """Bytes that the record of every chunk has at `CHUNK_MARK_OFFSET`: the length and the name of the compression."""
-MOST_RATIO = 4096
-"""Most uncompressed bytes per compressed byte. Each message has a stamp of its own, so recordings stay far below this;
-zstd by itself reaches 30,000, with which a small file could fill all memory."""
+MOST_RATIO, HARMLESS_BYTES = 4096, 64 * 2**20
+"""Most uncompressed bytes per compressed byte of a chunk with more than so many bytes. Recorded samples stay far below
+this; zstd by itself reaches 30,000, with which a small file could fill all memory."""
 RECORD_PREFIX_BYTES = 9
 """Size of opcode and length of a record; the length does not count them."""
 MESSAGE_HEADER = struct.Struct("<BQHIQQ")
@@ -152,17 +152,27 @@ class Chunk:
         return _CHUNK_HEADER.size + stored if is_ours else 0
 
     @classmethod
-    def parse_indexed(cls, records: memoryview, records_sha256: str) -> Chunk:
-        """Read an MCAP Chunk record with the Message Index records behind it, without decompressing it."""
-        # Bytes that announce no size are taken as a whole, and `parse` refuses them.
-        size = cls.read_announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
-        chunk, rest = cls.parse(records[:size]), records[size:]
-        indexes: dict[int, bytes] = {}
-        while rest:
-            _, _, channel, size = _MESSAGE_INDEX_HEADER.unpack_from(rest)
-            end = _MESSAGE_INDEX_HEADER.size + size
-            indexes[channel], rest = bytes(rest[:end]), rest[end:]
-        return replace(chunk, records_sha256=records_sha256, indexes=indexes)
+    def parse_run(cls, data: memoryview, hashes: Sequence[str]) -> list[Chunk]:
+        """Read MCAP Chunk records, each with the Message Index records behind it, without decompressing them.
+
+        Args:
+            data: The records.
+            hashes: SHA-256 of the records in each chunk, in hexadecimal.
+        """
+        chunks = []
+        for records_sha256 in hashes:
+            # Bytes that announce no size are taken as a whole, and `parse` refuses them.
+            size = cls.read_announced_size(bytes(data[:CHUNK_HEADER_BYTES])) or len(data)
+            chunk, data = cls.parse(data[:size]), data[size:]
+            indexes: dict[int, bytes] = {}
+            while data and data[0] == Opcode.MESSAGE_INDEX:
+                _, _, channel, size = _MESSAGE_INDEX_HEADER.unpack_from(data)
+                end = _MESSAGE_INDEX_HEADER.size + size
+                indexes[channel], data = bytes(data[:end]), data[end:]
+            chunks.append(replace(chunk, records_sha256=records_sha256, indexes=indexes))
+        if data:
+            raise DatasetError(f"chunk: {len(data)} bytes behind {len(hashes)} chunks")
+        return chunks
 
     @classmethod
     def parse(cls, record: bytes | memoryview) -> Chunk:
@@ -181,7 +191,7 @@ class Chunk:
             raise DatasetError(f"chunk: cannot be decompressed: {error}") from error
         if size != self.uncompressed_size:
             raise DatasetError(f"chunk: holds {size} bytes", expected=f"{self.uncompressed_size} as announced")
-        if size > MOST_RATIO * len(self.data):
+        if size > max(MOST_RATIO * len(self.data), HARMLESS_BYTES):
             raise DatasetError(
                 f"chunk: {len(self.data)} bytes of data announce {size}",
                 expected=f"at most {MOST_RATIO} times as many",

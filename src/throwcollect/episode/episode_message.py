@@ -1,10 +1,10 @@
 """The one message that carries an episode from a simulation to the coordinator: std_msgs/UInt8MultiArray.
 
 Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
-JSON; ``conditions``, the conditions of the episode in lines; ``hash``, the SHA-256 of the records of the chunk as 32
-bytes; ``chunk``, its MCAP Chunk record with its Message Index records behind it; and ``signature``, which covers all
-parts before it. The coordinator trusts a sender who has the key of the run, so it does not decompress, hash or judge
-the episode again.
+JSON; ``conditions``, the conditions of the episode in lines; ``hash``, the SHA-256 of the records of each chunk as 32
+bytes; ``chunk``, its MCAP Chunk records, each with its Message Index records behind it; and ``signature``, which covers
+all parts before it. The coordinator trusts a sender who has the key of the run, so it does not decompress, hash or
+judge the episode again.
 
 The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
 are the number of the trial that was refused.
@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -45,12 +45,15 @@ class Episode:
     Attributes:
         header: The facts besides the samples.
         chunk: The recorded messages, with their hash.
+        sensors: What sensors saw of the samples, in further chunks with their hashes and message indexes; the digest
+            does not cover it.
         result: Result of the trial in JSON; empty if no simulation has judged the episode.
         conditions: Conditions of the episode in lines; empty if it comes from a file.
     """
 
     header: EpisodeHeader
     chunk: Chunk
+    sensors: tuple[Chunk, ...] = field(default=(), kw_only=True)
     result: str = field(default="", kw_only=True)
     conditions: str = field(default="", kw_only=True)
 
@@ -114,8 +117,11 @@ def pack(handed: Episode | TrialRefusal, signer: Signer) -> bytes:
             handed.header_json.encode(),
             handed.result.encode(),
             handed.conditions.encode(),
-            bytes.fromhex(handed.chunk.records_sha256),
-            b"".join((handed.chunk.record(), *handed.message_indexes.values())),
+            b"".join(bytes.fromhex(chunk.records_sha256) for chunk in (handed.chunk, *handed.sensors)),
+            b"".join(
+                chunk.record() + b"".join(chunk.indexes.values())
+                for chunk in (replace(handed.chunk, indexes=handed.message_indexes), *handed.sensors)
+            ),
         ]
     parts.append(signer.sign(*parts).encode())
     dimension, layout = get_message("std_msgs/msg/MultiArrayDimension"), get_message("std_msgs/msg/MultiArrayLayout")
@@ -137,12 +143,15 @@ def unpack(message: bytes, signer: Signer) -> Episode | TrialRefusal:
     *parts, signature = (data[start:end] for start, end in itertools.pairwise(ends))
     if not signer.has_signed(bytes(signature).decode(errors="replace"), data[: ends[-2]]):
         raise DatasetError("episode: is not signed with the key of this run")
-    header, result, conditions, records_hash, chunk = parts
+    header, result, conditions, hashes, chunks = parts
     try:
         texts = bytes(result).decode(), bytes(conditions).decode()
         if not header:
             return TrialRefusal(trial=int(texts[1]), reason=texts[0])
     except ValueError as error:
         raise DatasetError("episode: its result or its conditions cannot be read") from error
-    recorded = Chunk.parse_indexed(chunk, records_hash.hex())
-    return Episode(header_from_json(bytes(header)), recorded, result=texts[0], conditions=texts[1])
+    recorded, *sensors = Chunk.parse_run(
+        chunks, [hashes[start : start + 32].hex() for start in range(0, len(hashes), 32)]
+    )
+    facts = header_from_json(bytes(header))
+    return Episode(facts, recorded, sensors=tuple(sensors), result=texts[0], conditions=texts[1])

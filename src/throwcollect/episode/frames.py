@@ -85,10 +85,12 @@ class FrameTree:
     Attributes:
         fixed: Frames that never move; the first is the robot's root in `WORLD`.
         moving: Frames that joints move.
+        links: Names of all links, in the order of the description.
     """
 
     fixed: tuple[Frame, ...]
     moving: tuple[MovingFrame, ...]
+    links: tuple[str, ...]
 
 
 @lru_cache(maxsize=4)
@@ -103,6 +105,7 @@ def read_frames(urdf: str, *, base_height: float) -> FrameTree:
     return FrameTree(
         fixed=(root, *(frame for frame in frames if not isinstance(frame, MovingFrame))),
         moving=tuple(frame for frame in frames if isinstance(frame, MovingFrame)),
+        links=tuple(link.name for link in model.links),
     )
 
 

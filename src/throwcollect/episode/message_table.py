@@ -23,7 +23,14 @@ from throwcollect.episode.channels import (
     POLICY_COMMAND_ID,
     Channels,
 )
-from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, Chunk, encode_message_index
+from throwcollect.episode.chunk import (
+    MESSAGE_HEADER,
+    RECORD_PREFIX_BYTES,
+    Chunk,
+    count_indexed,
+    encode_message_index,
+)
+from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.episode.topics import (
     BODY_FIELDS,
@@ -209,18 +216,35 @@ class MessageTable:
         return np.array(messages.view(layout.dtype)[:, 0]["data"]).reshape(len(self), 2, len(joints))
 
 
+def read_frames(chunk: Chunk) -> MessageTable:
+    """Read the records of a chunk with frames of a sensor: one row a frame; `chunk` has its message indexes."""
+    return MessageTable(chunk.contents, max(map(count_indexed, chunk.indexes.values()), default=0))
+
+
+def check_frames(chunk: Chunk) -> None:
+    """Compare the records of a chunk with frames of a sensor with their hash and their message indexes."""
+    chunk.check_records()
+    table = read_frames(chunk)
+    if table.message_indexes != chunk.indexes:
+        raise DatasetError("chunk: the message indexes behind it do not fit it")
+
+
+def make_row(layouts: Mapping[int, MessageLayout]) -> bytearray:
+    """Make a row of message records without numbers, one for each channel, in order."""
+    row = bytearray()
+    for number, layout in layouts.items():
+        length = MESSAGE_HEADER.size - RECORD_PREFIX_BYTES + len(layout.template)
+        row += MESSAGE_HEADER.pack(Opcode.MESSAGE, length, number, 0, 0, 0) + layout.template
+    return row
+
+
 class ChunkEncoder:
     """Encodes samples for one configuration, with a level of zstd."""
 
     def __init__(self, channels: Channels, *, level: int) -> None:
         self._topics = {channel.id: topic for channel, topic in channels.recorded.items()}
         self._compressor = zstandard.ZstdCompressor(level=level)
-        row = bytearray()
-        for number, topic in self._topics.items():
-            template = topic.layout.template
-            length = MESSAGE_HEADER.size - RECORD_PREFIX_BYTES + len(template)
-            row += MESSAGE_HEADER.pack(Opcode.MESSAGE, length, number, 0, 0, 0) + template
-        self._row = row
+        self._row = make_row({number: topic.layout for number, topic in self._topics.items()})
 
     def encode(
         self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None

@@ -17,6 +17,7 @@ from throwcollect.dataset.provenance import find_versions, read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.dataset.verify import verify
+from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
@@ -24,12 +25,14 @@ from throwcollect.extras import MissingExtraError, require, require_engine
 from throwcollect.files import StrPath
 from throwcollect.members import names_of
 from throwcollect.progress_log import log_progress
+from throwcollect.robots.description import full_description
+from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
 from throwcollect.sweep.trials import choose_trials
 from throwcollect.wording import join_names, suggest
 
-SAMPLE = 10
-"""Number of throws that are simulated again by default."""
+SAMPLE, RENDERED = 10, 2
+"""Numbers of throws that are simulated again by default, and of those whose frames are rendered again."""
 
 _Found = TypeVar("_Found")
 
@@ -126,15 +129,19 @@ def _find_differences(stored: Episode, again: Episode) -> Iterator[str]:
             yield f"{column.name}: from {time_s:.3f} s on, by up to {largest:.3g}"
 
 
-def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: int = 1) -> list[Finding]:
+def verify_dataset(
+    directory: StrPath, *, replay: int | None = None, render: int | None = None, processes: int = 1
+) -> list[Finding]:
     """Check a finished dataset: files against the manifest, rows against plan and episodes, flights against physics.
 
-    Some throws, chosen by the seed of the dataset, are simulated again and compared bit for bit. Checks that take the
-    robot's model are left out without the extra ``collect``; `dataset.verify.find_unchecked` names them.
+    Some throws, chosen by the seed of the dataset, are simulated again and compared bit for bit, and so is what sensors
+    see of some. Checks that take the robot's model are left out without the extra ``collect``;
+    `dataset.verify.find_unchecked` names them.
 
     Args:
         directory: Its directory.
         replay: How many throws to simulate again; None for 10 if that can give the same bits here (`count_replayed`).
+        render: Of how many throws to render again what sensors see; None for 2.
         processes: How many processes may check the recordings of a large dataset.
 
     Returns:
@@ -155,6 +162,8 @@ def verify_dataset(directory: StrPath, *, replay: int | None = None, processes: 
         dataset = Dataset.open(directory)
         if count := count_replayed(dataset, replay):
             findings += _find_different_throws(dataset, count)
+        if dataset.config.sensors and len(dataset.recorded):
+            findings += _find_different_frames(dataset, RENDERED if render is None else render)
     except ConfigError:
         # The files of the robot may be damaged.
         if not findings:
@@ -190,6 +199,36 @@ def _find_different_throws(dataset: Dataset, count: int) -> Iterator[Finding]:
         if comparison.differences:
             problem = f"comes out differently: {'; '.join(comparison.differences)}"
             yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)
+
+
+def _find_different_frames(dataset: Dataset, count: int) -> Iterator[Finding]:
+    """Find throws of which sensors have recorded something else than what they see of the recorded samples."""
+    trials = select_trials(dataset, sample=min(count, len(dataset.recorded)))
+    processes = limit_processes(count_cores(), len(trials))
+    found = work_side_by_side(trials, _begin_rendering, (dataset.directory,), processes=processes, doing="renders")
+    for trial, names in zip(trials, log_progress(found, len(trials), "throw", "rendered"), strict=True):
+        if names:
+            problem = f"has other frames of {join_names(names)} than its samples give"
+            yield Finding(str(dataset.throw(trial)["shard"]), f"trial {trial}", problem)
+
+
+def _begin_rendering(directory: Path) -> Callable[[int], list[str]]:
+    """Open a dataset in a process; the function names the sensors that see something else in a trial."""
+    dataset = Dataset.open(directory)
+    channels = Channels(dataset.config, full_description(dataset.config))
+    recorder = SensorRecorder(channels)
+    names = {max(topics): name for name, topics in channels.sensors.items()}
+
+    def render(number: int) -> list[str]:
+        throw = dataset.throw(number)
+        with throw.locating_damage():
+            stored = throw.read_episode(sensors=True)
+            again = recorder.record(throw.config, stored.header.trial, stored.samples())
+            pairs = zip(stored.sensors, again, strict=False)
+            wrong = {max(one.indexes) for one, other in pairs if one.records_sha256 != other.records_sha256}
+        return [names[number] for number in sorted(wrong)]
+
+    return render
 
 
 @dataclass(frozen=True)

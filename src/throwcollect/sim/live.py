@@ -77,7 +77,7 @@ class LiveSimulator(Simulator):
         """Time at which a client last moved a limb [ns], or gave it something to do."""
         self._has_start = False
         """Whether the world has a start state to go on from, which it lacks after a reset of its state has failed."""
-        super().__init__(config)
+        super().__init__(config, renders=True)
 
     @property
     def running(self) -> bool:

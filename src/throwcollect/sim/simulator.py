@@ -24,6 +24,7 @@ from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
 from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.policy import Policy, PolicyLoop, make_policy
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup, trial_goals
@@ -43,6 +44,7 @@ class Simulator:
     Args:
         config: The configuration.
         policy: Policy in the place of the one that the configuration names.
+        renders: Whether episodes have what the sensors of the configuration see.
 
     Attributes:
         config: The configuration; a trial replaces some of its values.
@@ -58,7 +60,8 @@ class Simulator:
         WorkerError: If the physics engine does not start.
     """
 
-    def __init__(self, config: Config, policy: Policy | None = None) -> None:
+    def __init__(self, config: Config, policy: Policy | None = None, *, renders: bool = False) -> None:
+        self._renders = renders
         self.world = World(config)
         self.close = finalize(self, self.world.close)
         # This is not called when the process ends, which frees all worlds, because engines may be unloaded by then.
@@ -97,6 +100,7 @@ class Simulator:
         self.channels = Channels(config, full_description(config))
         self._settings = Settings(config)
         self._encoder = ChunkEncoder(self.channels, level=config.record.zstd_level)
+        self._sensors = SensorRecorder(self.channels)
         self._columns = task_of(config).columns
         self.loop: PolicyLoop | None = None
         if config.task.policy is not None:
@@ -211,7 +215,9 @@ class Simulator:
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the frames of bodies.
         result = self._judge(config, motion, table.samples, header) if motion else ""
-        return Episode(header, state, result=result, conditions=conditions)
+        # What sensors see follows from what is recorded, and is the same when it is rendered later.
+        seen = self._sensors.record(config, header.trial, table.samples) if self._renders else ()
+        return Episode(header, state, sensors=seen, result=result, conditions=conditions)
 
     def take_recording(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:
         """Return what was recorded of a trial that has ended, only once; None while there is no such recording."""

@@ -22,7 +22,7 @@ from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import bodies_of, looks_of, object_of, starts_in_tool
-from throwcollect.view.drawn_robot import draw_bodies_of, draw_robot_of
+from throwcollect.sensing.drawn_robot import draw_bodies_of, draw_robot_of
 from throwcollect.view.viewer_directory import choose_throws
 
 _OUTWARD = np.array([0.32, -1.0, 0.22])

@@ -19,7 +19,7 @@ from throwcollect.dataset.throws_table import Row, body_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import make_header
 from throwcollect.errors import ConfigError
-from throwcollect.view.drawn_robot import DrawnShape, Rgba, draw_bodies_of
+from throwcollect.sensing.drawn_robot import DrawnShape, Rgba, draw_bodies_of
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
 _SUCCEEDED: Rgba = (0.0, 0.75, 0.35, 1.0)

@@ -17,7 +17,7 @@ from throwcollect.episode.topics import odometry
 from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory
 from throwcollect.progress_log import log_progress
-from throwcollect.view.drawn_robot import draw_robot_of
+from throwcollect.sensing.drawn_robot import draw_robot_of
 from throwcollect.view.markers import ShownThrow
 from throwcollect.view.viewer_recording import FACTS_HARDWARE, FACTS_NAME, ViewRecording
 

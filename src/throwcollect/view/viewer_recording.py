@@ -35,8 +35,8 @@ from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import moving_bodies_of
+from throwcollect.sensing.drawn_robot import draw_object_of, draw_robot_of
 from throwcollect.tools.tool import tool_of
-from throwcollect.view.drawn_robot import draw_object_of, draw_robot_of
 from throwcollect.view.markers import ShownThrow, all_markers, path_cloud, shape_markers, throw_markers
 
 FACTS_NAME = "throw"

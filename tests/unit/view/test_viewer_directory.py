@@ -23,7 +23,7 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
-from throwcollect.view.drawn_robot import draw_robot_of
+from throwcollect.sensing.drawn_robot import draw_robot_of
 from throwcollect.view.viewer_directory import View, view
 
 CHOSEN = [5, 0]

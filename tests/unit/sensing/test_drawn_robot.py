@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.view.drawn_robot import DrawnRobot, read_drawn_robot
+from throwcollect.sensing.drawn_robot import DrawnRobot, read_drawn_robot
 from throwcollect.view.markers import shape_markers
 
 URDF = """\

@@ -42,6 +42,7 @@ class DrawnShape:
         kind: ``box``, ``cylinder``, ``sphere`` or ``mesh``.
         mesh: Path or URL of the mesh's file in the description; empty if it is none.
         rgba: Its colour.
+        body: Name of the body that it belongs to; empty for a shape of the robot.
     """
 
     link: str
@@ -51,6 +52,12 @@ class DrawnShape:
     kind: str
     mesh: str
     rgba: Rgba
+    body: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the body, or of the link."""
+        return self.body or self.link
 
 
 @dataclass(frozen=True)
@@ -66,6 +73,11 @@ class DrawnRobot:
     urdf: str
     shapes: tuple[DrawnShape, ...]
     locate: Callable[[str], Path]
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of the links, in the order of the description."""
+        return tuple(link.attrib["name"] for link in ElementTree.fromstring(self.urdf).iter("link"))  # noqa: S314
 
     @property
     def meshes(self) -> dict[str, Path]:
@@ -96,10 +108,13 @@ class DrawnRobot:
             (directory / path).write_text(renamed, encoding="utf-8")
 
 
-def draw_robot_of(config: Config) -> DrawnRobot:
-    """Read the robot with its tool and its mount as viewers draw it."""
-    description, mount_m = full_description(config), config.robot.mount_height_m
-    return read_drawn_robot(description, tool_of(config).link, robot_of(config).locate, mount_m)
+def draw_robot_of(config: Config, description: str | None = None) -> DrawnRobot:
+    """Read the robot with its tool and its mount as viewers draw it.
+
+    Writing its description needs Pinocchio; a recorded one does not.
+    """
+    text = full_description(config) if description is None else description
+    return read_drawn_robot(text, tool_of(config).link, robot_of(config).locate, config.robot.mount_height_m)
 
 
 def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path], mount_m: float = 0.0) -> DrawnRobot:
@@ -134,7 +149,9 @@ def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
         frame, (place, turn) = look.name, (look.within.xyz, quaternion_of(*look.within.rpy))
         if look.name not in moving:
             frame, (place, turn) = WORLD, _move(Placement(look.position_m, look.rpy_rad), look.within)
-        shapes.append(DrawnShape(frame, place, turn, look.size_m, look.shape, look.mesh, _read_hex(look.color)))
+        shapes.append(
+            DrawnShape(frame, place, turn, look.size_m, look.shape, look.mesh, _read_hex(look.color), look.name)
+        )
     return tuple(shapes)
 
 

@@ -1,0 +1,191 @@
+"""The topics of sensors: pictures with their intrinsics, scans and point clouds, and the frames that they are in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rclzenoh.interfaces import get_message
+from throwcollect.config.schema import Config
+from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig, SensorConfig
+from throwcollect.episode.frames import Frame, quaternion_of
+from throwcollect.episode.message_layout import MessageLayout
+from throwcollect.episode.topics import make_fixed_transforms, make_header
+
+FIRST_SENSOR_ID = 1000
+_IDS_OF_SENSOR = 16
+"""Numbers of channels that each sensor has, in the order of names, whichever streams it records."""
+_LABELS_ID = 15
+TF_ID = 6
+"""Number of the channel of ``/tf``."""
+_ENCODINGS = {"color": "rgb8", "depth": "", "segmentation": "mono16"}
+POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
+"""A point of a cloud [m]; the intensity is the number of the link or body that it lies on."""
+
+
+@dataclass(frozen=True)
+class SensorTopic:
+    """A topic of a sensor, with one message for each of its frames.
+
+    Attributes:
+        sensor: Name of the sensor.
+        stream: What is in it: ``color``, ``depth``, ``segmentation``, ``scan``, ``points``, ``pose``, or ``color_info``
+            and so on for the intrinsics of pictures.
+        name: Name of the topic.
+        type_name: Its message type, ``package/msg/Type``.
+        layout: Layout of its messages.
+    """
+
+    sensor: str
+    stream: str
+    name: str
+    type_name: str
+    layout: MessageLayout
+
+    @property
+    def stamp(self) -> str:
+        """Path of the stamp in its messages."""
+        return "transforms.0.header.stamp" if self.stream == "pose" else "header.stamp"
+
+
+def sensor_topics(config: Config) -> dict[str, dict[int, SensorTopic]]:
+    """Make the topics of each sensor of a configuration, by number of the channel, in the order of names.
+
+    All sensors tell where they are on the channel of ``/tf``, as their poses may differ from trial to trial.
+    """
+    topics: dict[str, dict[int, SensorTopic]] = {}
+    for index, (name, sensor) in enumerate(sorted(config.sensors.items())):
+        made = _make_pictures(name, sensor) if isinstance(sensor, PictureConfig) else _make_ranges(name, sensor)
+        first = FIRST_SENSOR_ID + _IDS_OF_SENSOR * index
+        topics[name] = {TF_ID: _make_pose(name, sensor), **{first + number: topic for number, topic in made}}
+    return topics
+
+
+def label_channels(config: Config) -> dict[int, str]:
+    """Name the topics that say what the numbers of segmentations mean, by number of the channel."""
+    return {
+        FIRST_SENSOR_ID + _IDS_OF_SENSOR * index + _LABELS_ID: f"/{name}/segmentation/label_info"
+        for index, (name, sensor) in enumerate(sorted(config.sensors.items()))
+        if isinstance(sensor, PictureConfig) and "segmentation" in sensor.recorded
+    }
+
+
+def optical_frames(config: Config) -> Iterator[Frame]:
+    """List the optical frames of cameras in the frames of these cameras (REP 103): x right, y down, z forward."""
+    for name, sensor in sorted(config.sensors.items()):
+        if isinstance(sensor, PictureConfig):
+            yield Frame(f"{name}_frame", f"{name}_optical_frame", (0.0, 0.0, 0.0), (-0.5, 0.5, -0.5, 0.5))
+
+
+def frame_of(name: str, sensor: SensorConfig) -> Frame:
+    """Make the frame of a sensor in its link: x forward, y to the left, z upwards."""
+    (x, y, z), look_at_m = sensor.place
+    if look_at_m is None:
+        turn = quaternion_of(*(sensor.rpy_rad or (0.0, 0.0, 0.0)))
+    else:
+        dx, dy, dz = (at - here for at, here in zip(look_at_m, (x, y, z), strict=True))
+        # Half angles of yaw and pitch by square roots alone, which every processor rounds alike.
+        level = math.sqrt(dx * dx + dy * dy)
+        cos_yaw, cos_pitch = dx / level if level > 0 else 1.0, level / math.sqrt(level * level + dz * dz)
+        sy, cy = math.copysign(math.sqrt((1 - cos_yaw) / 2), dy), math.sqrt((1 + cos_yaw) / 2)
+        sp, cp = math.copysign(math.sqrt((1 - cos_pitch) / 2), -dz), math.sqrt((1 + cos_pitch) / 2)
+        turn = -sy * sp, cy * sp, sy * cp, cy * cp
+    return Frame(sensor.link, f"{name}_frame", (x, y, z), turn)
+
+
+def focal_length(camera: PictureConfig) -> float:
+    """Compute the focal length of a camera in pixels, across and down."""
+    return camera.height / 2 / math.tan(camera.vertical_fov_rad / 2)
+
+
+def _make_pose(name: str, sensor: SensorConfig) -> SensorTopic:
+    message, place = make_fixed_transforms([frame_of(name, sensor)], 0), "transforms.0"
+    fields = ("header.stamp.sec", "header.stamp.nanosec", "transform.translation", "transform.rotation")
+    layout = MessageLayout(message, [f"{place}.{field}" for field in fields])
+    return SensorTopic(name, "pose", "/tf", "tf2_msgs/msg/TFMessage", layout)
+
+
+def _make_pictures(name: str, camera: PictureConfig) -> Iterator[tuple[int, SensorTopic]]:
+    header = make_header(f"{name}_optical_frame")
+    size = {"height": camera.height, "width": camera.width}
+    stamps = ["header.stamp.sec", "header.stamp.nanosec"]
+    image, info = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
+    intrinsics = get_message(info)(header=header, distortion_model="plumb_bob", d=np.zeros(5), **size)
+    for number, stream in enumerate(("color", "depth", "segmentation")):
+        if stream not in camera.recorded:
+            continue
+        place = f"/{name}" if stream == "color" else f"/{name}/{stream}"
+        encoding = camera.depth_encoding if stream == "depth" else _ENCODINGS[stream]
+        step = camera.width * {"rgb8": 3, "16UC1": 2, "mono16": 2, "32FC1": 4}[encoding]
+        data = np.zeros(step * camera.height, np.uint8)
+        message = get_message(image)(header=header, encoding=encoding, step=step, data=data, **size)
+        yield (
+            2 * number,
+            SensorTopic(name, stream, f"{place}/image_raw", image, MessageLayout(message, [*stamps, "data"])),
+        )
+        layout = MessageLayout(intrinsics, [*stamps, "k", "r", "p"])
+        yield 2 * number + 1, SensorTopic(name, f"{stream}_info", f"{place}/camera_info", info, layout)
+
+
+def _make_ranges(name: str, lidar: LidarConfig) -> Iterator[tuple[int, SensorTopic]]:
+    header, stamps = make_header(f"{name}_frame"), ["header.stamp.sec", "header.stamp.nanosec"]
+    if not isinstance(lidar, LayersConfig):
+        kind = "sensor_msgs/msg/LaserScan"
+        angles = lidar.angles_rad
+        message = get_message(kind)(
+            header=header,
+            angle_min=angles[0],
+            angle_max=angles[-1],
+            angle_increment=angles[1] - angles[0] if lidar.rays > 1 else 0.0,
+            scan_time=1 / lidar.rate_hz,
+            range_min=lidar.range_m[0],
+            range_max=lidar.range_m[1],
+            ranges=np.zeros(lidar.rays, np.float32),
+        )
+        yield 0, SensorTopic(name, "scan", f"/{name}/scan", kind, MessageLayout(message, [*stamps, "ranges"]))
+        return
+    kind, field = "sensor_msgs/msg/PointCloud2", get_message("sensor_msgs/msg/PointField")
+    step = POINT.itemsize * lidar.rays
+    message = get_message(kind)(
+        header=header,
+        height=lidar.layers,
+        width=lidar.rays,
+        fields=[
+            field(name=part, offset=4 * index, datatype=field.FLOAT32, count=1)
+            for index, part in enumerate(POINT.names or ())
+        ],
+        point_step=POINT.itemsize,
+        row_step=step,
+        data=np.zeros(step * lidar.layers, np.uint8),
+        is_dense=False,
+    )
+    yield 0, SensorTopic(name, "points", f"/{name}/points", kind, MessageLayout(message, [*stamps, "data"]))
+
+
+def label_names(config: Config, links: Sequence[str]) -> tuple[str, ...]:
+    """List what the numbers of a segmentation mean, given the links in the order of the robot's description."""
+    others = (name for name in config.bodies if name != config.acted_on)
+    return ("background", *links, config.acted_on, "ground", *others)
+
+
+def make_label_info(names: Sequence[str]) -> Any:
+    """Make the vision_msgs/LabelInfo that says what the numbers in pictures of the segmentation mean."""
+    kind = get_message("vision_msgs/msg/VisionClass")
+    return get_message("vision_msgs/msg/LabelInfo")(
+        class_map=[kind(class_id=number, class_name=name) for number, name in enumerate(names)], threshold=1.0
+    )
+
+
+def intrinsics_of(camera: PictureConfig) -> Mapping[str, NDArray[np.float64]]:
+    """Compute the matrices k, r and p of a sensor_msgs/CameraInfo, row by row."""
+    focal, across, down = focal_length(camera), (camera.width - 1) / 2, (camera.height - 1) / 2
+    return {
+        "k": np.array([focal, 0, across, 0, focal, down, 0, 0, 1.0]),
+        "r": np.eye(3).ravel(),
+        "p": np.array([focal, 0, across, 0, 0, focal, down, 0, 0, 0, 1.0, 0]),
+    }

@@ -1,0 +1,1 @@
+"""The node that publishes what sensors see of a running simulation."""

@@ -1,0 +1,155 @@
+"""Publishes what sensors see of the states that a simulation publishes; its physics does not wait for pictures."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from throwcollect import ros
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.config.values import leaves, with_values
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.sensor_topics import SensorTopic
+from throwcollect.episode.topics import odometry, put_stamps
+from throwcollect.errors import ConfigError
+from throwcollect.robots.description import full_description
+from throwcollect.robots.surroundings import moving_bodies_of
+from throwcollect.ros import Node, Parameter, Publisher, QoSProfile, get_message, graph_changes
+from throwcollect.ros.msg import SetParametersResult
+from throwcollect.ros.nodes import descriptors
+from throwcollect.ros.serving import begin_to_serve
+from throwcollect.sensing.pose import Pose
+from throwcollect.sensing.scene import Scene
+from throwcollect.sensing.sensor import make_sensor
+from throwcollect.units import NS_PER_S
+
+NAME = "sensors"
+"""Name of the node, in the namespace of its simulation."""
+_SAMPLED = QoSProfile(depth=10)
+_NEWEST = QoSProfile(depth=1)
+_WAIT_S = 0.01
+_IDLE_S = 0.1
+
+
+class SensorNode(Node):
+    """Publishes the topics of the sensors of a configuration that have subscribers, in the namespace of a simulation.
+
+    Each number and word of a sensor is a parameter, such as ``sensors.head.vertical_fov_rad``; the next frame shows a
+    change. In real time, frames come at most as often as `rate_hz` says of simulated time.
+    """
+
+    def __init__(self, config: Config, namespace: str) -> None:
+        super().__init__(NAME, namespace=namespace)
+        self._made: dict[str, Publisher] = {}
+        self._positions: list[float] = []
+        self._poses: dict[str, Pose] = {}
+        self._stamp_ns = 0
+        self._noticed_changes = -1
+        self._states: list[Any] = []
+        self._use(config)
+        for leaf in leaves(config):
+            if leaf.name.startswith("sensors.") and isinstance(leaf.value, bool | int | float | str):
+                about = descriptors.of_key(leaf.name, leaf.value, read_only=leaf.name.endswith(".kind"))
+                self.declare_parameter(leaf.name, leaf.value, about)
+        self.add_on_set_parameters_callback(self._change)
+
+    @property
+    def patience_s(self) -> float:
+        """How long the process may wait for messages [s]."""
+        return _WAIT_S if any(self._listened.values()) else _IDLE_S
+
+    def _use(self, config: Config) -> None:
+        """Render by a configuration from now on."""
+        scene, channels = Scene.of(config), Channels(config, full_description(config))
+        self._sensors = {name: make_sensor(name, config, scene, 0) for name in config.sensors}
+        self._config, self._scene, self._topics = config, scene, channels.sensors
+        for topics in self._topics.values():
+            for topic in topics.values():
+                if topic.name not in self._made:
+                    kind = get_message(topic.type_name)
+                    self._made[topic.name] = self.create_publisher(kind, topic.name.lstrip("/"), _SAMPLED)
+        self._frames = dict.fromkeys(config.sensors, 0)
+        self._due_s = dict.fromkeys(config.sensors, 0.0)
+        self._find_listened()
+
+    def _change(self, parameters: list[Parameter]) -> SetParametersResult:
+        try:
+            self._use(with_values(self._config, {parameter.name: parameter.value for parameter in parameters}))
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _find_listened(self) -> None:
+        """Find the topics with subscribers, and listen to the simulation if there are any."""
+        self._listened: dict[str, list[SensorTopic]] = {
+            name: [topic for topic in topics.values() if self._made[topic.name].get_subscription_count()]
+            for name, topics in self._topics.items()
+        }
+        # A new subscriber gets a frame even if time stands still.
+        self._shown_ns: dict[str, int] = {}
+        if any(self._listened.values()) and not self._states:
+            joint_state, moved = get_message("sensor_msgs/msg/JointState"), get_message("nav_msgs/msg/Odometry")
+            self._states = [self.create_subscription(joint_state, "joint_states", self._take_joints, _NEWEST)]
+            for number, body in enumerate(moving_bodies_of(self._config)):
+                topic, take = odometry(body, number).name.lstrip("/"), partial(self._take_body, body)
+                self._states.append(self.create_subscription(moved, topic, take, _NEWEST))
+        elif not any(self._listened.values()):
+            for subscription in self._states:
+                self.destroy_subscription(subscription)
+            self._states = []
+
+    def _take_joints(self, message: Any) -> None:
+        self._positions = list(message.position)
+        self._stamp_ns = message.header.stamp.sec * NS_PER_S + message.header.stamp.nanosec
+
+    def _take_body(self, body: str, message: Any) -> None:
+        at, turn = message.pose.pose.position, message.pose.pose.orientation
+        self._poses[body] = Pose.of((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+
+    def follow_up(self) -> None:
+        """Publish the frames that are due."""
+        if (changes := graph_changes(self)) != self._noticed_changes:
+            self._noticed_changes = changes
+            self._find_listened()
+        bodies = [self._poses.get(body) for body in moving_bodies_of(self._config)]
+        if not self._positions or None in bodies:
+            return
+        now_s, placed = time.monotonic(), None
+        for name, topics in self._listened.items():
+            if not topics or now_s < self._due_s[name] or self._shown_ns.get(name) == self._stamp_ns:
+                continue
+            placed = placed or self._scene.place(self._positions, [pose for pose in bodies if pose is not None])
+            sensor = self._sensors[name]
+            self._due_s[name], self._shown_ns[name] = now_s + 1 / sensor.rate_hz, self._stamp_ns
+            seen = sensor.look(placed, self._frames[name])
+            self._frames[name] += 1
+            for topic in topics:
+                message = np.frombuffer(bytearray(topic.layout.template), topic.layout.dtype)
+                put_stamps(message, topic.stamp, np.array([self._stamp_ns]))
+                for field, values in seen[topic.stream].items():
+                    message[field] = values
+                self._made[topic.name].publish(message.tobytes())
+
+
+def run(config: Path, *, namespace: str) -> None:
+    """Publish what the sensors of a configuration see of the simulation in a namespace, until a signal asks to stop.
+
+    Raises:
+        ConfigError: If the configuration is wrong.
+    """
+    read = load(config)
+    ros.init()
+    node = SensorNode(read, namespace)
+    executor, stopped = begin_to_serve(node)
+    try:
+        while not stopped():
+            ros.spin_some(executor, timeout_sec=node.patience_s)
+            node.follow_up()
+    finally:
+        node.destroy_node()
+        ros.shutdown()

@@ -1,0 +1,1 @@
+"""Cameras and lidars: pure functions from recorded states to pictures and ranges, with the same bits everywhere."""

@@ -1,0 +1,94 @@
+"""Poses, computed number by number in a fixed order, so that no library for matrices decides on their last bits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from throwcollect.engines.body import Vector
+from throwcollect.episode.frames import quaternion_of
+
+Rows = tuple[Vector, Vector, Vector]
+"""The rows of a rotation matrix, frame to parent."""
+
+
+def dot(one: Vector, other: Vector) -> float:
+    """Multiply two vectors."""
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def cross(one: Vector, other: Vector) -> Vector:
+    """Find the vector that is at right angles to two others."""
+    (a, b, c), (x, y, z) = one, other
+    return b * z - c * y, c * x - a * z, a * y - b * x
+
+
+def transpose(rows: Rows) -> Rows:
+    """Exchange the rows of a matrix for its columns."""
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return (a, d, g), (b, e, h), (c, f, i)
+
+
+class Pose(NamedTuple):
+    """Pose of a frame in its parent: the rows of the rotation, frame to parent, and the origin [m]."""
+
+    rows: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    origin: Vector = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def of(cls, origin: Sequence[float], rotation_xyzw: Sequence[float]) -> Pose:
+        """Make the pose of an origin [m] and a unit quaternion, frame to parent."""
+        (a, b, c), (x, y, z, w) = map(float, origin), map(float, rotation_xyzw)
+        rows = (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+        )
+        return cls(rows, (a, b, c))
+
+    @classmethod
+    def from_rpy(cls, origin: Sequence[float], rpy_rad: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
+        """Make the pose of an origin [m] and of rotations about the parent's axes x, y, z in this order [rad]."""
+        return cls.of(origin, quaternion_of(*rpy_rad))
+
+    @classmethod
+    def looking_at(cls, eye: Sequence[float], target: Sequence[float]) -> Pose:
+        """Make the pose of a sensor at one point [m] whose x points at another one, and whose y is level."""
+        (x, y, z), (a, b, c) = map(float, eye), map(float, target)
+        forward = _normalise((a - x, b - y, c - z))
+        # What looks straight up or down has its y along that of the world.
+        across = math.hypot(forward[0], forward[1])
+        left = (-forward[1] / across, forward[0] / across, 0.0) if across > 1e-9 else (0.0, 1.0, 0.0)
+        return cls(transpose((forward, left, cross(forward, left))), (x, y, z))
+
+    def turn(self, vector: Vector) -> Vector:
+        """Write a direction in the frame along the axes of the parent."""
+        return dot(self.rows[0], vector), dot(self.rows[1], vector), dot(self.rows[2], vector)
+
+    def move(self, point: Vector) -> Vector:
+        """Find a point of the frame in the parent [m]."""
+        (x, y, z), (a, b, c) = self.turn(point), self.origin
+        return x + a, y + b, z + c
+
+    def __mul__(self, inner: Pose) -> Pose:  # type: ignore[override]
+        """Find the pose in the parent of a frame in this frame."""
+        columns = transpose(inner.rows)
+        one, two, three = (self.turn(column) for column in columns)
+        return Pose(transpose((one, two, three)), self.move(inner.origin))
+
+    def inverse(self) -> Pose:
+        """Find the pose of the parent in the frame."""
+        turned = Pose(transpose(self.rows))
+        x, y, z = turned.turn(self.origin)
+        return Pose(turned.rows, (-x, -y, -z))
+
+
+def _normalise(vector: Vector) -> Vector:
+    x, y, z = vector
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+OPTICAL = Pose(((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)))
+"""Pose of an optical frame (x right, y down, z forward) in that of its camera (x forward, y left, z up), by REP 103."""

@@ -1,0 +1,130 @@
+"""One sensor of a trial: what it sees of a state, its noise, and the fields of the messages that hold it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from throwcollect.config.schema import Config
+from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig, SensorConfig
+from throwcollect.episode.sensor_topics import POINT, frame_of, intrinsics_of
+from throwcollect.errors import ConfigError
+from throwcollect.sensing.camera import Camera, Frame
+from throwcollect.sensing.lidar import Lidar, Ranges
+from throwcollect.sensing.noise import Noise
+from throwcollect.sensing.pose import Pose
+from throwcollect.sensing.scene import PlacedScene, Scene
+from throwcollect.wording import suggest
+
+Fields = Mapping[str, Any]
+"""Numbers of a message, by path of the field."""
+
+
+class Sensor(ABC):
+    """A sensor of one trial.
+
+    Attributes:
+        rate_hz: Frames per simulated second.
+        latency_s: Time after which a message arrives [s].
+    """
+
+    def __init__(self, name: str, section: SensorConfig) -> None:
+        frame = frame_of(name, section)
+        self.rate_hz, self.latency_s = section.rate_hz, section.latency_s
+        self.pose = Pose.of(frame.translation, frame.rotation_xyzw)
+        place = "transforms.0.transform."
+        self._placed = {f"{place}translation": frame.translation, f"{place}rotation": frame.rotation_xyzw}
+
+    @abstractmethod
+    def look(self, placed: PlacedScene, number: int) -> Mapping[str, Fields]:
+        """Render the frame of this number, which shows a scene in one state: the fields of its messages, by stream."""
+
+
+def make_sensor(name: str, config: Config, scene: Scene, trial: int) -> Sensor:
+    """Make a sensor of a trial, given its number.
+
+    Raises:
+        ConfigError: If the sensor is on a link that does not exist.
+    """
+    section = config.sensors[name]
+    if section.link not in scene.links:
+        raise ConfigError(f"sensors.{name}.link: there is no link {section.link!r}{suggest(section.link, scene.links)}")
+    if isinstance(section, PictureConfig):
+        return CameraSensor(name, section, config.seed, trial)
+    return LidarSensor(name, section, config.seed, trial)
+
+
+class CameraSensor(Sensor):
+    """A camera that records colors, depths and labels.
+
+    Attributes:
+        camera: Renders its pictures.
+    """
+
+    def __init__(self, name: str, section: PictureConfig, seed: int, trial: int) -> None:
+        super().__init__(name, section)
+        self._section, self._intrinsics = section, intrinsics_of(section)
+        self._color, self._depth = (
+            Noise(section.noise, seed, trial, f"{name}/{stream}") for stream in ("color", "depth")
+        )
+        size = section.width, section.height, section.vertical_fov_rad
+        self.camera = Camera(*size, section.link, self.pose, near_m=section.near_m, far_m=section.far_m)
+
+    def see(self, placed: PlacedScene) -> Frame:
+        """Render its picture of a scene in one state, without noise."""
+        return self.camera.render(placed, color="color" in self._section.recorded)
+
+    def look(self, placed: PlacedScene, number: int) -> Mapping[str, Fields]:
+        """See `Sensor.look`."""
+        seen, noise = self.see(placed), self._section.noise
+        if noise.recorded:
+            depth = self._depth.distance(seen.depth, number, noise.depth_std_m, noise.depth_std_share)
+            color = None if seen.color is None else self._color.color(seen.color, number)
+            seen = replace(seen, depth=depth, color=color)
+        depth = seen.depth.astype("<f4")
+        if self._section.depth_encoding == "16UC1":
+            # Beyond 65 m there is no number of millimetres.
+            depth_mm = np.rint(np.where(np.isfinite(depth), depth, 0) * np.float32(1000))
+            depth = np.where(depth_mm <= np.iinfo("<u2").max, depth_mm, 0).astype("<u2")
+        pictures = {"color": seen.color, "depth": depth, "segmentation": seen.labels.astype("<u2")}
+        fields: dict[str, Fields] = {"pose": self._placed}
+        for stream in self._section.recorded:
+            fields[stream] = {"data": np.ascontiguousarray(pictures[stream]).view(np.uint8).ravel()}
+            fields[f"{stream}_info"] = self._intrinsics
+        return fields
+
+
+class LidarSensor(Sensor):
+    """A lidar that records ranges or points.
+
+    Attributes:
+        lidar: Casts its rays.
+    """
+
+    def __init__(self, name: str, section: LidarConfig, seed: int, trial: int) -> None:
+        super().__init__(name, section)
+        self._section, self._noise = section, Noise(section.noise, seed, trial, name)
+        low, high = section.range_m
+        self.lidar = Lidar(section.angles_rad, section.elevations_rad, section.link, self.pose, low, high)
+
+    def see(self, placed: PlacedScene) -> Ranges:
+        """Cast its rays into a scene in one state, without noise."""
+        return self.lidar.scan(placed)
+
+    def look(self, placed: PlacedScene, number: int) -> Mapping[str, Fields]:
+        """See `Sensor.look`."""
+        seen, noise = self.see(placed), self._section.noise
+        if noise.recorded:
+            seen = replace(seen, ranges=self._noise.distance(seen.ranges, number, noise.range_std_m))
+        if not isinstance(self._section, LayersConfig):
+            return {"pose": self._placed, "scan": {"ranges": seen.ranges[0]}}
+        points = np.empty(seen.ranges.shape, POINT)
+        # Where nothing is near enough, there is no point.
+        ranges = np.where(np.isfinite(seen.ranges), seen.ranges, np.float32(np.nan))
+        points["x"], points["y"], points["z"] = self.lidar.directions * ranges
+        points["intensity"] = seen.labels
+        return {"pose": self._placed, "points": {"data": points.view(np.uint8).ravel()}}

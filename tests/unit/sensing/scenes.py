@@ -1,0 +1,29 @@
+"""Small scenes for tests of sensors: bodies in the world, without a robot or with a simple one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from throwcollect.episode.frames import WORLD
+from throwcollect.sensing.drawn_robot import DrawnShape, read_drawn_robot
+from throwcollect.sensing.pose import Pose
+from throwcollect.sensing.scene import PlacedScene, Scene
+
+NO_ROBOT = '<robot name="none"><link name="root"/></robot>'
+
+
+def make_shape(name: str, kind: str, size: Sequence[float], at: Sequence[float], link: str = WORLD) -> DrawnShape:
+    """Make an orange body."""
+    return DrawnShape(link, tuple(at), (0.0, 0.0, 0.0, 1.0), tuple(size), kind, "", (1.0, 0.5, 0.0, 1.0), name)
+
+
+def make_scene(*shapes: DrawnShape, urdf: str = NO_ROBOT, joints: Sequence[str] = ()) -> Scene:
+    """Make a scene of bodies that stand, and of a ball with a radius of 0.1 m that can be put anywhere."""
+    ball = make_shape("ball", "sphere", (0.2, 0.2, 0.2), (0.0, 0.0, 0.0), "ball")
+    return Scene(read_drawn_robot(urdf, "none", Path), joints, 0.5, [*shapes, ball], ["ball"])
+
+
+def place_ball(at: tuple[float, float, float], *shapes: DrawnShape) -> PlacedScene:
+    """Put the ball somewhere among bodies that stand."""
+    return make_scene(*shapes).place([], [Pose(origin=at)])
