@@ -254,7 +254,7 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     evidence: str,
 ) -> None:
     monkeypatch.setattr("throwcollect.runtimes.docker.containers.SILENCE_S", 3.0)
-    runtime = bare(through=connect(timeout_s=1.0))
+    runtime = bare(through=connect(timeout_s=10.0))
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.logs.tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)

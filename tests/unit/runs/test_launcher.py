@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
@@ -56,17 +55,7 @@ def run(engine: Engine, tmp_path: Path) -> Run:
     for name in ("logs", "data"):
         (tmp_path / name).mkdir()
     run = Records().new("throws")
-    record = RunRecord(
-        run=run.id,
-        name="throws",
-        runtime="docker",
-        directory=str(tmp_path / "data"),
-        logs=str(tmp_path / "logs"),
-        domain_id=0,
-        started=datetime.now(timezone.utc),
-        launcher=1,
-        simulations=1,
-    )
+    record = RunRecord.begin(run.id, "throws", tmp_path / "data", logs=tmp_path / "logs", runtime="docker")
     run.write(record)
     return run
 

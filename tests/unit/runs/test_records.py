@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,18 +36,9 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat(follow_symlinks=False).st_mode)
 
 
-def record(run: Run, **fields: object) -> RunRecord:
-    values = {
-        "name": "small",
-        "runtime": "local",
-        "directory": "/data/small",
-        "logs": "/data/small/logs",
-        "domain_id": 0,
-        "started": NOW,
-        "launcher": 1,
-        "simulations": 2,
-    }
-    return RunRecord(run=run.id, **{**values, **fields})  # type: ignore[arg-type]
+def record(run: Run, **fields: Any) -> RunRecord:
+    begun = RunRecord.begin(run.id, "small", Path("/data/small"), logs=Path("/data/small/logs"), runtime="local")
+    return replace(begun, **{"started": NOW, "launcher": 1, "simulations": 2, **fields})
 
 
 def remember(records: Records, **fields: object) -> str:
@@ -84,15 +76,6 @@ def test_a_run_without_a_record_is_not_found(state: Path) -> None:
     assert records.ids() == []
     with pytest.raises(ConfigError, match=f"no run {run.id}"):
         records.get(run.id)
-
-
-def test_a_run_lives_as_long_as_its_lock_is_held(state: Path) -> None:
-    records = Records()
-    run = records.new("small")
-    run.write(record(run))
-    assert records.get(run.id).status == "running"
-    run.close()
-    assert records.get(run.id).status == "died"
 
 
 def test_a_killed_launcher_releases_its_run_even_if_its_pid_is_in_use(state: Path) -> None:

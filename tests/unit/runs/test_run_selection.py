@@ -1,8 +1,10 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.unit.runtimes.docker.engine import Engine, engine_at
@@ -39,21 +41,12 @@ def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
     """Makes a run: ``lives``, ``died`` or ``ended``, in directories of its own unless told otherwise."""
     held = ExitStack()
 
-    def make(name: str, status: str, *, age_h: int = 0, **fields: object) -> RunRecord:
+    def make(name: str, status: str, *, age_h: int = 0, **fields: Any) -> RunRecord:
         monkeypatch.setattr("throwcollect.runs.records.secrets.token_hex", lambda _: "0123")
         run = records.new(name)
-        values = {
-            "name": name,
-            "runtime": "local",
-            "directory": str(tmp_path / name),
-            "logs": "logs",
-            "domain_id": 0,
-            "started": NOW - timedelta(hours=age_h),
-            "launcher": 1,
-            "simulations": 2,
-            "ended": NOW if status == "ended" else None,
-        }
-        run.write(RunRecord(run=run.id, **{**values, **fields}))  # type: ignore[arg-type]
+        begun = RunRecord.begin(run.id, name, tmp_path / name, logs=tmp_path / "logs", runtime="local")
+        ended = NOW if status == "ended" else None
+        run.write(replace(begun, **{"started": NOW - timedelta(hours=age_h), "launcher": 1, "ended": ended, **fields}))
         if status == "lives":
             held.callback(run.close)
         else:
