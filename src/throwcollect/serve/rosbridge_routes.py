@@ -9,20 +9,19 @@ from dataclasses import dataclass
 
 from fastapi import APIRouter, WebSocket
 
-from throwcollect.errors import ConflictError, ThrowcollectError
-from throwcollect.ros.connection import Connection
+from throwcollect.errors import ConfigError, ConflictError, ThrowcollectError, UnreachableError
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
-from throwcollect.serve.sockets import NOT_FOUND, close, refuse, refuse_ended, wait_for_end
+from throwcollect.serve.sockets import FAILED, NOT_FOUND, close, refuse, refuse_ended
 
-_LOOK_S = 0.5
+_LOOK_S = 1.0
+_LOST = "the router of the run has gone; connect again"
 
 
 @dataclass
 class _Shared:
     bridge: Bridge
-    following: asyncio.Task[None]
     clients: int = 0
 
 
@@ -31,37 +30,30 @@ class Bridges:
 
     def __init__(self) -> None:
         self._shared: dict[str, _Shared] = {}
+        self._one_at_a_time = asyncio.Lock()
 
     @asynccontextmanager
     async def bridge(self, run: Run) -> AsyncIterator[Bridge]:
-        """The bridge of a run, for one more client."""
-        if (shared := self._shared.get(run.id)) is None:
-            run.record.middleware.joining.settle()
-            bridge = Bridge(run.connection)
-            shared = self._shared[run.id] = _Shared(bridge, asyncio.create_task(_follow(run, bridge)))
+        """The bridge of a run, for one more client; a bridge that has lost its router is no longer used."""
+        async with self._one_at_a_time:
+            if (shared := self._shared.get(run.id)) is None or shared.bridge.is_over:
+                shared = self._shared[run.id] = _Shared(await asyncio.to_thread(_join, run))
         shared.clients += 1
         try:
             yield shared.bridge
         finally:
             shared.clients -= 1
             if not shared.clients:
-                del self._shared[run.id]
-                shared.following.cancel()
+                if self._shared.get(run.id) is shared:
+                    del self._shared[run.id]
                 await asyncio.to_thread(shared.bridge.close)
 
 
-async def _follow(run: Run, bridge: Bridge) -> None:
-    """Give a bridge the connection to the router of its run whenever the connection changes."""
-    known = run.connection
-    while True:
-        await asyncio.sleep(_LOOK_S)
-        connection: Connection | None = None
-        # A run that was forgotten raises an error, and has no router.
-        with suppress(ThrowcollectError):
-            connection = (await asyncio.to_thread(run.now)).connection
-        if connection != known:
-            known = connection
-            bridge.move(connection)
+def _join(run: Run) -> Bridge:
+    if run.connection is None:
+        raise UnreachableError(f"run {run.id} has no router yet; connect again")
+    run.record.middleware.joining.settle()
+    return Bridge(run.connection)
 
 
 def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
@@ -85,20 +77,25 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
             run = await asyncio.to_thread(find_run)
             bridge = await stack.enter_async_context(bridges.bridge(run))
         except ThrowcollectError as error:
-            await refuse(socket, NOT_FOUND, error.message)
+            await refuse(socket, NOT_FOUND if isinstance(error, ConfigError) else FAILED, error.message)
             return
-        ending = asyncio.create_task(_close_at_end(socket, run))
+        ending = asyncio.create_task(_close_at_end(socket, run, bridge))
         stack.callback(ending.cancel)
         await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
 
 
-async def _close_at_end(socket: WebSocket, run: Run) -> None:
+async def _close_at_end(socket: WebSocket, run: Run, bridge: Bridge) -> None:
+    """Close a socket when its run has ended, or the router has gone: the router that comes next is another one."""
+    code, reason = FAILED, _LOST
     try:
-        await wait_for_end(run)
+        while not bridge.is_over:
+            refuse_ended(await asyncio.to_thread(run.now))
+            await asyncio.sleep(_LOOK_S)
     except ThrowcollectError as error:
-        # If the client has left meanwhile, the socket is closed already.
-        with suppress(RuntimeError):
-            await close(socket, NOT_FOUND, error.message)
+        code, reason = NOT_FOUND, error.message
+    # If the client has left meanwhile, the socket is closed already.
+    with suppress(RuntimeError):
+        await close(socket, code, reason)
 
 
 def _find(instances: Instances, instance: str) -> Run:
