@@ -46,10 +46,16 @@ def serve(
             "--models", metavar="DIR", file_okay=False, help="Directory of models, each in a directory of its own."
         ),
     ] = Path("models"),
-    certificate: Annotated[
-        Path | None, typer.Option("--tls-cert", metavar="FILE", help="Certificate in PEM: speak HTTPS.")
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--token-file", metavar="FILE", help="Tokens that outlive a restart; a file that does not exist is made."
+        ),
     ] = None,
-    key: Annotated[Path | None, typer.Option("--tls-key", metavar="FILE", help="Its key in PEM.")] = None,
+    certificate: Annotated[
+        Path | None, typer.Option("--tls-cert", metavar="FILE", exists=True, help="Certificate in PEM: speak HTTPS.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option("--tls-key", metavar="FILE", exists=True, help="Its key in PEM.")] = None,
     in_the_clear: Annotated[
         bool, typer.Option("--in-the-clear", help="Serve other machines without TLS, where the network is trusted.")
     ] = False,
@@ -63,6 +69,7 @@ def serve(
     json: JsonOption = False,
 ) -> None:
     """Serve a page, REST, the state of all runs and rosbridge on one port, until it is stopped."""
+    from throwcollect.serve.access import Keys
     from throwcollect.serve.catalogue import Catalogue
     from throwcollect.serve.instances import Instances
     from throwcollect.serve.models import Models
@@ -93,6 +100,7 @@ def serve(
         tls=tls,
         origins=frozenset(origins or ()),
         names=frozenset(names or ()),
+        keys=None if token_file is None else Keys.of_file(token_file),
         tell=show_address,
     )
 

@@ -20,8 +20,8 @@ from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.catalogue import LONGEST_NAME
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.problem_responses import describe_bytes, problem
-from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
-from throwcollect.serve.watching import StateWatch
+from throwcollect.serve.state import ComponentState, InstanceState, describe
+from throwcollect.serve.states import States
 from throwcollect.wording import suggest
 
 
@@ -49,33 +49,33 @@ class Scaling(BaseModel):
     simulations: StrictInt = Field(ge=0, le=256)
 
 
-def make_component_routes(watch: StateWatch) -> APIRouter:
+def make_component_routes(states: States) -> APIRouter:
     """Make the routes on components."""
     router = APIRouter(prefix="/components")
 
     @router.get("")
     async def components() -> list[ComponentState]:
         """All components."""
-        return (await watch.current()).components
+        return (await states.read()).components
 
     @router.get("/{name}", response_model=ComponentState)
     async def component(name: str) -> Any:
         """A component."""
-        components = (await watch.current()).components
+        components = (await states.read()).components
         found = next((each for each in components if each.name == name), None)
         return found or problem(404, f"no component {name!r}")
 
     return router
 
 
-def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
+def make_instance_routes(instances: Instances, states: States) -> APIRouter:
     """Make the routes on instances."""
     router = APIRouter(prefix="/instances")
 
     @router.get("")
     def all_instances() -> list[InstanceState]:
         """All runs that this machine remembers, the latest first."""
-        return lookout.list_instances()
+        return states.list_instances()
 
     @router.get("/{instance}")
     def one(instance: str) -> InstanceState:

@@ -29,7 +29,7 @@ from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
-from throwcollect.serve.resumption import check_resumption
+from throwcollect.serve.resumption import explain_refusal
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
 from throwcollect.state_directory import state_directory
@@ -100,7 +100,8 @@ class Instances:
         run = self.get(instance)
         origin = run.record.origin
         with _one_at_a_time():
-            check_resumption(run.now())
+            if (reason := explain_refusal(run.now())) is not None:
+                raise ConflictError(reason)
             for other in Records().into(run.place.directory):
                 if other.status == "running":
                     raise ConflictError(f"run {other.id} collects into the dataset of run {run.id}")

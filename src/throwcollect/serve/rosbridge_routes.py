@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 
 from fastapi import APIRouter, WebSocket
 
-from throwcollect.errors import ConfigError, ConflictError, ThrowcollectError, UnreachableError
+from throwcollect.errors import ConflictError, ThrowcollectError, UnreachableError
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
-from throwcollect.serve.sockets import FAILED, NOT_FOUND, close, refuse, refuse_ended
-
-_LOOK_S = 1.0
-_LOST = "the router of the run has gone; connect again"
+from throwcollect.serve.sockets import close, refuse, refuse_ended, wait_for_end
+from throwcollect.serve.throws import ThrowWatch
 
 
 @dataclass
-class _Shared:
+class SharedBridge:
+    """The bridge of a run, what it hears of throws, and the number of its clients."""
+
     bridge: Bridge
+    throws: ThrowWatch
     clients: int = 0
 
 
@@ -29,18 +30,19 @@ class Bridges:
     """Makes the bridge of a run for its first client, and closes it after its last."""
 
     def __init__(self) -> None:
-        self._shared: dict[str, _Shared] = {}
+        self._shared: dict[str, SharedBridge] = {}
         self._one_at_a_time = asyncio.Lock()
 
     @asynccontextmanager
-    async def bridge(self, run: Run) -> AsyncIterator[Bridge]:
+    async def share(self, run: Run) -> AsyncIterator[SharedBridge]:
         """The bridge of a run, for one more client; a bridge that has lost its router is no longer used."""
         async with self._one_at_a_time:
             if (shared := self._shared.get(run.id)) is None or shared.bridge.is_over:
-                shared = self._shared[run.id] = _Shared(await asyncio.to_thread(_join, run))
+                bridge = await asyncio.to_thread(_join, run)
+                shared = self._shared[run.id] = SharedBridge(bridge, ThrowWatch(run, bridge))
         shared.clients += 1
         try:
-            yield shared.bridge
+            yield shared
         finally:
             shared.clients -= 1
             if not shared.clients:
@@ -75,9 +77,9 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
     async with AsyncExitStack() as stack:
         try:
             run = await asyncio.to_thread(find_run)
-            bridge = await stack.enter_async_context(bridges.bridge(run))
+            bridge = (await stack.enter_async_context(bridges.share(run))).bridge
         except ThrowcollectError as error:
-            await refuse(socket, NOT_FOUND if isinstance(error, ConfigError) else FAILED, error.message)
+            await refuse(socket, error)
             return
         ending = asyncio.create_task(_close_at_end(socket, run, bridge))
         stack.callback(ending.cancel)
@@ -85,17 +87,10 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
 
 
 async def _close_at_end(socket: WebSocket, run: Run, bridge: Bridge) -> None:
-    """Close a socket when its run has ended, or the router has gone: the router that comes next is another one."""
-    code, reason = FAILED, _LOST
     try:
-        while not bridge.is_over:
-            refuse_ended(await asyncio.to_thread(run.now))
-            await asyncio.sleep(_LOOK_S)
+        await wait_for_end(run, bridge)
     except ThrowcollectError as error:
-        code, reason = NOT_FOUND, error.message
-    # If the client has left meanwhile, the socket is closed already.
-    with suppress(RuntimeError):
-        await close(socket, code, reason)
+        await close(socket, error)
 
 
 def _find(instances: Instances, instance: str) -> Run:

@@ -14,10 +14,10 @@ from throwcollect.units import NS_PER_S
 
 
 class Sample:
-    """One message of a topic, as it came: bytes in CDR, with the time of receipt on the node's clock [ns]."""
+    """One message of a topic, as it came: ``data`` in CDR, with the time of receipt on the node's clock [ns]."""
 
     def __init__(self, data: bytes, message_type: Any, received_ns: int) -> None:
-        self._data = data
+        self.data = data
         self._type = message_type
         self._received_ns = received_ns
         self._encoded: dict[str, Any] = {}
@@ -35,9 +35,9 @@ class Sample:
     def _make_content(self, compression: str) -> Any:
         if compression == "cbor-raw":
             secs, nsecs = divmod(self._received_ns, NS_PER_S)
-            return {"secs": secs, "nsecs": nsecs, "bytes": self._data}
+            return {"secs": secs, "nsecs": nsecs, "bytes": self.data}
         if compression not in self._encoded:
-            values = plain_values(ros.deserialize_message(self._data, self._type), compression)
+            values = plain_values(ros.deserialize_message(self.data, self._type), compression)
             # The values are kept encoded, as they are the largest part of a frame, and do not depend on a client's name
             # for the topic.
             self._encoded[compression] = orjson.Fragment(json_text(values)) if compression == "none" else values
