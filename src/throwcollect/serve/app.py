@@ -6,40 +6,27 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from fastapi import APIRouter, FastAPI, WebSocket
+from fastapi import APIRouter, Body, FastAPI, HTTPException, WebSocket
 from fastapi.staticfiles import StaticFiles
-from pydantic import BaseModel
 
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
-from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
+from throwcollect.serve.instance_routes import make_instance_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
 from throwcollect.serve.models import Models, make_model_routes
-from throwcollect.serve.problem_responses import HANDLERS, ProblemFacts, problem
+from throwcollect.serve.problem_responses import HANDLERS, ProblemFacts
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import STATES, WholeState
 from throwcollect.serve.states import States
-from throwcollect.serve.view_routes import make_description_routes, make_view_routes
+from throwcollect.serve.view_routes import make_view_routes
 from throwcollect.version import __version__
 
 PREFIX = "/api/v1"
 _PAGE = Path(__file__).parent / "page"
-
-
-class Code(BaseModel):
-    """A one-time code."""
-
-    code: str
-
-
-class TokenAnswer(BaseModel):
-    """A token."""
-
-    token: str
 
 
 def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
@@ -55,11 +42,8 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
     states, bridges = States(instances.catalogue), Bridges()
     for routes in (
         _make_general_routes(states, keys),
-        make_component_routes(states),
         make_instance_routes(instances, states),
-        make_log_routes(instances),
         make_dataset_routes(instances),
-        make_description_routes(instances),
         make_view_routes(instances, bridges),
         make_model_routes(models),
     ):
@@ -86,18 +70,19 @@ def _make_general_routes(states: States, keys: Keys) -> APIRouter:
         """Whether it serves; for anybody."""
         return {"status": "ok", "version": __version__}
 
-    @router.post("/exchange", response_model=TokenAnswer)
-    def exchange(code: Code) -> Any:
+    @router.post("/exchange")
+    def exchange(code: Annotated[str, Body(embed=True)]) -> dict[str, str]:
         """The token for a code that nobody has exchanged yet; for anybody who has one."""
-        token = keys.exchange(code.code)
-        if token is None:
-            return problem(403, "this code has been exchanged already, or is too old", hint="throwcollect view")
-        return TokenAnswer(token=token)
+        if (token := keys.exchange(code)) is None:
+            raise HTTPException(
+                403, "this code has been exchanged already, or is too old; throwcollect view makes another"
+            )
+        return {"token": token}
 
     @router.post("/codes", status_code=201)
-    def make_code() -> Code:
+    def make_code() -> dict[str, str]:
         """A code that can be exchanged for the token once, for an address that is given to a browser."""
-        return Code(code=keys.new_code())
+        return {"code": keys.new_code()}
 
     @router.get("/state")
     async def state() -> WholeState:

@@ -61,11 +61,6 @@ def problem(status: int, title: str, headers: dict[str, str] | None = None, **fa
     return ProblemResponse(content, status_code=status, headers=headers)
 
 
-def describe_bytes(media_type: str) -> dict[int | str, dict[str, Any]]:
-    """Describe an answer that is no JSON, for the description of a request."""
-    return {200: {"description": "OK", "content": {media_type: {}}}}
-
-
 def answer(error: ThrowcollectError) -> ProblemResponse:
     """Make the answer that describes one of our own errors."""
     status = next((status for kind, status in _STATUS if isinstance(error, kind)), 500)

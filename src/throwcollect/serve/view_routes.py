@@ -13,7 +13,6 @@ from throwcollect.errors import ThrowcollectError
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import slow_down
-from throwcollect.serve.problem_responses import describe_bytes
 from throwcollect.serve.robot_files import (
     MeshFile,
     SceneFacts,
@@ -29,14 +28,20 @@ from throwcollect.serve.sockets import MAY_NOT, keep_telling, refuse, wait_for_e
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
 
-def make_description_routes(instances: Instances) -> APIRouter:
-    """Make the routes on the look of the robot of a run."""
+class Xml(Response):
+    """An answer in XML."""
+
+    media_type = "application/xml"
+
+
+def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
+    """Make the routes on what the page draws."""
     router = APIRouter()
 
-    @router.get("/instances/{instance}/urdf", response_class=Response, responses=describe_bytes("application/xml"))
+    @router.get("/instances/{instance}/urdf", response_class=Xml)
     def urdf(instance: str) -> Response:
         """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
-        return Response(description_of(instances.get(instance)), media_type="application/xml")
+        return Xml(description_of(instances.get(instance)))
 
     @router.get("/instances/{instance}/meshes")
     def meshes(instance: str) -> list[MeshFile]:
@@ -58,13 +63,6 @@ def make_description_routes(instances: Instances) -> APIRouter:
     def show_own(instance: str) -> None:
         """Let viewers draw the description of the configuration again."""
         instances.show(instance, None)
-
-    return router
-
-
-def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
-    """Make the routes on what the page draws."""
-    router = APIRouter()
 
     @router.get("/meshes/{package}/{path:path}", response_class=FileResponse)
     def mesh(package: str, path: str) -> FileResponse:
