@@ -11,16 +11,17 @@ from typing import Annotated
 from fastapi import APIRouter, Body, FastAPI, HTTPException, WebSocket
 from fastapi.staticfiles import StaticFiles
 
+from throwcollect.errors import NotFoundError
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
-from throwcollect.serve.instance_routes import make_instance_routes
+from throwcollect.serve.instance_routes import make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
 from throwcollect.serve.models import Models, make_model_routes
 from throwcollect.serve.problem_responses import HANDLERS, ProblemFacts
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
-from throwcollect.serve.state import STATES, WholeState
+from throwcollect.serve.state import STATES, ComponentState, WholeState
 from throwcollect.serve.states import States
 from throwcollect.serve.view_routes import make_view_routes
 from throwcollect.version import __version__
@@ -43,6 +44,7 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
     for routes in (
         _make_general_routes(states, keys),
         make_instance_routes(instances, states),
+        make_log_routes(instances),
         make_dataset_routes(instances),
         make_view_routes(instances, bridges),
         make_model_routes(models),
@@ -88,6 +90,19 @@ def _make_general_routes(states: States, keys: Keys) -> APIRouter:
     async def state() -> WholeState:
         """The state of everything."""
         return await states.read()
+
+    @router.get("/components")
+    async def components() -> list[ComponentState]:
+        """All components."""
+        return (await states.read()).components
+
+    @router.get("/components/{name}")
+    async def component(name: str) -> ComponentState:
+        """A component."""
+        for each in (await states.read()).components:
+            if each.name == name:
+                return each
+        raise NotFoundError(f"no component {name!r}")
 
     @router.websocket("/state")
     async def follow(socket: WebSocket) -> None:

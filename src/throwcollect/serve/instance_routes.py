@@ -1,4 +1,4 @@
-"""REST on components and instances."""
+"""REST on instances."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from throwcollect.runs.run_record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.catalogue import LONGEST_NAME
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.state import ComponentState, InstanceState, describe
+from throwcollect.serve.state import InstanceState, describe
 from throwcollect.serve.states import States
 from throwcollect.wording import suggest
 
@@ -56,21 +56,8 @@ class Scaling(BaseModel):
 
 
 def make_instance_routes(instances: Instances, states: States) -> APIRouter:
-    """Make the routes on components and instances, with their logs and events."""
+    """Make the routes on instances."""
     router = APIRouter()
-
-    @router.get("/components")
-    async def components() -> list[ComponentState]:
-        """All components."""
-        return (await states.read()).components
-
-    @router.get("/components/{name}")
-    async def component(name: str) -> ComponentState:
-        """A component."""
-        for each in (await states.read()).components:
-            if each.name == name:
-                return each
-        raise NotFoundError(f"no component {name!r}")
 
     @router.get("/instances")
     def all_instances() -> list[InstanceState]:
@@ -115,6 +102,13 @@ def make_instance_routes(instances: Instances, states: States) -> APIRouter:
     def patch(instance: str, scaling: Scaling) -> InstanceState:
         """Change the number of simulations of a run."""
         return describe(instances.scale(instance, scaling.simulations))
+
+    return router
+
+
+def make_log_routes(instances: Instances) -> APIRouter:
+    """Make the routes on logs of nodes and events of runs."""
+    router = APIRouter()
 
     @router.get("/instances/{instance}/log/{node}", response_class=PlainTextResponse)
     def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> PlainTextResponse:

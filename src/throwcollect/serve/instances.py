@@ -28,9 +28,8 @@ from throwcollect.runs.run_record import Origin
 from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
-from throwcollect.serve.resumption import explain_refusal
 from throwcollect.serve.robot_files import description_of
-from throwcollect.serve.state import simulations_of
+from throwcollect.serve.state import explain_refusal, simulations_of
 
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _ONE_AT_A_TIME = threading.Lock()

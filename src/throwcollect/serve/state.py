@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from datetime import datetime
+from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.resume import is_complete
+from throwcollect.dataset.directory import CONFIG, METADATA
 from throwcollect.dataset.summary import Info
 from throwcollect.runs.records import Run
 from throwcollect.runs.run_record import Kind, Planning
 from throwcollect.runtimes.nodes import is_simulation
 from throwcollect.runtimes.runtime import NodeState
-from throwcollect.serve.resumption import explain_refusal
 
 Status = Literal["planning", "starting", "running", "ended", "died"]
 
@@ -45,19 +49,14 @@ class InstanceState:
     """A run of this machine, whoever began it.
 
     Attributes:
-        id: Id of the run.
         component: Name of the component that it is an instance of; None if a command or a program began it.
-        name: Name of the collection.
         kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
         joins: Id of the run that a container has joined; None if it has joined none.
         status: ``planning`` while a large plan is made, ``starting`` until all nodes run, ``running``, ``ended``, or
             ``died`` if its launcher died before the end.
-        started: When it was begun.
-        ended: When it ended; None before.
         stopping: Whether it ends because somebody has asked for that; running trials are finished.
         exit_code: Exit code of its launcher; None before it ended.
         message: The error with which it ended, in words; empty if there was none.
-        simulations: Number of simulations that are wanted.
         nodes: Its nodes; none once it has ended, or died with them.
         planning: How far the plan is while it is made; else None.
         progress: How far it has come; None before the first report, and without a coordinator.
@@ -126,6 +125,26 @@ def describe(run: Run, *, is_growing: bool = False) -> InstanceState:
         "can_be_resumed": not is_growing and explain_refusal(run) is None,
     }
     return InstanceState(**{**shared, **own})
+
+
+def explain_refusal(run: Run) -> str | None:
+    """Why clients cannot continue the dataset of a run; None if they can. This is cheap enough for many calls."""
+    directory = run.place.directory
+    if run.status == "running":
+        return f"run {run.id} is still running"
+    if run.record.kind != "collection" or run.record.volume is not None or not os.path.isfile(directory / CONFIG):
+        return f"run {run.id} has no dataset in a directory to go on with"
+    try:
+        changed_ns = directory.stat().st_mtime_ns, (directory / METADATA).stat().st_mtime_ns
+    except OSError:
+        return None
+    return f"the dataset of run {run.id} is complete" if _is_complete(directory, changed_ns) else None
+
+
+# The tables of a dataset are read again only if files were added, removed or replaced.
+@lru_cache(maxsize=1024)
+def _is_complete(directory: Path, _changed_ns: tuple[int, int]) -> bool:
+    return is_complete(directory)
 
 
 def simulations_of(nodes: Sequence[NodeState]) -> list[str]:

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
 from throwcollect.errors import ThrowcollectError
+from throwcollect.runs.records import Run
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import slow_down
@@ -90,24 +91,28 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
-        if not socket.state.may_change:
-            await socket.accept()
-            await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
-            return
-        try:
-            run = await asyncio.to_thread(instances.get, instance)
-            hold = await asyncio.to_thread(slow_down, run, simulation)
-        except ThrowcollectError as error:
-            await refuse(socket, error)
-            return
-        try:
-            await socket.accept()
-            # Nothing is ever sent: the simulation stays slow as long as the client is connected.
-            await keep_telling(socket, wait_for_end(run))
-        finally:
-            await asyncio.to_thread(hold.restore_speed)
+        await _keep_slow(socket, lambda: instances.get(instance), simulation)
 
     return router
+
+
+async def _keep_slow(socket: WebSocket, find_run: Callable[[], Run], simulation: str) -> None:
+    """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
+    if not socket.state.may_change:
+        await socket.accept()
+        await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
+        return
+    try:
+        run = await asyncio.to_thread(find_run)
+        hold = await asyncio.to_thread(slow_down, run, simulation)
+    except ThrowcollectError as error:
+        await refuse(socket, error)
+        return
+    try:
+        await socket.accept()
+        await keep_telling(socket, wait_for_end(run))
+    finally:
+        await asyncio.to_thread(hold.restore_speed)
 
 
 async def _send_throws(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:

@@ -121,11 +121,6 @@ class Parameters:
         return service in dict(self._client.bridge.node.get_service_names_and_types())
 
 
-def delete(call: Call) -> None:
-    """Answer that parameters of nodes cannot be deleted."""
-    call.fail(f"{call.asked.name}: parameters of nodes cannot be deleted")
-
-
 def _read_name(call: Call) -> tuple[str, str]:
     """Node and name of a parameter."""
     given = call.arguments.name

@@ -19,7 +19,7 @@ from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.calls import Arguments, Call
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.guarded import is_guarded
-from throwcollect.serve.rosbridge.parameters import Parameters, delete
+from throwcollect.serve.rosbridge.parameters import Parameters
 from throwcollect.units import NS_PER_S
 
 Answer = Callable[[Call], None]
@@ -38,7 +38,7 @@ def make_services(client: Client) -> Mapping[str, Answer]:
         "set_param": parameters.set,
         "has_param": parameters.has,
         "get_param_names": parameters.list_all,
-        "delete_param": delete,
+        "delete_param": lambda call: call.fail(f"{call.asked.name}: parameters of nodes cannot be deleted"),
     }
     at_once: Mapping[str, Answer] = {name: partial(_reply, values) for name, values in graph.services().items()}
     services = {f"rosapi/{name}": answer for name, answer in {**at_once, **later}.items()}
