@@ -354,13 +354,15 @@ def test_a_server_speaks_ipv6_and_tls(place: Place, tmp_path: Path, monkeypatch:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     words = ("serve", "--host", "::1", "--port", "0", "--json")
     options = ("--tls-cert", str(key.certificate), "--tls-key", str(key.private_key))
-    with start_command(*words, *options, cwd=tmp_path, stderr=None) as process:
+    tokens = tmp_path / "tokens"
+    with start_command(*words, *options, "--token-file", str(tokens), cwd=tmp_path, stderr=None) as process:
         assert process.stdout is not None
         url = json.loads(process.stdout.readline())["url"]
         assert url.startswith("https://[::1]:")
         found = find_server()
         assert found is not None
         assert found.url == url
+        assert tokens.read_text().split() == [found.token, found.read_only_token]
         assert make_page_address(found).startswith(f"{url}/#code=")
         process.terminate()
         assert process.wait(timeout=30) == 0

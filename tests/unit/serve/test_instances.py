@@ -164,7 +164,10 @@ def test_a_container_can_join_a_run(
     assert client.get(f"{URL}/d/urdf").status_code == 404
     for wish in ({"component": "deaf", "simulations": 1}, {"component": "deaf", "set": {"a": 1}}):
         assert ask("g", **wish).status_code == 422
-    assert ask("g", component="talos", joins="t").json()["title"] == "joins: talos is a session, for which this cannot be set"
+    assert (
+        ask("g", component="talos", joins="t").json()["title"]
+        == "joins: talos is a session, for which this cannot be set"
+    )
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from contextlib import suppress
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from throwcollect.serve.rosbridge.bridge import Bridge
-from throwcollect.serve.rosbridge.codec import LONGEST_FRAME, Frame, json_text
+from throwcollect.serve.rosbridge.codec import Frame, json_text
 from throwcollect.serve.rosbridge.requests import Requests
 
 MOST_FRAMES = 1000
@@ -19,7 +19,6 @@ MOST_BYTES = 32 * 2**20
 
 _MOST_WAITING = 100
 _POLL_S = 0.01
-_TOO_BIG = 1009
 _DROPPED = json_text(
     {
         "op": "status",
@@ -95,9 +94,6 @@ async def _receive_all(websocket: WebSocket, bridge: Bridge, requests: Requests)
             return
         text: str | None = message.get("text")
         frame: Frame = message["bytes"] if text is None else text
-        if len(frame) > LONGEST_FRAME or (text is not None and len(text.encode()) > LONGEST_FRAME):
-            await websocket.close(_TOO_BIG, "a frame is longer than 10 MiB")
-            return
         requests.receive(frame)
         # If a client sends faster than the bridge works, its frames are not read for a while, so TCP makes it wait.
         while requests.waiting > _MOST_WAITING and not bridge.is_over:

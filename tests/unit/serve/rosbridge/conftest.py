@@ -24,6 +24,7 @@ from throwcollect.ros.middleware import Middleware, uses_rclpy
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 from throwcollect.serve.rosbridge import Bridge, Requests, attend
+from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 from throwcollect.serve.server_process import WEBSOCKETS
 
 PATIENCE_S = 60.0
@@ -115,6 +116,7 @@ def serve_by_websocket(bridge: Bridge) -> Iterator[str]:
     options: dict[str, Any] = {
         "lifespan": "off",
         "ws": WEBSOCKETS,
+        "ws_max_size": LONGEST_FRAME,
         "ws_per_message_deflate": False,
         "timeout_graceful_shutdown": 1,
     }
