@@ -202,8 +202,8 @@ def test_a_watched_run_outlives_its_server_and_can_be_stopped_and_resumed(
     wish = {"component": "throws", "simulations": 1, "set": {**SLOWLY, "trials": MANY}}
     assert first.ask("PUT", "/instances/watched", wish)[0] == 202
     assert first.ask("PUT", "/instances/watched", wish)[0] == 200
+    first.wait_until("watched", "running")
     with closing(never_read(first, "/state")), closing(never_read(first, "/instances/watched/shown")):
-        first.wait_until("watched", "running")
         with first.open("/state") as state, first.open("/instances/watched/shown") as shown:
             assert json.loads(state.recv())["instances"][0]["id"] == "watched"
             frame = shown.recv(timeout=60)

@@ -72,7 +72,6 @@ def serve(
     from throwcollect.serve.access import Keys
     from throwcollect.serve.catalogue import Catalogue
     from throwcollect.serve.instances import Instances
-    from throwcollect.serve.models import Models
     from throwcollect.serve.server_process import Tls
     from throwcollect.serve.server_process import serve as serve_all
 
@@ -94,7 +93,7 @@ def serve(
 
     serve_all(
         Instances(Catalogue.read(catalogue) if catalogue else Catalogue.find(DEFAULT_CONFIG), datasets.absolute()),
-        Models(models.absolute()),
+        models.absolute(),
         host=host,
         port=port,
         tls=tls,

@@ -17,7 +17,7 @@ from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
-from throwcollect.serve.models import Models, make_model_routes
+from throwcollect.serve.models import make_model_routes
 from throwcollect.serve.problem_responses import HANDLERS, ProblemFacts
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
@@ -30,7 +30,7 @@ PREFIX = "/api/v1"
 _PAGE = Path(__file__).parent / "page"
 
 
-def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
+def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
     """Make the application, which belongs behind `access.Access`."""
     app = FastAPI(
         title="throwcollect",

@@ -20,7 +20,6 @@ from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.finding import Address, publish
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.models import Models
 from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 
 _PORT = 8080
@@ -41,7 +40,7 @@ class Tls:
 
 def serve(
     instances: Instances,
-    models: Models,
+    models: Path,
     *,
     host: str = "127.0.0.1",
     port: int | None = None,
@@ -55,7 +54,7 @@ def serve(
 
     Args:
         instances: All runs, and what can be done with them.
-        models: All models.
+        models: Directory of models.
         host: Address to listen at.
         port: Port to listen at, 0 for any free one; None for 8080, or any free one if 8080 is taken.
         tls: Certificate and key; None to speak in the clear.

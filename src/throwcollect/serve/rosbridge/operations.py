@@ -11,7 +11,6 @@ from pydantic import (
     BaseModel,
     Field,
     NonNegativeFloat,
-    NonNegativeInt,
     PositiveFloat,
     TypeAdapter,
     ValidationError,
@@ -30,6 +29,8 @@ RequestId = str | int | None
 """The id that a client has given an operation; None if it has given none."""
 MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service", "fragment", "set_level", "status"))
 """Operations that clients may use that may only look; a call is decided on by its service."""
+Natural = Annotated[int, Field(ge=0, lt=1 << 53)]
+"""A number from 0 on that JavaScript can represent."""
 _OFFER_NAME = AliasChoices("service", "action")
 
 
@@ -48,7 +49,7 @@ class Form(Operation):
     """How the answers to an operation are sent; text frames are cut into parts of ``fragment_size`` characters."""
 
     compression: Compression = "none"
-    fragment_size: NonNegativeInt = 0
+    fragment_size: Natural = 0
 
 
 class Subscribe(Form):
@@ -58,7 +59,7 @@ class Subscribe(Form):
     topic: str
     type: str = ""
     throttle_rate: NonNegativeFloat = 0
-    queue_length: NonNegativeInt = 0
+    queue_length: Natural = 0
 
 
 class Withdraw(Operation):
@@ -76,7 +77,7 @@ class Publish(Operation):
     type: str = ""
     msg: Any = None
     latch: bool = False
-    queue_size: NonNegativeInt = 0
+    queue_size: Natural = 0
 
 
 class CallService(Form):
@@ -129,7 +130,7 @@ class Fragment(Operation):
     op: Literal["fragment"]
     id: str | int
     data: str
-    num: NonNegativeInt
+    num: Natural
     total: int = Field(le=100_000)
 
     @model_validator(mode="after")
