@@ -63,8 +63,8 @@ class ComponentSection(NodeContainerConfig):
     def _is_one_thing(self) -> ComponentSection:
         if sum(each is not None for each in (self.config, self.session, self.image)) != 1:
             raise ValueError("should have one of config, session and image")
-        of_containers = {*NodeContainerConfig.model_fields, "command", "urdf"}
-        if self.image is None and (wrong := sorted(self.model_fields_set & of_containers)):
+        given = self.model_fields_set & {*NodeContainerConfig.model_fields, "command", "urdf"}
+        if self.image is None and (wrong := sorted("volumes" if each == "mounts" else each for each in given)):
             raise ContradictionError(dict.fromkeys(wrong, "should be left out; it is for components with image"))
         return self
 
