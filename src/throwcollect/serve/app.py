@@ -18,7 +18,7 @@ from throwcollect.serve.instance_routes import make_instance_routes, make_log_ro
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
 from throwcollect.serve.models import make_model_routes
-from throwcollect.serve.problem_responses import HANDLERS, ProblemFacts
+from throwcollect.serve.problem_responses import DESCRIPTION, HANDLERS
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import STATES, ComponentState, WholeState
@@ -49,7 +49,7 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
         make_view_routes(instances, bridges),
         make_model_routes(models),
     ):
-        app.include_router(routes, prefix=PREFIX, responses={"default": {"model": ProblemFacts}})
+        app.include_router(routes, prefix=PREFIX, responses=DESCRIPTION)
     app.include_router(make_rosbridge_routes(instances, bridges))
     # Routes are tried in their order, and this last one takes all other paths.
     app.mount("/", StaticFiles(directory=_PAGE, html=True))

@@ -69,29 +69,29 @@ def make_model_routes(directory: Path) -> APIRouter:
             return []
         return [each for each in sorted(os.listdir(directory)) if _is_model(directory, each)]
 
-    @router.get("/{name}")
-    def view(name: str) -> ModelView:
+    @router.get("/{model}")
+    def view(model: str) -> ModelView:
         """The throws that a model was learned from, its misses, and the effect of adapting it."""
-        model = _find(directory, name)
-        trained, ends = model.trained_on, model.learned.outputs
+        found = _find(directory, model)
+        trained, ends = found.trained_on, found.learned.outputs
         return ModelView(
-            name=name,
+            name=model,
             learned_from=trained.name,
             throws=trained.throws,
             error=trained.error,
-            parameters=list(model.parameters),
-            targets=list(model.targets),
-            given=list(model.given),
+            parameters=list(found.parameters),
+            targets=list(found.targets),
+            given=list(found.given),
             # The step is rounded up, so that there are never more points than allowed.
             reached=ends[:: max(1, -(-len(ends) // _MOST_POINTS))].tolist(),
-            adaptation=model.adaptation,
-            score=read_score(directory / name),
+            adaptation=found.adaptation,
+            score=read_score(directory / model),
         )
 
-    @router.get("/{name}/aim")
-    def aim(name: str, at: Annotated[list[float], Query()]) -> AimView:
+    @router.get("/{model}/aim")
+    def aim(model: str, at: Annotated[list[float], Query()]) -> AimView:
         """The parameters of a throw at a target: values of the model's targets, then of the keys given with them."""
-        (found,) = _find(directory, name).aim([at])
+        (found,) = _find(directory, model).aim([at])
         return AimView(**found.as_dict())
 
     return router

@@ -85,6 +85,13 @@ async def answer_any(_: Request, error: Exception) -> ProblemResponse:
     return problem(500, "internal error", hint="the log of the server says where; please report it")
 
 
+DESCRIPTION: dict[int | str, dict[str, Any]] = {
+    "default": {
+        "description": "An error",
+        "content": {ProblemResponse.media_type: {"schema": ProblemFacts.model_json_schema()}},
+    }
+}
+"""What the description of the interface tells of errors."""
 HANDLERS: dict[int | type[Exception], Any] = dict.fromkeys(
     (ThrowcollectError, RequestValidationError, HTTPException, Exception), answer_any
 )
