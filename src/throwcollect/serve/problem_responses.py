@@ -8,7 +8,7 @@ from typing import Any
 from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, JsonValue
+from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from throwcollect.errors import (
@@ -45,7 +45,7 @@ class ProblemFacts(BaseModel):
     """What was seen."""
     hint: str | None = None
     """What gets further."""
-    problems: list[dict[str, JsonValue]] | None = None
+    problems: list[dict[str, Any]] | None = None
     """Each key that is wrong, with a message."""
 
 
