@@ -203,20 +203,24 @@ def test_a_watched_run_outlives_its_server_and_can_be_stopped_and_resumed(
     assert first.ask("PUT", "/instances/watched", wish)[0] == 202
     assert first.ask("PUT", "/instances/watched", wish)[0] == 200
     first.wait_until("watched", "running")
-    with closing(never_read(first, "/state")), closing(never_read(first, "/instances/watched/shown")):
-        with first.open("/state") as state, first.open("/instances/watched/shown") as shown:
-            assert json.loads(state.recv())["instances"][0]["id"] == "watched"
-            frame = shown.recv(timeout=60)
-            assert isinstance(frame, bytes)
-            header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
-            numbers = header["samples"] * (len(header["joints"]) + 3 + 7)
-            assert {"trial", "outcome", "joints", "samples", "rate_hz", "landing"} <= set(header)
-            assert len(frame) % 4 == 0
-            assert 0 <= len(frame) - 4 * numbers - 4 - len(json.dumps(header)) < 4
-            before = first.instance("watched")
-            first.kill()
-            # The end of the server has cut the socket, so the iteration ends.
-            assert list(iter_until_cut(state))[-1]["version"] == 1
+    with (
+        closing(never_read(first, "/state")),
+        closing(never_read(first, "/instances/watched/shown")),
+        first.open("/state") as state,
+        first.open("/instances/watched/shown") as shown,
+    ):
+        assert json.loads(state.recv())["instances"][0]["id"] == "watched"
+        frame = shown.recv(timeout=60)
+        assert isinstance(frame, bytes)
+        header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
+        numbers = header["samples"] * (len(header["joints"]) + 3 + 7)
+        assert {"trial", "outcome", "joints", "samples", "rate_hz", "landing"} <= set(header)
+        assert len(frame) % 4 == 0
+        assert 0 <= len(frame) - 4 * numbers - 4 - len(json.dumps(header)) < 4
+        before = first.instance("watched")
+        first.kill()
+        # The end of the server has cut the socket, so the iteration ends.
+        assert list(iter_until_cut(state))[-1]["version"] == 1
     second = place.serve()
     after = second.instance("watched")
     growing = ("progress", "nodes")
