@@ -24,7 +24,6 @@ from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.catalogue import Catalogue
-from throwcollect.serve.models import Models
 from throwcollect.state_directory import STATE_VARIABLE
 
 _PORT = 8099
@@ -87,7 +86,7 @@ def main() -> int:
         instances_module.begin_run = _begin  # type: ignore[assignment]
         keys, host = Keys(), f"127.0.0.1:{_PORT}"
         instances = instances_module.Instances(Catalogue.read(catalogue), directory / "data")
-        app = Access(make_app(instances, Models(directory / "models"), keys), keys, frozenset({host}))
+        app = Access(make_app(instances, directory / "models", keys), keys, frozenset({host}))
         server = uvicorn.Server(uvicorn.Config(app, port=_PORT, log_level="warning", ws="websockets-sansio"))
         threading.Thread(target=server.run, daemon=True).start()
         tried = [str(Path(sys.executable).parent / "schemathesis")]

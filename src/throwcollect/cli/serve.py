@@ -26,6 +26,7 @@ def serve(
     port: int | None = None,
     datasets: Path = Path("datasets"),
     models: Path = Path("models"),
+    token_file: Path | None = None,
     certificate: Path | None = None,
     key: Path | None = None,
     in_the_clear: bool = False,
@@ -41,15 +42,16 @@ def serve(
         port (0..65535): Port; by default 8080, or a free one if that is taken.
         datasets (DIR): Directory in which instances write datasets.
         models (DIR): Directory of models, each in a directory of its own.
+        token_file (FILE): Tokens that outlive a restart; a file that does not exist is made.
         certificate (--tls-cert FILE): Certificate in PEM: speak HTTPS.
         key (--tls-key FILE): Its key in PEM.
         in_the_clear: Serve other machines without TLS, where the network is trusted.
         origins (--allow-origin URL): Origin of pages served elsewhere that may connect.
         names (--name NAME): Host name by which clients know this machine.
     """
+    from throwcollect.serve.access import Keys
     from throwcollect.serve.catalogue import Catalogue
     from throwcollect.serve.instances import Instances
-    from throwcollect.serve.models import Models
     from throwcollect.serve.server_process import Tls
     from throwcollect.serve.server_process import serve as serve_all
 
@@ -73,12 +75,13 @@ def serve(
 
     serve_all(
         Instances(Catalogue.read(catalogue) if catalogue else Catalogue.find(DEFAULT_CONFIG), datasets.absolute()),
-        Models(models.absolute()),
+        models.absolute(),
         host=host,
         port=port,
         tls=tls,
         origins=frozenset(origins or ()),
         names=frozenset(names or ()),
+        keys=None if token_file is None else Keys.of_file(token_file),
         tell=show_address,
     )
 

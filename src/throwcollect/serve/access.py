@@ -9,29 +9,36 @@ from __future__ import annotations
 
 import hmac
 import logging
+import re
 import secrets
 import time
 from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass, field
 from enum import Enum
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, quote
 
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+
+from throwcollect.errors import ConfigError
+from throwcollect.files import write_secret
 from throwcollect.serve.problem_responses import problem
 
-Scope = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
 
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
-_TOO_LONG = 413, f"a body may have at most {_MOST_BODY} bytes"
 MAY_ONLY_LOOK = 403, "this token may only look"
 """Status and sentence for a request to change something with the token that may only look."""
 _PLAIN = "/-_.~{}:@!$&'()*+,;="
 _CODE_S = 600.0
 """Time for which a one-time code can be exchanged."""
+_FORM = r"[A-Za-z0-9_-]{16,}"
 _SUBPROTOCOL = "bearer."
 _POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self'{sockets}; "
@@ -66,6 +73,32 @@ class Keys:
     read_only: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     _codes: dict[str, float] = field(default_factory=dict)
 
+    @classmethod
+    def of_file(cls, path: Path) -> Keys:
+        """Take the tokens from a file, with the full one in the first line, so that they outlive a restart.
+
+        A file that does not exist is made, with new tokens.
+
+        Raises:
+            ConfigError: If others can read the file, or it does not have two tokens.
+        """
+        try:
+            if not path.exists():
+                keys = cls()
+                write_secret(path, f"{keys.full}\n{keys.read_only}\n".encode())
+            tokens = path.read_text(errors="replace").split()
+            is_private = not path.stat().st_mode & 0o077
+        except OSError as error:
+            raise ConfigError(f"--token-file {path}: {error.strerror}") from error
+        if not is_private:
+            raise ConfigError(f"--token-file {path}: others can read it", hint=f"chmod 600 {path}")
+        if len(set(tokens)) != 2 or not all(re.fullmatch(_FORM, each) for each in tokens):
+            raise ConfigError(
+                f"--token-file {path}: should have two tokens of 16 or more letters, digits, - and _, in two lines",
+                expected="the token that may do everything, then the one that may only look",
+            )
+        return cls(tokens[0], tokens[1])
+
     def rights_of(self, token: str) -> Rights:
         """What the owner of a token may do; nothing if it is no token of this server."""
         # Both comparisons are always made, and take the same time for any token, so that the time reveals nothing.
@@ -97,33 +130,33 @@ class Access:
     ``origins``.
     """
 
+    # Middleware of Starlette would not do: TrustedHostMiddleware knows neither ports nor IPv6, and CORSMiddleware lets
+    # requests of other origins through.
     def __init__(self, app: Any, keys: Keys, hosts: frozenset[str], origins: frozenset[str] = frozenset()) -> None:
         self._app = app
         self._keys = keys
         self._hosts = hosts
         self._origins = origins | {f"{scheme}://{host}" for scheme in ("http", "https") for host in hosts}
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: MutableMapping[str, Any], receive: Receive, send: Send) -> None:
         """Handle a request or a socket, as ASGI defines it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        headers = Headers(scope=scope)
         refusal, rights = self._judge(scope, headers)
         scope.setdefault("state", {})["may_change"] = rights is Rights.CHANGE
         host = headers.get("host", "")
-        answer = _Answer(scope, send, rights.value, _write_policy(host if host in self._hosts else None))
-        if refusal is not None:
-            await _refuse(scope, receive, answer, *refusal)
-            return
-        body = _Body(receive)
-        try:
-            await self._app(scope, body.receive, body.unless_too_long(answer))
-        finally:
-            if body.is_too_long:
-                await _refuse(scope, receive, answer, *_TOO_LONG)
+        send = _add_headers(scope, send, rights, host if host in self._hosts else None)
+        if refusal is None:
+            await self._app(scope, _limit_body(receive), send)
+        else:
+            status, title = refusal
+            more = {"WWW-Authenticate": "Bearer"} if status == HTTPStatus.UNAUTHORIZED else None
+            # For a socket, this refuses the handshake with a status and a body.
+            await problem(status, title, headers=more)(scope, receive, send)
 
-    def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, Rights]:
+    def _judge(self, scope: MutableMapping[str, Any], headers: Headers) -> tuple[tuple[int, str] | None, Rights]:
         """Decide on a request.
 
         Returns:
@@ -134,17 +167,15 @@ class Access:
             return (421, "this server is not known by that name"), Rights.NONE
         if "origin" in headers and headers["origin"] not in self._origins:
             return (403, "pages of another origin may not connect"), Rights.NONE
-        length = headers.get("content-length", "0")
-        too_long = None if length.isdecimal() and int(length) <= _MOST_BODY else _TOO_LONG
         # The page itself needs no token, because it holds no secret: it exchanges the code in the printed address.
         if scope["type"] == "http" and _is_public(scope["path"]):
-            return too_long, Rights.NONE
+            return None, Rights.NONE
         rights = self._keys.rights_of(_read_token(scope, headers))
         if rights is Rights.NONE:
             return (401, "a token is missing, or it is not ours"), rights
         if rights is Rights.LOOK and scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
             return MAY_ONLY_LOOK, rights
-        return too_long, rights
+        return None, rights
 
 
 def _is_public(path: str) -> bool:
@@ -152,95 +183,66 @@ def _is_public(path: str) -> bool:
     return path in ("/api/v1/health", "/api/v1/exchange") or not path.startswith(("/api/", "/openapi.json"))
 
 
-def _read_token(scope: Scope, headers: dict[str, str]) -> str:
+def _read_token(scope: MutableMapping[str, Any], headers: Headers) -> str:
     """The token of a request; empty if it has none."""
     scheme, _, given = headers.get("authorization", "").partition(" ")
     if scheme.lower() == "bearer":
         return given.strip()
     if scope["type"] != "websocket":
         return ""
-    for protocol in scope.get("subprotocols", ()):
-        if protocol.startswith(_SUBPROTOCOL):
-            return str(protocol).removeprefix(_SUBPROTOCOL)
+    if (protocol := _find_protocol(scope)) is not None:
+        return protocol.removeprefix(_SUBPROTOCOL)
     # Clients of rosbridge can set neither headers nor subprotocols, so they give the token in the query.
     return str(parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0])
 
 
-class _Body:
-    """Receives a body; if it gets too long, whatever its header says, breaks off as if the client had left.
+def _find_protocol(scope: MutableMapping[str, Any]) -> str | None:
+    return next((str(each) for each in scope.get("subprotocols", ()) if each.startswith(_SUBPROTOCOL)), None)
 
-    Attributes:
-        is_too_long: Whether the body was too long.
+
+def _limit_body(receive: Receive) -> Receive:
+    """Make a function that receives as ``receive`` does, and raises an error when a body gets too long."""
+    left = _MOST_BODY
+
+    async def receive_some() -> Message:
+        nonlocal left
+        message = await receive()
+        left -= len(message.get("body", b""))
+        if left < 0:
+            raise HTTPException(413, f"a body may have at most {_MOST_BODY} bytes")
+        return message
+
+    return receive_some
+
+
+def _add_headers(scope: MutableMapping[str, Any], send: Send, rights: Rights, host: str | None) -> Send:
+    """Make a function that sends as ``send`` does, with the headers that all answers have, and a line in the log.
+
+    The policy lets the page connect to this server only; without a ``host``, the page gets no sockets.
     """
-
-    def __init__(self, receive: Receive) -> None:
-        self.is_too_long = False
-        self._receive = receive
-        self._allowed = _MOST_BODY
-
-    async def receive(self) -> MutableMapping[str, Any]:
-        message = await self._receive()
-        self._allowed -= len(message.get("body", b""))
-        self.is_too_long = self._allowed < 0
-        return {"type": "http.disconnect"} if self.is_too_long else message
-
-    def unless_too_long(self, send: Send) -> Send:
-        """Make a function that drops the application's answer if the body was too long: the client gets a refusal."""
-
-        async def send_some(message: MutableMapping[str, Any]) -> None:
-            if not self.is_too_long:
-                await send(message)
-
-        return send_some
-
-
-async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title: str) -> None:
-    headers = {"WWW-Authenticate": "Bearer"} if status == HTTPStatus.UNAUTHORIZED else None
-    response = problem(status, title, headers=headers)
-    if scope["type"] == "http":
-        await response(scope, receive, send)
-    # With this extension of ASGI, a refused handshake gets a status and a body; without it, the status is always 403.
-    elif "websocket.http.response" in scope.get("extensions", {}):
-        start = {"status": status, "headers": response.raw_headers}
-        await send({"type": "websocket.http.response.start", **start})
-        await send({"type": "websocket.http.response.body", "body": response.body})
-    else:
-        await send({"type": "websocket.close", "code": 1008, "reason": title})
-
-
-def _write_policy(host: str | None) -> bytes:
-    """Write the policy that lets the page connect to this server only; if `host` is None, the page gets no sockets."""
     # The sockets have to be named because in some browsers 'self' does not include them.
-    return _POLICY.format(sockets=f" ws://{host} wss://{host}" if host else "").encode()
+    policy = _POLICY.format(sockets=f" ws://{host} wss://{host}" if host else "").encode()
+    is_noted = False
 
+    def note(status: int) -> None:
+        nonlocal is_noted
+        if not is_noted:
+            # The query is left out, because it may hold a token. The path is quoted, so that it cannot forge a line.
+            path = quote(scope["path"], safe=_PLAIN)
+            _AUDIT.info("%s %s %d %s", scope.get("method", "SOCKET"), path, status, rights.value)
+        is_noted = True
 
-class _Answer:
-    """Sends the answer to a request with the headers that all answers have, and writes a line to the log."""
-
-    def __init__(self, scope: Scope, send: Send, group: str, policy: bytes) -> None:
-        self._send = send
-        self._scope = scope
-        self._group = group
-        self._headers = (*_HEADERS, (b"content-security-policy", policy))
-        self._is_noted = False
-        self._protocol = next((p for p in scope.get("subprotocols", ()) if p.startswith(_SUBPROTOCOL)), None)
-
-    async def __call__(self, message: MutableMapping[str, Any]) -> None:
+    async def send_more(message: Message) -> None:
         if message["type"] in ("http.response.start", "websocket.http.response.start"):
-            self._note(message["status"])
-            message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
+            note(message["status"])
+            more = (*_HEADERS, (b"content-security-policy", policy))
+            message = {**message, "headers": [*message.get("headers", ()), *more]}
         elif message["type"] == "websocket.accept":
-            self._note(HTTPStatus.SWITCHING_PROTOCOLS)
+            note(HTTPStatus.SWITCHING_PROTOCOLS)
             # A browser closes the socket if the server accepts none of the protocols that the browser offers.
-            message = {**message, "subprotocol": message.get("subprotocol") or self._protocol}
+            message = {**message, "subprotocol": message.get("subprotocol") or _find_protocol(scope)}
         elif message["type"] == "websocket.close":
-            self._note(HTTPStatus.FORBIDDEN)
-        await self._send(message)
+            note(HTTPStatus.FORBIDDEN)
+        await send(message)
 
-    def _note(self, status: int) -> None:
-        if self._is_noted:
-            return
-        self._is_noted = True
-        # The query is left out, because it may hold a token. The path is quoted, so that it cannot forge a second line.
-        path = quote(self._scope["path"], safe=_PLAIN)
-        _AUDIT.info("%s %s %d %s", self._scope.get("method", "SOCKET"), path, status, self._group)
+    return send_more

@@ -4,73 +4,53 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from contextlib import aclosing, asynccontextmanager
+from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from fastapi import APIRouter, FastAPI, WebSocket
+from fastapi import APIRouter, Body, FastAPI, HTTPException, WebSocket
 from fastapi.staticfiles import StaticFiles
-from pydantic import BaseModel
 
+from throwcollect.errors import NotFoundError
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
-from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
+from throwcollect.serve.instance_routes import make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
-from throwcollect.serve.models import Models, make_model_routes
-from throwcollect.serve.problem_responses import add_handlers, describe_problems, problem
+from throwcollect.serve.models import make_model_routes
+from throwcollect.serve.problem_responses import DESCRIPTION, HANDLERS
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
-from throwcollect.serve.state import Lookout, WholeState
-from throwcollect.serve.view_routes import make_description_routes, make_view_routes
-from throwcollect.serve.watching import StateWatch
+from throwcollect.serve.state import STATES, ComponentState, WholeState
+from throwcollect.serve.states import States
+from throwcollect.serve.view_routes import make_view_routes
 from throwcollect.version import __version__
 
 PREFIX = "/api/v1"
-_ALWAYS = (400, 403, 413, 421, 500)
-"""Statuses with which any request may fail."""
 _PAGE = Path(__file__).parent / "page"
 
 
-class Code(BaseModel):
-    """A one-time code."""
-
-    code: str
-
-
-class TokenAnswer(BaseModel):
-    """A token."""
-
-    token: str
-
-
-def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
+def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
     """Make the application, which belongs behind `access.Access`."""
     app = FastAPI(
         title="throwcollect",
         lifespan=_restore_speeds_meanwhile,
         version=__version__,
-        openapi_url="/openapi.json",
         docs_url=None,
         redoc_url=None,
+        exception_handlers=HANDLERS,
     )
-    add_handlers(app)
-    lookout = Lookout(instances.catalogue)
-    watch = StateWatch(lookout.look)
-    of_runs = (401, 404, 409, 422, 503)
-    for routes, statuses in (
-        (_make_public_routes(keys), ()),
-        (_make_general_routes(watch, keys), (401,)),
-        (make_component_routes(watch), (401, 404, 422)),
-        (make_instance_routes(instances, lookout), of_runs),
-        (make_log_routes(instances), of_runs),
-        (make_dataset_routes(instances), of_runs),
-        (make_description_routes(instances), of_runs),
-        (make_view_routes(instances), of_runs),
-        (make_model_routes(models), (401, 404, 422)),
+    states, bridges = States(instances.catalogue), Bridges()
+    for routes in (
+        _make_general_routes(states, keys),
+        make_instance_routes(instances, states),
+        make_log_routes(instances),
+        make_dataset_routes(instances),
+        make_view_routes(instances, bridges),
+        make_model_routes(models),
     ):
-        app.include_router(routes, prefix=PREFIX, responses=describe_problems(*_ALWAYS, *statuses))
-    app.include_router(make_rosbridge_routes(instances, Bridges()))
+        app.include_router(routes, prefix=PREFIX, responses=DESCRIPTION)
+    app.include_router(make_rosbridge_routes(instances, bridges))
     # Routes are tried in their order, and this last one takes all other paths.
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
@@ -84,7 +64,7 @@ async def _restore_speeds_meanwhile(_: FastAPI) -> AsyncIterator[None]:
     restoring.cancel()
 
 
-def _make_public_routes(keys: Keys) -> APIRouter:
+def _make_general_routes(states: States, keys: Keys) -> APIRouter:
     router = APIRouter()
 
     @router.get("/health")
@@ -92,40 +72,46 @@ def _make_public_routes(keys: Keys) -> APIRouter:
         """Whether it serves; for anybody."""
         return {"status": "ok", "version": __version__}
 
-    @router.post("/exchange", response_model=TokenAnswer, responses=describe_problems(422))
-    def exchange(code: Code) -> Any:
+    @router.post("/exchange")
+    def exchange(code: Annotated[str, Body(embed=True)]) -> dict[str, str]:
         """The token for a code that nobody has exchanged yet; for anybody who has one."""
-        token = keys.exchange(code.code)
-        if token is None:
-            return problem(403, "this code has been exchanged already, or is too old", hint="throwcollect view")
-        return TokenAnswer(token=token)
-
-    return router
-
-
-def _make_general_routes(watch: StateWatch, keys: Keys) -> APIRouter:
-    router = APIRouter()
+        if (token := keys.exchange(code)) is None:
+            raise HTTPException(
+                403, "this code has been exchanged already, or is too old; throwcollect view makes another"
+            )
+        return {"token": token}
 
     @router.post("/codes", status_code=201)
-    def make_code() -> Code:
+    def make_code() -> dict[str, str]:
         """A code that can be exchanged for the token once, for an address that is given to a browser."""
-        return Code(code=keys.new_code())
+        return {"code": keys.new_code()}
 
     @router.get("/state")
     async def state() -> WholeState:
         """The state of everything."""
-        return await watch.current()
+        return await states.read()
+
+    @router.get("/components")
+    async def components() -> list[ComponentState]:
+        """All components."""
+        return (await states.read()).components
+
+    @router.get("/components/{name}")
+    async def component(name: str) -> ComponentState:
+        """A component."""
+        for each in (await states.read()).components:
+            if each.name == name:
+                return each
+        raise NotFoundError(f"no component {name!r}")
 
     @router.websocket("/state")
-    async def states(socket: WebSocket) -> None:
+    async def follow(socket: WebSocket) -> None:
         await socket.accept()
-        await keep_telling(socket, _send_states(socket, watch))
+        await keep_telling(socket, _send_states(socket, states))
 
     return router
 
 
-async def _send_states(socket: WebSocket, watch: StateWatch) -> None:
-    # Without `aclosing`, the generator would go on listening after its client has left, until Python deletes it.
-    async with aclosing(watch.states()) as states:  # type: ignore[type-var]
-        async for text in states:
-            await socket.send_text(text.decode())
+async def _send_states(socket: WebSocket, states: States) -> None:
+    async for state in states.follow():
+        await socket.send_text(STATES.dump_json(state).decode())

@@ -8,18 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
-from throwcollect.config.containers import (
-    ContainerOptions,
-    ContainerPort,
-    ContainerSpec,
-    HostPort,
-    Mount,
-    NodeContainerConfig,
-    Size,
-    Variable,
-)
+from throwcollect.config.containers import ContainerSpec, Mount, NodeContainerConfig
 from throwcollect.config.document import Document
 from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.loader import load
@@ -45,10 +36,10 @@ def _check_name(text: str) -> str:
 Name = Annotated[str, AfterValidator(_check_name)]
 
 
-class ComponentSection(Section):
+class ComponentSection(NodeContainerConfig):
     """One component; exactly one of `config`, `session` and `image` says what its instances are.
 
-    The fields below `image` are only for components that have an image.
+    Properties of containers are only for components that have an image.
     """
 
     pretty_name: str | None = None
@@ -63,20 +54,8 @@ class ComponentSection(Section):
     """Image of a container, which may join a run."""
     command: list[str] | None = None
     """The command that the container runs; by default, that of the image."""
-    environment: dict[Variable, str | int | float] = Field(default_factory=dict)
-    """Further environment variables."""
-    volumes: list[Mount] = Field(default_factory=list)
+    mounts: list[Mount] = Field(default=[], alias="volumes")
     """Directories and files of the host that are mounted into the container; not below /data or /key."""
-    networks: list[str] = Field(default_factory=list)
-    """Networks of the engine that the container joins."""
-    ports: dict[ContainerPort, HostPort] = Field(default_factory=dict)
-    """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
-    cpus: PositiveFloat | None = None
-    """Upper bound of processor time, in cores."""
-    memory: Size | None = None
-    """Upper bound of memory; nothing is swapped out beyond it."""
-    options: ContainerOptions = Field(default_factory=ContainerOptions)
-    """Further options."""
     urdf: str | None = None
     """File with the description of the robot for viewers; relative to the catalogue."""
 
@@ -84,14 +63,10 @@ class ComponentSection(Section):
     def _is_one_thing(self) -> ComponentSection:
         if sum(each is not None for each in (self.config, self.session, self.image)) != 1:
             raise ValueError("should have one of config, session and image")
-        if self.image is None and (wrong := sorted(self.model_fields_set & _OF_CONTAINERS)):
+        given = self.model_fields_set & {*NodeContainerConfig.model_fields, "command", "urdf"}
+        if self.image is None and (wrong := sorted("volumes" if each == "mounts" else each for each in given)):
             raise ContradictionError(dict.fromkeys(wrong, "should be left out; it is for components with image"))
         return self
-
-
-_OF_CONTAINERS = frozenset(
-    ("command", "environment", "volumes", "networks", "ports", "cpus", "memory", "options", "urdf")
-)
 
 
 class CatalogueFile(Section):
@@ -167,8 +142,7 @@ def _read_component(name: str, section: ComponentSection, document: Document, di
                 read_urdf_text(urdf)
             except ConfigError as error:
                 raise ConfigError([document.problem(("components", name, "urdf"), error.message)]) from error
-        general = section.model_dump(include={"environment", "networks", "ports", "cpus", "memory", "options"})
-        node = NodeContainerConfig(**general, mounts=section.volumes)
+        node = NodeContainerConfig(**section.model_dump(include=set(NodeContainerConfig.model_fields)))
         source = ContainerSpec(section.image, None if section.command is None else tuple(section.command), node)
         return Component(name, pretty_name, "container", source, section.max_instances, urdf)
     config = directory / (section.config or section.session or "")

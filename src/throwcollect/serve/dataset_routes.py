@@ -19,7 +19,7 @@ from starlette.background import BackgroundTask
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import CARD, JOURNAL, MANIFEST, PROVENANCE, THROWS, config_path
 from throwcollect.dataset.journal import read_commits
-from throwcollect.dataset.manifest import read_manifest, size_of_file
+from throwcollect.dataset.manifest import FileEntry, read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
 from throwcollect.runs.records import Records
@@ -34,14 +34,6 @@ _OWN_FILES = {CARD, PROVENANCE}
 _MOST_LANDINGS = 20_000
 _JOURNAL_BYTES = 4_000_000
 """Most landings, and most bytes of a journal (about 15,000 throws), for one answer."""
-
-
-class DatasetFile(BaseModel):
-    """A file of a dataset."""
-
-    path: str
-    bytes: int
-    sha256: str
 
 
 class LandingPoints(BaseModel):
@@ -75,10 +67,9 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
         return describe(instances.resume(instance))
 
     @router.get("/files")
-    def files(instance: str) -> list[DatasetFile]:
+    def files(instance: str) -> tuple[FileEntry, ...]:
         """The files of a finished dataset, with their digests."""
-        directory = _find_finished(instances, instance)
-        return [DatasetFile(path=each.path, bytes=each.bytes, sha256=each.sha256) for each in read_manifest(directory)]
+        return read_manifest(_find_finished(instances, instance))
 
     @router.get("/files/{path:path}", response_class=FileResponse)
     def file(instance: str, path: str) -> FileResponse:

@@ -12,11 +12,10 @@ import ssl
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from http import HTTPStatus
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.request import HTTPSHandler, ProxyHandler, Request, build_opener
 
 from pydantic import TypeAdapter
 
@@ -72,10 +71,14 @@ def publish(address: Address) -> Iterator[None]:
         lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
         raise WorkerError(f"{path}: nobody would find this server: {error.strerror}") from error
+    is_first = False
     # A server holds the lock until it ends, even if it is killed. `is_locked` of a program holds it for a moment.
     deadline = time.monotonic() + _LOCK_S
-    while not (is_first := _lock(lock)) and time.monotonic() < deadline:
-        time.sleep(_POLL_S)
+    while not is_first and time.monotonic() < deadline:
+        with suppress(BlockingIOError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_first = True
+        time.sleep(0 if is_first else _POLL_S)
     if is_first:
         write_secret(path, _ADDRESS.dump_json(address))
     try:
@@ -86,23 +89,13 @@ def publish(address: Address) -> Iterator[None]:
         os.close(lock)
 
 
-def _lock(file: int) -> bool:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
-def log_path() -> Path:
-    """Log of a server that was started in the background."""
-    return state_directory() / _LOG
-
-
 def find_living() -> Address | None:
     """Find the server of this user, even one that does not answer; returns None if none lives."""
     # If a server was killed, another process may have got its port or pid. Only the lock proves that a server lives.
-    return _read() if is_locked(_find_path().with_name(_LOCK)) else None
+    with suppress(OSError, ValueError):
+        if is_locked(_find_path().with_name(_LOCK)):
+            return _ADDRESS.validate_json(_find_path().read_bytes())
+    return None
 
 
 def end_server() -> Address | None:
@@ -128,7 +121,7 @@ def find_server() -> Address | None:
         return None
     try:
         _ask(address, "GET", "/api/v1/health")
-    except (OSError, ValueError, http.client.HTTPException):
+    except (OSError, ValueError):
         return None
     return address
 
@@ -137,7 +130,7 @@ def ensure_server() -> Address:
     """Find the server of this user; if there is none, start one, which outlives this process."""
     if (address := find_server()) is not None:
         return address
-    log = log_path()
+    log = state_directory() / _LOG
     words = [*make_command(), "serve", "--json"]
     with open(open_log(log), "ab") as output:
         # Standard output has a one-time code. It does not go to the log, which the user may let others read.
@@ -163,28 +156,27 @@ def make_page_address(address: Address, run: str | None = None) -> str:
     """Make an address of the page, on one run or all, that can be opened once, within ten minutes."""
     try:
         return address.page(_ask(address, "POST", "/api/v1/codes")["code"], run)
-    except (OSError, ValueError, KeyError, http.client.HTTPException) as error:
+    except (OSError, ValueError, KeyError) as error:
         raise WorkerError(f"{address.url}: the server does not answer: {error}") from error
 
 
 def _ask(address: Address, method: str, path: str) -> dict[str, str]:
-    parts = urlsplit(address.url)
-    host, port = parts.hostname or "", parts.port
-    if address.certificate is None:
-        connection = http.client.HTTPConnection(host, port, timeout=_ANSWER_S)
-    else:
+    """Ask a server; raises an OSError or a ValueError if it does not answer as it should."""
+    context = None
+    if address.certificate is not None:
         # Only this one certificate is accepted, so the names in it and its issuer do not matter.
         context = ssl.create_default_context(cafile=address.certificate)
         context.check_hostname = False
         context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
-        connection = http.client.HTTPSConnection(host, port, timeout=_ANSWER_S, context=context)
-    with closing(connection):
-        connection.request(method, path, headers={"Authorization": f"Bearer {address.token}"})
-        answer = connection.getresponse()
-        content = json.loads(answer.read())
-    if answer.status >= HTTPStatus.BAD_REQUEST or not isinstance(content, dict):
-        raise ValueError(f"{path}: status {answer.status}")
-    return content
+    headers = {"Authorization": f"Bearer {address.token}"}
+    request = Request(address.url + path, method=method, headers=headers)  # noqa: S310 - a server wrote the address
+    # A proxy of the environment must not be asked for a server of this machine.
+    opener = build_opener(ProxyHandler({}), HTTPSHandler(context=context))
+    try:
+        with opener.open(request, timeout=_ANSWER_S) as answer:
+            return dict(json.loads(answer.read()))
+    except http.client.HTTPException as error:
+        raise ValueError(f"{path}: {error}") from error
 
 
 _ADDRESS = TypeAdapter(Address)
@@ -192,10 +184,3 @@ _ADDRESS = TypeAdapter(Address)
 
 def _find_path() -> Path:
     return state_directory() / _FILE
-
-
-def _read() -> Address | None:
-    try:
-        return _ADDRESS.validate_json(_find_path().read_bytes())
-    except (OSError, ValueError):
-        return None

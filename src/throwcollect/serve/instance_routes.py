@@ -1,4 +1,4 @@
-"""REST on components and instances."""
+"""REST on instances."""
 
 from __future__ import annotations
 
@@ -7,22 +7,28 @@ import time
 from collections import deque
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, StrictInt
 
+from throwcollect.errors import NotFoundError
 from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS, parse
 from throwcollect.runs.run_record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.catalogue import LONGEST_NAME
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.problem_responses import describe_bytes, problem
-from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
-from throwcollect.serve.watching import StateWatch
+from throwcollect.serve.state import InstanceState, describe
+from throwcollect.serve.states import States
 from throwcollect.wording import suggest
+
+
+class Lines(Response):
+    """An answer of lines, each in JSON."""
+
+    media_type = "application/x-ndjson"
 
 
 class InstanceRequest(BaseModel):
@@ -49,41 +55,24 @@ class Scaling(BaseModel):
     simulations: StrictInt = Field(ge=0, le=256)
 
 
-def make_component_routes(watch: StateWatch) -> APIRouter:
-    """Make the routes on components."""
-    router = APIRouter(prefix="/components")
-
-    @router.get("")
-    async def components() -> list[ComponentState]:
-        """All components."""
-        return (await watch.current()).components
-
-    @router.get("/{name}", response_model=ComponentState)
-    async def component(name: str) -> Any:
-        """A component."""
-        components = (await watch.current()).components
-        found = next((each for each in components if each.name == name), None)
-        return found or problem(404, f"no component {name!r}")
-
-    return router
-
-
-def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
+def make_instance_routes(instances: Instances, states: States) -> APIRouter:
     """Make the routes on instances."""
-    router = APIRouter(prefix="/instances")
+    router = APIRouter()
 
-    @router.get("")
+    @router.get("/instances")
     def all_instances() -> list[InstanceState]:
         """All runs that this machine remembers, the latest first."""
-        return lookout.list_instances()
+        return states.list_instances()
 
-    @router.get("/{instance}")
+    @router.get("/instances/{instance}")
     def one(instance: str) -> InstanceState:
         """A run."""
         return describe(instances.get(instance))
 
     @router.put(
-        "/{instance}", status_code=202, responses={200: {"model": InstanceState, "description": "It was begun before"}}
+        "/instances/{instance}",
+        status_code=202,
+        responses={200: {"model": InstanceState, "description": "It was begun before"}},
     )
     def put(instance: str, request: InstanceRequest, response: Response) -> InstanceState:
         """Begin an instance of a component; the same request again changes nothing."""
@@ -92,24 +81,24 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
             response.status_code = 200
         return describe(run)
 
-    @router.post("", status_code=202)
+    @router.post("/instances", status_code=202)
     def post(request: InstanceRequest, response: Response) -> InstanceState:
         """Begin an instance of a component, with an id that is chosen here."""
         run, _ = instances.put(make_id(request.component), request.origin)
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
 
-    @router.delete("", status_code=202)
+    @router.delete("/instances", status_code=202)
     def delete_all() -> list[str]:
         """Stop all living runs that clients have begun; returns their ids."""
         return instances.stop_all()
 
-    @router.delete("/{instance}", status_code=202)
+    @router.delete("/instances/{instance}", status_code=202)
     def delete(instance: str, force: bool = False) -> None:
         """Stop a run: running trials are finished; by force, everything ends at once, and the run is forgotten."""
         instances.stop(instance, force=force)
 
-    @router.patch("/{instance}", status_code=202)
+    @router.patch("/instances/{instance}", status_code=202)
     def patch(instance: str, scaling: Scaling) -> InstanceState:
         """Change the number of simulations of a run."""
         return describe(instances.scale(instance, scaling.simulations))
@@ -117,18 +106,12 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     return router
 
 
-def make_id(component: str) -> str:
-    """Make an id for an instance of a component, from the component's name, cut if too long, and the present time."""
-    suffix = f"-{time.time_ns() // 1_000_000:x}"
-    return component[: LONGEST_NAME - len(suffix)] + suffix
-
-
 def make_log_routes(instances: Instances) -> APIRouter:
     """Make the routes on logs of nodes and events of runs."""
-    router = APIRouter(prefix="/instances")
+    router = APIRouter()
 
-    @router.get("/{instance}/log/{node}", response_class=PlainTextResponse)
-    def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> Any:
+    @router.get("/instances/{instance}/log/{node}", response_class=PlainTextResponse)
+    def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> PlainTextResponse:
         """The last lines of what a node has printed."""
         # The name is only compared with names of files in the directory, so it cannot lead out of the directory.
         files = NodeLogs(Path(instances.get(instance).record.logs)).files()
@@ -136,9 +119,9 @@ def make_log_routes(instances: Instances) -> APIRouter:
             with open(open_log(files[node], os.O_RDONLY), encoding="utf-8", errors="replace") as file:
                 return PlainTextResponse("".join(deque(file, tail)))
         except (KeyError, OSError):
-            return problem(404, f"run {instance} has no log of {node!r}{suggest(node, files)}")
+            raise NotFoundError(f"run {instance} has no log of {node!r}{suggest(node, files)}") from None
 
-    @router.get("/{instance}/events", response_class=Response, responses=describe_bytes("application/x-ndjson"))
+    @router.get("/instances/{instance}/events", response_class=Lines)
     def events(instance: str) -> Response:
         """What has happened in a run, one event in JSON a line."""
         record = instances.get(instance).record
@@ -150,6 +133,12 @@ def make_log_routes(instances: Instances) -> APIRouter:
         ):
             # If the run resumes a dataset, the file has the events of earlier runs, too.
             told += (line for line in file if (event := parse(line)) and event.run == record.run)
-        return Response("".join(told), media_type="application/x-ndjson")
+        return Lines("".join(told))
 
     return router
+
+
+def make_id(component: str) -> str:
+    """Make an id for an instance of a component, from the component's name, cut if too long, and the present time."""
+    suffix = f"-{time.time_ns() // 1_000_000:x}"
+    return component[: LONGEST_NAME - len(suffix)] + suffix

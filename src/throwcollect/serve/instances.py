@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import re
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,17 +25,16 @@ from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
-from throwcollect.runs.run_record import Origin, RunRecord
+from throwcollect.runs.run_record import Origin
 from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
-from throwcollect.serve.resumption import check_resumption
 from throwcollect.serve.robot_files import description_of
-from throwcollect.serve.state import simulations_of
-from throwcollect.state_directory import state_directory
+from throwcollect.serve.state import explain_refusal, simulations_of
 
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
-_LOCK = "instances.lock"
+_ONE_AT_A_TIME = threading.Lock()
+"""Held while an instance is begun or stopped, so that several requests together do not begin one too many."""
 _LOOK_S = 0.02
 _LONGEST_STOP_S = 2.0
 """Longest wait for a launcher to write into its record that it is stopping."""
@@ -59,12 +57,7 @@ class Instances:
         # Ids become names of files, so they must not hold a slash, for example.
         if not re.fullmatch(ENTRY, instance):
             raise NotFoundError(f"no run {instance!r}", expected="at most 80 of letters, digits, -, _ and .")
-        try:
-            return Records().get(instance)
-        except NotFoundError:
-            raise
-        except ConfigError as error:
-            raise ConflictError(error.problems, hint=error.hint) from error
+        return Records().get(instance)
 
     def put(self, instance: str, origin: Origin) -> tuple[Run, bool]:
         """Begin an instance, unless the same request has begun it already; returns the run, and whether it is new."""
@@ -73,7 +66,7 @@ class Instances:
             raise ConfigError(f"no instance can have the id {instance!r}", expected="at most 63 of a-z, 0-9, - and _")
         _check_request(origin, component)
         overrides = _write_overrides(origin)
-        with _one_at_a_time():
+        with _ONE_AT_A_TIME:
             with suppress(NotFoundError):
                 run = self.get(instance)
                 if run.record.origin == origin:
@@ -85,7 +78,9 @@ class Instances:
                 return begin_container(order, run=instance, origin=origin, urdf=component.urdf), True
             directory = self.datasets / instance
             if component.kind == "collection":
-                _refuse_taken(directory)
+                # The run would refuse it, too, but only after the client got its answer.
+                with _conflicts(hint="choose another id"):
+                    refuse_taken(directory)
             run = begin_run(
                 component.source,
                 overrides=overrides,
@@ -100,8 +95,9 @@ class Instances:
         """Begin a new run, which continues the dataset of a run that has ended."""
         run = self.get(instance)
         origin = run.record.origin
-        with _one_at_a_time():
-            check_resumption(run.now())
+        with _ONE_AT_A_TIME:
+            if (reason := explain_refusal(run.now())) is not None:
+                raise ConflictError(reason)
             for other in Records().into(run.context.directory):
                 if other.status == "running":
                     raise ConflictError(f"run {other.id} collects into the dataset of run {run.id}")
@@ -120,7 +116,7 @@ class Instances:
         if force or run.status == "died":
             control.down(run)
         elif not (run.lives and run.record.stopping):
-            with _one_at_a_time():
+            with _ONE_AT_A_TIME:
                 _stop_once(run)
 
     def stop_all(self) -> list[str]:
@@ -135,7 +131,8 @@ class Instances:
     def scale(self, instance: str, simulations: int) -> Run:
         """Ask an instance for another number of simulations."""
         run = self.get(instance)
-        _require_living(run)
+        with _conflicts():
+            require_living(run)
         control.scale(run, simulations)
         return run.now()
 
@@ -146,7 +143,8 @@ class Instances:
         own = description_of(run)
         if urdf is not None:
             check_appearance(own, urdf)
-        record = _require_living(run)
+        with _conflicts():
+            record = require_living(run)
         config = load(config_path(run.context.directory))
         nodes = [name_node(config, name) for name in simulations_of(record.nodes)]
         if not nodes:
@@ -156,15 +154,13 @@ class Instances:
                 raise ConflictError(f"run {run.id}: {result.reason}")
 
 
-def _require_living(run: Run) -> RunRecord:
-    """Check that a run lives, and return its record.
-
-    A run that died is a `ConflictError` here, too, because it is no failure of the server.
-    """
+@contextmanager
+def _conflicts(hint: str | None = None) -> Iterator[None]:
+    """Turn errors into conflicts, because neither the request is wrong nor does the server fail."""
     try:
-        return require_living(run)
-    except WorkerError as error:
-        raise ConflictError(error.message, hint=error.hint) from error
+        yield
+    except (ConfigError, WorkerError) as error:
+        raise ConflictError(error.message, hint=hint or error.hint) from error
 
 
 def _stop_once(run: Run) -> None:
@@ -181,25 +177,14 @@ def _stop_once(run: Run) -> None:
         now = run.now()
 
 
-def _refuse_taken(directory: Path) -> None:
-    """Refuse a directory that is not empty. The run would refuse it, too, but only after the client got its answer."""
-    try:
-        refuse_taken(directory)
-    except ConfigError as error:
-        raise ConflictError(error.problems, hint="choose another id") from error
-
-
 def _check_request(origin: Origin, component: Component) -> None:
-    """Refuse a request with fields that do not fit the kind of component."""
-    problems = []
-    if component.kind != "container" and origin.joins is not None:
-        problems.append(Problem(f"{component.name} is a {component.kind}; containers join runs", key="joins"))
-    if component.kind == "container" and origin.simulations is not None:
-        problems.append(Problem(f"{component.name} is a container, and has no simulations", key="simulations"))
-    if component.kind == "container" and origin.changes:
-        problems.append(Problem(f"{component.name} is a container, and has no configuration", key="set"))
-    if problems:
-        raise ConfigError(problems)
+    """Reject a request with fields that do not fit the kind of component."""
+    given = {"joins": origin.joins, "simulations": origin.simulations, "set": origin.changes or None}
+    fit = {"joins"} if component.kind == "container" else {"simulations", "set"}
+    wrong = [key for key, value in given.items() if value is not None and key not in fit]
+    if wrong:
+        what = f"{component.name} is a {component.kind}, for which this cannot be set"
+        raise ConfigError([Problem(what, key=key) for key in wrong])
 
 
 def _check_room(component: Component) -> None:
@@ -214,35 +199,18 @@ def _check_room(component: Component) -> None:
         )
 
 
-@contextmanager
-def _one_at_a_time() -> Iterator[None]:
-    """Hold a lock of the machine, so that several requests or servers together do not begin one instance too many."""
-    path = state_directory() / _LOCK
-    try:
-        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-    except OSError as error:
-        raise WorkerError(f"{path}: no instance can be begun: {error.strerror}") from error
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(lock)
-
-
 def _write_overrides(origin: Origin) -> list[str]:
     """Write the keys that a request sets as ``--set`` takes them."""
+    kept = list_operator_keys()
     problems = [
-        *(
-            Problem("should be a dotted key, of letters, digits, - and _", key=key)
-            for key in origin.changes
-            if not re.fullmatch(_KEY, key)
-        ),
-        *(
-            Problem("may be set only by the operator, not by a request", key=kept)
-            for key, value in origin.changes.items()
-            for kept in list_operator_keys()
-            if _sets(key.split("."), value, kept.split("."))
-        ),
+        Problem("should be a dotted key, of letters, digits, - and _", key=key)
+        for key in origin.changes
+        if not re.fullmatch(_KEY, key)
+    ] + [
+        Problem("may be set only by the operator, not by a request", key=each)
+        for key, value in origin.changes.items()
+        for each in kept
+        if any(_overlap(path, each.split(".")) for path in _list_paths(key.split("."), value))
     ]
     if problems:
         raise ConfigError(problems)
@@ -252,10 +220,15 @@ def _write_overrides(origin: Origin) -> list[str]:
     return overrides
 
 
-def _sets(key: list[str], value: JsonValue, kept: list[str]) -> bool:
-    """Whether setting a key to a value also sets another key: the same, one above it, or one inside the value."""
-    if not kept:
-        return True
-    if key:
-        return kept[0] in ("*", key[0]) and _sets(key[1:], value, kept[1:])
-    return isinstance(value, dict) and any(_sets(each.split("."), inner, kept) for each, inner in value.items())
+def _list_paths(key: list[str], value: JsonValue) -> Iterator[list[str]]:
+    """Paths of all keys that setting a key to a value sets."""
+    if isinstance(value, dict) and value:
+        for name, inner in value.items():
+            yield from _list_paths([*key, *name.split(".")], inner)
+    else:
+        yield key
+
+
+def _overlap(path: list[str], kept: list[str]) -> bool:
+    """Whether two paths are the same, or one is above the other; ``*`` stands for any name."""
+    return all(own in (other, "*") for own, other in zip(kept, path, strict=False))

@@ -1,8 +1,8 @@
 """Simulations that are slowed down to real time as long as somebody watches them live.
 
-For each simulation that is watched, there is a file beside the key of the run. Each watcher holds a shared lock of the
-file, which ends with the server. So any server can find files without a lock, and with them the simulations that nobody
-watches any more, even if the server of their watchers was killed.
+For each simulation that was watched, there is a file beside the key of the run, which is not empty as long as the
+simulation is slow. Each watcher holds a shared lock of the file, which ends with the server. So any server can find the
+simulations that nobody watches any more, even if the server of their watchers was killed.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Hold:
             except WorkerError:
                 # The simulation may be busy: the file stays, so that `restore_abandoned` tries again.
                 return
-            _find_lock_path(self.run, self.simulation).unlink(missing_ok=True)
+            os.ftruncate(self.lock, 0)
         finally:
             os.close(self.lock)
 
@@ -97,7 +97,7 @@ def restore_abandoned() -> None:
     with suppress(ThrowcollectError, OSError):
         for run in Records().all():
             for note in sorted(_find_lock_path(run, "").glob("*")) if run.status == "running" else ():
-                with suppress(FileNotFoundError):
+                if note.stat().st_size:
                     Hold(run, note.name, os.open(note, os.O_RDWR)).restore_speed()
 
 
@@ -107,16 +107,12 @@ def _find_lock_path(run: Run, simulation: str) -> Path:
 
 
 def _share(path: Path) -> int:
-    """Share the lock of a file from now on, and return the file's descriptor."""
+    """Share the lock of a file from now on, note in it that the simulation is slow, and return its descriptor."""
     path.parent.mkdir(exist_ok=True)
-    while True:
-        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-        fcntl.flock(lock, fcntl.LOCK_SH)
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(lock), path.stat()):
-                return lock
-        # The last watcher has removed the file after it was opened and before it was locked here.
-        os.close(lock)
+    lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    fcntl.flock(lock, fcntl.LOCK_SH)
+    os.pwrite(lock, b"slow", 0)
+    return lock
 
 
 def _runs(run: Run, simulation: str) -> bool:

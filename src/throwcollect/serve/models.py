@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -60,80 +58,59 @@ class AimView(BaseModel):
     nearest: list[float]
 
 
-@dataclass(frozen=True)
-class Models:
-    """The models in a directory, which are only read.
-
-    Attributes:
-        directory: The directory that holds a directory for each model. It need not exist.
-    """
-
-    directory: Path
-
-    def names(self) -> list[str]:
-        """Names of the models."""
-        try:
-            names = sorted(os.listdir(self.directory))
-        except OSError:
-            return []
-        return [each for each in names if re.fullmatch(ENTRY, each) and (self.directory / each / MODEL).is_file()]
-
-    def view(self, name: str) -> ModelView:
-        """Describe a model."""
-        model = self._load(name)
-        trained, ends = model.trained_on, model.learned.outputs
-        return ModelView(
-            name=name,
-            learned_from=trained.name,
-            throws=trained.throws,
-            error=trained.error,
-            parameters=list(model.parameters),
-            targets=list(model.targets),
-            given=list(model.given),
-            # The step is rounded up, so that there are never more points than allowed.
-            reached=ends[:: max(1, -(-len(ends) // _MOST_POINTS))].tolist(),
-            adaptation=model.adaptation,
-            score=read_score(self.directory / name),
-        )
-
-    def aim(self, name: str, target: Sequence[float]) -> AimView:
-        """Find parameters for a target: values of the model's targets, then of the keys that are given with them."""
-        (aim,) = self._load(name).aim([target])
-        return AimView(**aim.as_dict())
-
-    def _load(self, name: str) -> Model:
-        # Names of models become names of directories.
-        if not re.fullmatch(ENTRY, name) or not (self.directory / name / MODEL).is_file():
-            raise NotFoundError(
-                f"no model {name!r}", hint=f"throwcollect fit makes models; they belong in {self.directory}"
-            )
-        directory = self.directory / name
-        changed = [path.stat().st_mtime_ns for path in (directory / MODEL, directory / POINTS) if path.exists()]
-        return _load(directory, *changed)
-
-
-@lru_cache(maxsize=8)
-def _load(directory: Path, *_changed_ns: int) -> Model:
-    return load_model(directory)
-
-
-def make_model_routes(models: Models) -> APIRouter:
-    """Make the routes on models, none of which changes a model."""
+def make_model_routes(directory: Path) -> APIRouter:
+    """Make the routes on the models of a directory, which need not exist; none of them changes a model."""
     router = APIRouter(prefix="/models")
 
     @router.get("")
     def names() -> list[str]:
         """Names of all models."""
-        return models.names()
+        if not directory.is_dir():
+            return []
+        return [each for each in sorted(os.listdir(directory)) if _is_model(directory, each)]
 
     @router.get("/{model}")
     def view(model: str) -> ModelView:
         """The throws that a model was learned from, its misses, and the effect of adapting it."""
-        return models.view(model)
+        found = _find(directory, model)
+        trained, ends = found.trained_on, found.learned.outputs
+        return ModelView(
+            name=model,
+            learned_from=trained.name,
+            throws=trained.throws,
+            error=trained.error,
+            parameters=list(found.parameters),
+            targets=list(found.targets),
+            given=list(found.given),
+            # The step is rounded up, so that there are never more points than allowed.
+            reached=ends[:: max(1, -(-len(ends) // _MOST_POINTS))].tolist(),
+            adaptation=found.adaptation,
+            score=read_score(directory / model),
+        )
 
     @router.get("/{model}/aim")
     def aim(model: str, at: Annotated[list[float], Query()]) -> AimView:
         """The parameters of a throw at a target: values of the model's targets, then of the keys given with them."""
-        return models.aim(model, at)
+        (found,) = _find(directory, model).aim([at])
+        return AimView(**found.as_dict())
 
     return router
+
+
+def _is_model(directory: Path, name: str) -> bool:
+    # Names of models become names of directories.
+    return bool(re.fullmatch(ENTRY, name)) and (directory / name / MODEL).is_file()
+
+
+def _find(directory: Path, name: str) -> Model:
+    if not _is_model(directory, name):
+        raise NotFoundError(f"no model {name!r}", hint=f"throwcollect fit makes models; they belong in {directory}")
+    changed = [
+        path.stat().st_mtime_ns for path in (directory / name / MODEL, directory / name / POINTS) if path.exists()
+    ]
+    return _load(directory / name, *changed)
+
+
+@lru_cache(maxsize=8)
+def _load(directory: Path, *_changed_ns: int) -> Model:
+    return load_model(directory)

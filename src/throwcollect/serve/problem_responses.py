@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from throwcollect.errors import (
@@ -32,18 +32,21 @@ _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
 )
 """Status of each kind of error, the first that fits; that of any other is 500."""
 
-_SCHEMA = {
-    "type": "object",
-    "required": ["title", "status"],
-    "properties": {
-        "title": {"type": "string", "description": "Where and what."},
-        "status": {"type": "integer"},
-        "expected": {"type": "string", "description": "What would have been right."},
-        "evidence": {"type": "string", "description": "What was seen."},
-        "hint": {"type": "string", "description": "What gets further."},
-        "problems": {"type": "array", "items": {"type": "object"}, "description": "Each key that is wrong."},
-    },
-}
+
+class ProblemFacts(BaseModel):
+    """What the answer to a request with an error consists of."""
+
+    title: str
+    """Where and what."""
+    status: int
+    expected: str | None = None
+    """What would have been right."""
+    evidence: str | None = None
+    """What was seen."""
+    hint: str | None = None
+    """What gets further."""
+    problems: list[dict[str, Any]] | None = None
+    """Each key that is wrong, with a message."""
 
 
 class ProblemResponse(JSONResponse):
@@ -54,19 +57,8 @@ class ProblemResponse(JSONResponse):
 
 def problem(status: int, title: str, headers: dict[str, str] | None = None, **facts: Any) -> ProblemResponse:
     """Make the answer that describes a problem: status, title, and those of the further ``facts`` that are not None."""
-    content = {"title": title, "status": status, **{key: value for key, value in facts.items() if value is not None}}
+    content = ProblemFacts(title=title, status=status, **facts).model_dump(exclude_none=True)
     return ProblemResponse(content, status_code=status, headers=headers)
-
-
-def describe_bytes(media_type: str) -> dict[int | str, dict[str, Any]]:
-    """Describe an answer that is no JSON, for the description of a request."""
-    return {200: {"description": "OK", "content": {media_type: {}}}}
-
-
-def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Describe the problems of some statuses, for the description of a request."""
-    content = {ProblemResponse.media_type: {"schema": _SCHEMA}}
-    return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
 
 
 def answer(error: ThrowcollectError) -> ProblemResponse:
@@ -80,29 +72,34 @@ def answer(error: ThrowcollectError) -> ProblemResponse:
     )
 
 
-def add_handlers(app: FastAPI) -> None:
-    """Make an application answer errors with problems."""
+async def answer_any(_: Request, error: Exception) -> ProblemResponse:
+    """Answer an error of any kind: our own, one that FastAPI or Starlette raises, or an unexpected one."""
+    match error:
+        case ThrowcollectError():
+            return answer(error)
+        case RequestValidationError():
+            return answer(ConfigError([_describe(each) for each in error.errors()]))
+        case HTTPException():
+            return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
+    # Starlette raises the error again after this answer, so that it gets into the log.
+    return problem(500, "internal error", hint="the log of the server says where; please report it")
 
-    @app.exception_handler(ThrowcollectError)
-    async def own(_: Request, error: ThrowcollectError) -> ProblemResponse:
-        return answer(error)
 
-    @app.exception_handler(Exception)
-    async def answer_unexpected(_: Request, __: Exception) -> ProblemResponse:
-        # Starlette raises the error again after this answer, so that it gets into the log.
-        return problem(500, "internal error", hint="the log of the server says where; please report it")
-
-    @app.exception_handler(HTTPException)
-    async def http(_: Request, error: HTTPException) -> ProblemResponse:
-        return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
-
-    @app.exception_handler(RequestValidationError)
-    async def invalid(_: Request, error: RequestValidationError) -> ProblemResponse:
-        return answer(ConfigError([_describe(each) for each in error.errors()]))
+DESCRIPTION: dict[int | str, dict[str, Any]] = {
+    "default": {
+        "description": "An error",
+        "content": {ProblemResponse.media_type: {"schema": ProblemFacts.model_json_schema()}},
+    }
+}
+"""What the description of the interface tells of errors."""
+HANDLERS: dict[int | type[Exception], Any] = dict.fromkeys(
+    (ThrowcollectError, RequestValidationError, HTTPException, Exception), answer_any
+)
+"""The handlers of errors of the application."""
 
 
 def _describe(error: Mapping[str, Any]) -> Problem:
-    """Describe one value of a request that FastAPI refuses; the first part of its place is ``body`` or ``query``."""
+    """Describe one value of a request that FastAPI rejects; the first part of its place is ``body`` or ``query``."""
     part, *place = error["loc"]
     key = "" if error["type"] == "json_invalid" else ".".join(map(str, place))
     return Problem(error["msg"] if key else f"{part}: {error['msg']}", key=key)

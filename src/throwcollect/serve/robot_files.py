@@ -105,12 +105,9 @@ def find_mesh(package: str, path: str) -> Path:
 
 def _find_carried(*names: str) -> Path | None:
     """Find a mesh that a dataset of a run carries; it does not matter which one, as names are made of contents."""
-    for is_known in (True, False):
-        if not is_known:
-            _look_for_carried()
-        if found := [file for name in names if (file := _carried.get(name)) is not None and file.is_file()]:
-            return found[0]
-    return None
+    if not any(name in _carried and _carried[name].is_file() for name in names):
+        _look_for_carried()
+    return next((file for name in names if (file := _carried.get(name)) is not None and file.is_file()), None)
 
 
 def _look_for_carried() -> None:
@@ -149,13 +146,11 @@ def list_meshes(description: str) -> list[MeshFile]:
 
 def find_mesh_by_content(sha256: str) -> Path:
     """Find the file of a mesh of one of the robots by the SHA-256 of its content, in hexadecimal."""
-    for text, _ in _read_descriptions():
-        for _, _, file in _find_files(text):
-            if _digest(file, file.stat().st_mtime_ns) == sha256:
-                return file
+    known = [file for text, _ in _read_descriptions() for _, _, file in _find_files(text)]
     carried = _find_carried(*(f"{sha256[:16]}{kind}" for kind in _KINDS))
-    if carried is not None and _digest(carried, carried.stat().st_mtime_ns) == sha256:
-        return carried
+    for file in [*known, *([carried] if carried else [])]:
+        if _digest(file, file.stat().st_mtime_ns) == sha256:
+            return file
     raise NotFoundError(f"no mesh with the SHA-256 {sha256}")
 
 

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 
 from fastapi import APIRouter, WebSocket
 
-from throwcollect.errors import ConflictError, ThrowcollectError
-from throwcollect.ros.connection import Connection
+from throwcollect.errors import ConflictError, ThrowcollectError, UnreachableError
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
-from throwcollect.serve.sockets import NOT_FOUND, close, refuse, refuse_ended, wait_for_end
-
-_LOOK_S = 0.5
+from throwcollect.serve.sockets import close, refuse, refuse_ended, wait_for_end
+from throwcollect.serve.throws import ThrowWatch
 
 
 @dataclass
-class _Shared:
+class SharedBridge:
+    """The bridge of a run, what it hears of throws, and the number of its clients."""
+
     bridge: Bridge
-    following: asyncio.Task[None]
+    throws: ThrowWatch
     clients: int = 0
 
 
@@ -31,38 +31,32 @@ class Bridges:
     """Makes the bridge of a run for its first client, and closes it after its last."""
 
     def __init__(self) -> None:
-        self._shared: dict[str, _Shared] = {}
+        self._shared: dict[str, SharedBridge] = {}
+        self._one_at_a_time = asyncio.Lock()
 
     @asynccontextmanager
-    async def bridge(self, run: Run) -> AsyncIterator[Bridge]:
-        """The bridge of a run, for one more client."""
-        if (shared := self._shared.get(run.id)) is None:
-            run.record.middleware.joining.settle()
-            bridge = Bridge(run.connection)
-            shared = self._shared[run.id] = _Shared(bridge, asyncio.create_task(_follow(run, bridge)))
+    async def share(self, run: Run) -> AsyncIterator[SharedBridge]:
+        """The bridge of a run, for one more client; a bridge that has lost its router is no longer used."""
+        async with self._one_at_a_time:
+            if (shared := self._shared.get(run.id)) is None or shared.bridge.is_over:
+                bridge = await asyncio.to_thread(_join, run)
+                shared = self._shared[run.id] = SharedBridge(bridge, ThrowWatch(run, bridge))
         shared.clients += 1
         try:
-            yield shared.bridge
+            yield shared
         finally:
             shared.clients -= 1
             if not shared.clients:
-                del self._shared[run.id]
-                shared.following.cancel()
+                if self._shared.get(run.id) is shared:
+                    del self._shared[run.id]
                 await asyncio.to_thread(shared.bridge.close)
 
 
-async def _follow(run: Run, bridge: Bridge) -> None:
-    """Give a bridge the connection to the router of its run whenever the connection changes."""
-    known = run.connection
-    while True:
-        await asyncio.sleep(_LOOK_S)
-        connection: Connection | None = None
-        # A run that was forgotten raises an error, and has no router.
-        with suppress(ThrowcollectError):
-            connection = (await asyncio.to_thread(run.now)).connection
-        if connection != known:
-            known = connection
-            bridge.move(connection)
+def _join(run: Run) -> Bridge:
+    if run.connection is None:
+        raise UnreachableError(f"run {run.id} has no router yet; connect again")
+    run.record.middleware.joining.settle()
+    return Bridge(run.connection)
 
 
 def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
@@ -84,22 +78,20 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
     async with AsyncExitStack() as stack:
         try:
             run = await asyncio.to_thread(find_run)
-            bridge = await stack.enter_async_context(bridges.bridge(run))
+            bridge = (await stack.enter_async_context(bridges.share(run))).bridge
         except ThrowcollectError as error:
-            await refuse(socket, NOT_FOUND, error.message)
+            await refuse(socket, error)
             return
-        ending = asyncio.create_task(_close_at_end(socket, run))
+        ending = asyncio.create_task(_close_at_end(socket, run, bridge))
         stack.callback(ending.cancel)
         await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
 
 
-async def _close_at_end(socket: WebSocket, run: Run) -> None:
+async def _close_at_end(socket: WebSocket, run: Run, bridge: Bridge) -> None:
     try:
-        await wait_for_end(run)
+        await wait_for_end(run, bridge)
     except ThrowcollectError as error:
-        # If the client has left meanwhile, the socket is closed already.
-        with suppress(RuntimeError):
-            await close(socket, NOT_FOUND, error.message)
+        await close(socket, error)
 
 
 def _find(instances: Instances, instance: str) -> Run:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import logging.handlers
 import os
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -21,14 +20,12 @@ from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.finding import Address, publish
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.models import Models
 from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 
 _PORT = 8080
 """Port to serve at if the user names none and it is free."""
 WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
 """This implementation of WebSockets waits for a client that reads slowly, and does not collect frames in memory."""
-_PEM = "a certificate and its key without a password, both in PEM"
 _END_S = 2.5
 """Time within which the process ends after a signal."""
 
@@ -43,28 +40,30 @@ class Tls:
 
 def serve(
     instances: Instances,
-    models: Models,
+    models: Path,
     *,
     host: str = "127.0.0.1",
     port: int | None = None,
     tls: Tls | None = None,
     origins: frozenset[str] = frozenset(),
     names: frozenset[str] = frozenset(),
+    keys: Keys | None = None,
     tell: Callable[[Address, str], None],
 ) -> None:
     """Serve until a signal asks the process to end.
 
     Args:
         instances: All runs, and what can be done with them.
-        models: All models.
+        models: Directory of models.
         host: Address to listen at.
         port: Port to listen at, 0 for any free one; None for 8080, or any free one if 8080 is taken.
         tls: Certificate and key; None to speak in the clear.
         origins: Further origins of pages that may connect.
         names: Host names by which clients know this machine, besides the address.
+        keys: The tokens; None for new ones.
         tell: Called once, when the server can be reached, with the server's address and a one-time code.
     """
-    keys = Keys()
+    keys = keys or Keys()
     with _listen(host, port) as listener:
         bound = listener.getsockname()[1]
         scheme = "https" if tls else "http"
@@ -117,15 +116,12 @@ class _Server(uvicorn.Server):
 
 def _load(config: uvicorn.Config) -> None:
     """Load the configuration of uvicorn."""
-    for option, path in (("--tls-cert", config.ssl_certfile), ("--tls-key", config.ssl_keyfile)):
-        if path is not None and not Path(path).is_file():
-            raise ConfigError(f"{option} {path}: no such file", expected=_PEM)
     try:
         config.load()
     except OSError as error:
         raise ConfigError(
             f"--tls-cert {config.ssl_certfile} --tls-key {config.ssl_keyfile}: cannot be used: {error}",
-            expected=_PEM,
+            expected="a certificate and its key without a password, both in PEM",
         ) from error
 
 
@@ -138,26 +134,20 @@ def _write_lines() -> None:
     logger.addHandler(lines)
 
 
-@contextlib.contextmanager
-def _listen(host: str, port: int | None) -> Iterator[socket.socket]:
+def _listen(host: str, port: int | None) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_STREAM)
-    with contextlib.closing(listener):
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
         try:
-            try:
-                listener.bind((host, _PORT if port is None else port))
-            except OSError:
-                if port is not None:
-                    raise
-                listener.bind((host, 0))
-            listener.listen()
-        except OSError as error:
-            raise ConfigError(
-                f"--host {host} --port {_PORT if port is None else port}: cannot listen there: {error.strerror}",
-                hint="--port 0 takes one that is free; throwcollect view finds who serves already",
-            ) from error
-        yield listener
+            return socket.create_server((host, _PORT if port is None else port), family=family)
+        except OSError:
+            if port is not None:
+                raise
+            return socket.create_server((host, 0), family=family)
+    except OSError as error:
+        raise ConfigError(
+            f"--host {host} --port {_PORT if port is None else port}: cannot listen there: {error.strerror}",
+            hint="--port 0 takes one that is free; throwcollect view finds who serves already",
+        ) from error
 
 
 def _find_reachable_address(host: str) -> str:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Coroutine
+from contextlib import suppress
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError
+from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError, UnreachableError
 from throwcollect.runs.run import Run
+from throwcollect.serve.rosbridge import Bridge
 
 _LOOK_S = 1.0
 
@@ -30,21 +32,22 @@ _MOST_REASON = 123
 _logger = logging.getLogger(__name__)
 
 
-async def refuse(socket: WebSocket, code: int, reason: str) -> None:
+async def refuse(socket: WebSocket, error: ThrowcollectError) -> None:
     """Accept a socket and close it at once, because a page learns nothing about a socket that was not accepted."""
     await socket.accept()
-    await close(socket, code, reason)
+    await close(socket, error)
 
 
-async def close(socket: WebSocket, code: int, reason: str) -> None:
-    """Close a socket with the first line of a reason, cut to the size that fits into a frame."""
-    await socket.close(code, _cut(reason))
-
-
-def _cut(reason: str) -> str:
-    first, _, _ = reason.partition("\n")
+async def close(socket: WebSocket, error: ThrowcollectError) -> None:
+    """Close a socket because of an error, with the first line of its message, cut to the size that fits."""
+    # A record that is damaged, too, describes no run any more.
+    code = NOT_FOUND if isinstance(error, ConfigError) else FAILED
+    first, _, _ = error.message.partition("\n")
     # If the cut goes through a character, its remaining bytes are left out.
-    return first.encode()[:_MOST_REASON].decode(errors="ignore")
+    reason = first.encode()[:_MOST_REASON].decode(errors="ignore")
+    # If the client has left meanwhile, the socket is closed already.
+    with suppress(RuntimeError, WebSocketDisconnect):
+        await socket.close(code, reason)
 
 
 async def keep_telling(socket: WebSocket, *telling: Coroutine[Any, Any, object]) -> None:
@@ -66,25 +69,16 @@ async def keep_telling(socket: WebSocket, *telling: Coroutine[Any, Any, object])
             task.cancel()
         await asyncio.wait(tasks)
     for error in (task.exception() for task in tasks if not task.cancelled()):
-        # This error means that the client has left while something was sent to it.
-        if error is not None and not isinstance(error, WebSocketDisconnect):
-            await _end(socket, error)
-
-
-async def _end(socket: WebSocket, error: BaseException) -> None:
-    """Close a socket because of an error, and log the error if it is unexpected."""
-    is_expected = isinstance(error, ThrowcollectError)
-    code, reason = BROKEN, "internal error"
-    if isinstance(error, ThrowcollectError):
-        # A record that is damaged, too, describes no run any more.
-        code, reason = NOT_FOUND if isinstance(error, ConfigError) else FAILED, error.message
-    try:
-        await close(socket, code, reason)
-    except (RuntimeError, WebSocketDisconnect):
-        # The socket was closed before, and sending to a closed socket fails with a RuntimeError.
-        is_expected = is_expected or isinstance(error, RuntimeError)
-    if not is_expected:
-        _logger.error("telling a client failed", exc_info=error)
+        if isinstance(error, ThrowcollectError):
+            await close(socket, error)
+        elif error is not None and not isinstance(error, WebSocketDisconnect):
+            try:
+                await socket.close(BROKEN, "internal error")
+            except (RuntimeError, WebSocketDisconnect):
+                # The client has left, and sending to a closed socket fails with a RuntimeError, too.
+                if isinstance(error, RuntimeError):
+                    continue
+            _logger.error("telling a client failed", exc_info=error)
 
 
 def refuse_ended(run: Run) -> None:
@@ -93,13 +87,15 @@ def refuse_ended(run: Run) -> None:
         raise NotFoundError(f"run {run.id} has ended")
 
 
-async def wait_for_end(run: Run) -> None:
-    """Wait until a run has ended, which is told by an error.
+async def wait_for_end(run: Run, bridge: Bridge | None = None) -> None:
+    """Wait until a run has ended, or its bridge is over, and raise an error then.
 
     Raises:
         NotFoundError: If the run has ended, or was forgotten.
         ConfigError: If its record is damaged.
+        UnreachableError: If the router has gone; the one that comes next needs another bridge.
     """
-    while True:
+    while bridge is None or not bridge.is_over:
         refuse_ended(await asyncio.to_thread(run.now))
         await asyncio.sleep(_LOOK_S)
+    raise UnreachableError("the router of the run has gone; connect again")

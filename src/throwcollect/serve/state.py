@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import datetime
+from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from throwcollect.coordinator.progress import Progress
+from throwcollect.coordinator.resume import is_complete
+from throwcollect.dataset.directory import CONFIG, METADATA
 from throwcollect.dataset.summary import Info
-from throwcollect.errors import ConfigError
-from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Kind, Planning
 from throwcollect.runtimes.nodes import is_simulation
 from throwcollect.runtimes.runtime import NodeState
-from throwcollect.serve.catalogue import Catalogue
-from throwcollect.serve.resumption import can_be_resumed
-
-_MOST_OVER = 100
 
 Status = Literal["planning", "starting", "running", "ended", "died"]
-_LIVING: tuple[Status, ...] = ("planning", "starting", "running")
 
 
 # These are dataclasses of pydantic, which makes their schema once; for plain ones, it would do so for each route.
@@ -52,19 +49,14 @@ class InstanceState:
     """A run of this machine, whoever began it.
 
     Attributes:
-        id: Id of the run.
         component: Name of the component that it is an instance of; None if a command or a program began it.
-        name: Name of the collection.
         kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
         joins: Id of the run that a container has joined; None if it has joined none.
         status: ``planning`` while a large plan is made, ``starting`` until all nodes run, ``running``, ``ended``, or
             ``died`` if its launcher died before the end.
-        started: When it was begun.
-        ended: When it ended; None before.
         stopping: Whether it ends because somebody has asked for that; running trials are finished.
         exit_code: Exit code of its launcher; None before it ended.
         message: The error with which it ended, in words; empty if there was none.
-        simulations: Number of simulations that are wanted.
         nodes: Its nodes; none once it has ended, or died with them.
         planning: How far the plan is while it is made; else None.
         progress: How far it has come; None before the first report, and without a coordinator.
@@ -115,91 +107,44 @@ class WholeState:
 STATES: TypeAdapter[WholeState] = TypeAdapter(WholeState)
 
 
-class Lookout:
-    """Reads the state; the record of a run that has ended is read again only if it was written since."""
-
-    def __init__(self, catalogue: Catalogue) -> None:
-        self._catalogue = catalogue
-        self._ended: dict[tuple[str, int | None], tuple[Run, InstanceState]] = {}
-
-    def look(self) -> WholeState:
-        """Read the state: all runs that live, and the latest of those that are over."""
-        instances = self.list_instances()
-        living = [each for each in instances if each.status in _LIVING]
-        over = [each for each in instances if each.status not in _LIVING]
-        components = [
-            ComponentState(
-                each.name,
-                each.pretty_name,
-                each.kind,
-                each.max_instances,
-                [instance.id for instance in living if instance.component == each.name],
-            )
-            for each in self._catalogue.components.values()
-        ]
-        return WholeState(components, [*living, *over[:_MOST_OVER]])
-
-    def list_instances(self) -> list[InstanceState]:
-        """All runs that this machine remembers, the latest first."""
-        records = Records()
-        known, ended = self._ended, {}
-        instances = []
-        collecting: set[str] = set()
-        resumable: dict[str, str] = {}
-        for name in records.ids():
-            written = name, records.read_change_ns(name)
-            if written in known:
-                run, instance = known[written]
-                # A later run may have continued the dataset, which the record of this run does not show.
-                instance = replace(instance, can_be_resumed=can_be_resumed(run))
-            else:
-                try:
-                    run = records.get(name)
-                except ConfigError:
-                    # The record was removed just now, or is damaged; `throwcollect ps` reports damaged records.
-                    continue
-                instance = describe(run)
-            instances.append(instance)
-            if run.status == "running":
-                collecting.add(run.record.directory)
-            if instance.can_be_resumed:
-                resumable[instance.id] = run.record.directory
-            if instance.status == "ended":
-                ended[written] = run, instance
-        self._ended = ended
-        instances = [
-            # A dataset that another run continues right now cannot be resumed.
-            replace(each, can_be_resumed=False) if resumable.get(each.id) in collecting else each
-            for each in instances
-        ]
-        return sorted(instances, key=lambda each: each.started, reverse=True)
-
-
-def describe(run: Run) -> InstanceState:
-    """Describe a run for clients."""
+def describe(run: Run, *, is_growing: bool = False) -> InstanceState:
+    """Describe a run for clients; ``is_growing`` says that some run collects into its directory."""
     record = run.record
-    error = record.error if record.failure else None
-    return InstanceState(
-        id=run.id,
-        component=None if record.origin is None else record.origin.component,
-        name=record.name,
-        kind=record.kind,
-        joins=None if record.origin is None else record.origin.joins,
-        status=_find_status(run),
-        started=record.started,
-        ended=record.ended,
-        stopping=record.stopping and run.status == "running",
-        exit_code=record.exit_code,
-        message=str(error or ""),
-        simulations=record.simulations,
-        nodes=list(run.nodes),
-        planning=record.planning if run.status == "running" else None,
-        progress=record.progress,
-        dataset=record.directory if record.kind == "collection" else None,
-        summary=record.summary,
-        robots=simulations_of(run.nodes),
-        can_be_resumed=can_be_resumed(run),
-    )
+    shared = {name: value for name, value in vars(record).items() if name in InstanceState.__dataclass_fields__}
+    own = {
+        "id": run.id,
+        "component": None if record.origin is None else record.origin.component,
+        "joins": None if record.origin is None else record.origin.joins,
+        "status": _find_status(run),
+        "stopping": record.stopping and run.status == "running",
+        "message": str((record.error if record.failure else None) or ""),
+        "nodes": list(run.nodes),
+        "planning": record.planning if run.status == "running" else None,
+        "dataset": record.directory if record.kind == "collection" else None,
+        "robots": simulations_of(run.nodes),
+        "can_be_resumed": not is_growing and explain_refusal(run) is None,
+    }
+    return InstanceState(**{**shared, **own})
+
+
+def explain_refusal(run: Run) -> str | None:
+    """Why clients cannot continue the dataset of a run; None if they can. This is cheap enough for many calls."""
+    directory = run.context.directory
+    if run.status == "running":
+        return f"run {run.id} is still running"
+    if run.record.kind != "collection" or not os.path.isfile(directory / CONFIG):
+        return f"run {run.id} has no dataset in a directory to go on with"
+    try:
+        changed_ns = directory.stat().st_mtime_ns, (directory / METADATA).stat().st_mtime_ns
+    except OSError:
+        return None
+    return f"the dataset of run {run.id} is complete" if _is_complete(directory, changed_ns) else None
+
+
+# The tables of a dataset are read again only if files were added, removed or replaced.
+@lru_cache(maxsize=1024)
+def _is_complete(directory: Path, _changed_ns: tuple[int, int]) -> bool:
+    return is_complete(directory)
 
 
 def simulations_of(nodes: Sequence[NodeState]) -> list[str]:

@@ -1,13 +1,12 @@
-"""The newest throws of a run, as the page draws them: received in the run's graph as long as somebody watches."""
+"""The newest throws of a run, as the page draws them: received by the bridge of the run as long as somebody watches."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import struct
-import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -19,17 +18,16 @@ from throwcollect.dataset.directory import PLAN, config_path
 from throwcollect.episode.episode_message import Episode, unpack
 from throwcollect.errors import ThrowcollectError
 from throwcollect.robots.surroundings import BodyLook, looks_of
-from throwcollect.ros import Node
-from throwcollect.ros.msg import UInt8MultiArray
-from throwcollect.ros.nodes.coordinator.showing import SHOWN_QOS, make_shown_topic
+from throwcollect.ros.nodes.coordinator.showing import make_shown_topic
 from throwcollect.run_key import Signer
 from throwcollect.runs.run import Run
-from throwcollect.runtimes.run_listener import RunListener
+from throwcollect.serve.rosbridge import Bridge
+from throwcollect.serve.rosbridge.feed import Feed, Listener, Sample
 from throwcollect.serve.state import simulations_of
 from throwcollect.sweep.plan import Plan
 from throwcollect.units import NS_PER_S
 
-_SPIN_S = 0.2
+_LOOK_S = 0.5
 _FLOAT_BYTES = 4
 _LENGTH = struct.Struct("<I")
 _ENDS = ("landing", "rest")
@@ -93,14 +91,17 @@ class PlannedTrials:
 
 
 class ThrowWatch:
-    """Receives the newest throws of one run in a thread of its own, while there are listeners."""
+    """Receives the newest throws of one run by its bridge, while there are listeners."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, bridge: Bridge) -> None:
         self._run = run
-        self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
-        self._is_over = threading.Event()
-        self._newest: bytes | None = None
+        self._bridge = bridge
         self._planned = PlannedTrials(run.context.directory)
+        self._loop = asyncio.get_running_loop()
+        self._queues: list[asyncio.Queue[bytes]] = []
+        self._newest: bytes | None = None
+        self._feeds: dict[str, tuple[Feed, Listener]] = {}
+        self._is_on = False
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
@@ -110,85 +111,55 @@ class ThrowWatch:
             A function that returns the newest throw since its last call, and waits for one if none has come.
         """
         queue: asyncio.Queue[bytes] = asyncio.Queue(maxsize=1)
-        if not self._listeners:
-            # Each thread gets an event of its own, because the event of a new thread must not keep an old one alive.
-            self._is_over = threading.Event()
-            name = f"throws of {self._run.id}"
-            threading.Thread(target=self._listen, args=(self._is_over,), name=name, daemon=True).start()
-        self._listeners[queue] = asyncio.get_running_loop()
+        self._queues.append(queue)
+        self._bridge.submit(self._begin)
         if self._newest is not None:
             queue.put_nowait(self._newest)
         try:
             yield queue.get
         finally:
-            del self._listeners[queue]
-            if not self._listeners:
-                self._is_over.set()
+            self._queues.remove(queue)
 
-    @property
-    def is_idle(self) -> bool:
-        """Whether nobody listens."""
-        return not self._listeners
+    def _begin(self) -> None:
+        if not self._is_on:
+            self._is_on = True
+            self._listen()
 
-    def _listen(self, is_over: threading.Event) -> None:
-        run = self._run
-        subscriptions = _Subscriptions(self._hear)
-        with RunListener(lambda _: None, on_connect=subscriptions.move) as listener:
-            while not is_over.is_set():
-                try:
-                    run = run.now()
-                    if run.connection is not None:
-                        run.record.middleware.joining.settle()
-                    subscriptions.add(simulations_of(run.record.nodes))
-                    listener.spin(run.connection, _SPIN_S)
-                except ThrowcollectError:
-                    # The run was forgotten, or cannot be joined; clients see that in the state.
-                    is_over.wait(_SPIN_S)
+    def _listen(self) -> None:
+        """Subscribe to all simulations of the run, now and again, because some may be started later."""
+        if not self._queues:
+            for feed, listener in self._feeds.values():
+                feed.remove(listener)
+            self._feeds, self._newest, self._is_on = {}, None, False
+            return
+        # A run that was forgotten has no simulations; clients see that in the state.
+        with suppress(ThrowcollectError):
+            for name in set(simulations_of(self._run.now().record.nodes)) - self._feeds.keys():
+                listener = partial(self._hear, name)
+                feed = self._bridge.listen(make_shown_topic(name), "std_msgs/msg/UInt8MultiArray", listener)
+                self._feeds[name] = feed, listener
+        self._bridge.later(_LOOK_S, self._listen)
 
-    def _hear(self, simulation: str, message: bytes) -> None:
+    def _hear(self, simulation: str, sample: Sample) -> None:
+        asyncio.run_coroutine_threadsafe(self._pass_on(simulation, sample.data), self._loop)
+
+    async def _pass_on(self, simulation: str, message: bytes) -> None:
+        """Put a throw into all queues, in the place of one that was not taken yet."""
+        frame = await asyncio.to_thread(self._encode, simulation, message)
+        if frame is None:
+            return
+        self._newest = frame
+        for queue in self._queues:
+            while not queue.empty():
+                queue.get_nowait()
+            queue.put_nowait(frame)
+
+    def _encode(self, simulation: str, message: bytes) -> bytes | None:
         try:
             episode = unpack(message, Signer.of_key(self._run.key))
             if not isinstance(episode, Episode) or not episode.result:
-                return
-            frame = encode_throw(episode, simulation, *self._planned.of(episode.header.trial))
+                return None
+            return encode_throw(episode, simulation, *self._planned.of(episode.header.trial))
         except ThrowcollectError:
             # Another node has published something else on this topic.
-            return
-        self._newest = frame
-        for queue, loop in list(self._listeners.items()):
-            loop.call_soon_threadsafe(_replace, queue, frame)
-
-
-class _Subscriptions:
-    """Subscribes to all simulations of a run, including those that are started later.
-
-    Args:
-        hear: Called with the name of a simulation and the message that carries its newest episode.
-    """
-
-    def __init__(self, hear: Callable[[str, bytes], None]) -> None:
-        self._hear = hear
-        self._node: Node | None = None
-        self._heard: set[str] = set()
-
-    def move(self, node: Node) -> None:
-        """Subscribe again with another node."""
-        self._node = node
-        heard, self._heard = self._heard, set()
-        self.add(heard)
-
-    def add(self, simulations: Iterable[str]) -> None:
-        """Subscribe to those simulations that are not subscribed to yet."""
-        if self._node is None:
-            return
-        for name in set(simulations) - self._heard:
-            self._heard.add(name)
-            hear = partial(self._hear, name)
-            self._node.create_subscription(UInt8MultiArray, make_shown_topic(name), hear, SHOWN_QOS, raw=True)
-
-
-def _replace(queue: asyncio.Queue[bytes], frame: bytes) -> None:
-    """Put a frame into a queue that holds one frame, in place of the frame that it holds."""
-    while not queue.empty():
-        queue.get_nowait()
-    queue.put_nowait(frame)
+            return None

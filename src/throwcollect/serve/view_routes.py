@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import AsyncExitStack
 
 from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
-from throwcollect.errors import NotFoundError, ThrowcollectError
+from throwcollect.errors import ThrowcollectError
+from throwcollect.runs.run import Run
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import slow_down
-from throwcollect.serve.problem_responses import describe_bytes
 from throwcollect.serve.robot_files import (
     MeshFile,
     SceneFacts,
@@ -22,20 +23,26 @@ from throwcollect.serve.robot_files import (
     list_meshes,
     scene_of,
 )
-from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse, wait_for_end
-from throwcollect.serve.throws import ThrowWatch
+from throwcollect.serve.rosbridge_routes import Bridges
+from throwcollect.serve.sockets import MAY_NOT, keep_telling, refuse, wait_for_end
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
 
-def make_description_routes(instances: Instances) -> APIRouter:
-    """Make the routes on the look of the robot of a run."""
+class Xml(Response):
+    """An answer in XML."""
+
+    media_type = "application/xml"
+
+
+def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
+    """Make the routes on what the page draws."""
     router = APIRouter()
 
-    @router.get("/instances/{instance}/urdf", response_class=Response, responses=describe_bytes("application/xml"))
+    @router.get("/instances/{instance}/urdf", response_class=Xml)
     def urdf(instance: str) -> Response:
         """The robot of a run, with its tool, in URDF; meshes are ``package://`` URLs."""
-        return Response(description_of(instances.get(instance)), media_type="application/xml")
+        return Xml(description_of(instances.get(instance)))
 
     @router.get("/instances/{instance}/meshes")
     def meshes(instance: str) -> list[MeshFile]:
@@ -58,14 +65,6 @@ def make_description_routes(instances: Instances) -> APIRouter:
         """Let viewers draw the description of the configuration again."""
         instances.show(instance, None)
 
-    return router
-
-
-def make_view_routes(instances: Instances) -> APIRouter:
-    """Make the routes on what the page draws."""
-    router = APIRouter()
-    watches: dict[str, ThrowWatch] = {}
-
     @router.get("/meshes/{package}/{path:path}", response_class=FileResponse)
     def mesh(package: str, path: str) -> FileResponse:
         """The file of a mesh, as the description names it."""
@@ -79,40 +78,41 @@ def make_view_routes(instances: Instances) -> APIRouter:
 
     @router.websocket("/instances/{instance}/shown")
     async def stream_throws(socket: WebSocket, instance: str) -> None:
-        try:
-            run = await asyncio.to_thread(instances.get, instance)
-        except ThrowcollectError as error:
-            await refuse(socket, NOT_FOUND, error.message)
-            return
-        await socket.accept()
-        watch = watches.setdefault(instance, ThrowWatch(run))
-        try:
-            async with watch.throws() as next_throw:
-                await keep_telling(socket, _send_throws(socket, next_throw), wait_for_end(run))
-        finally:
-            # A later run of the same id must not get the throws of this run.
-            if watch.is_idle and watches.get(instance) is watch:
-                del watches[instance]
+        async with AsyncExitStack() as stack:
+            try:
+                run = await asyncio.to_thread(instances.get, instance)
+                shared = await stack.enter_async_context(bridges.share(run))
+            except ThrowcollectError as error:
+                await refuse(socket, error)
+                return
+            await socket.accept()
+            next_throw = await stack.enter_async_context(shared.throws.throws())
+            await keep_telling(socket, _send_throws(socket, next_throw), wait_for_end(run, shared.bridge))
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
-        if not socket.state.may_change:
-            await refuse(socket, MAY_NOT, MAY_ONLY_LOOK[1])
-            return
-        try:
-            run = await asyncio.to_thread(instances.get, instance)
-            hold = await asyncio.to_thread(slow_down, run, simulation)
-        except ThrowcollectError as error:
-            await refuse(socket, NOT_FOUND if isinstance(error, NotFoundError) else FAILED, error.message)
-            return
-        try:
-            await socket.accept()
-            # Nothing is ever sent: the simulation stays slow as long as the client is connected.
-            await keep_telling(socket, wait_for_end(run))
-        finally:
-            await asyncio.to_thread(hold.restore_speed)
+        await _keep_slow(socket, lambda: instances.get(instance), simulation)
 
     return router
+
+
+async def _keep_slow(socket: WebSocket, find_run: Callable[[], Run], simulation: str) -> None:
+    """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
+    if not socket.state.may_change:
+        await socket.accept()
+        await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
+        return
+    try:
+        run = await asyncio.to_thread(find_run)
+        hold = await asyncio.to_thread(slow_down, run, simulation)
+    except ThrowcollectError as error:
+        await refuse(socket, error)
+        return
+    try:
+        await socket.accept()
+        await keep_telling(socket, wait_for_end(run))
+    finally:
+        await asyncio.to_thread(hold.restore_speed)
 
 
 async def _send_throws(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:

@@ -20,7 +20,6 @@ from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.catalogue import Catalogue
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.models import Models
 from throwcollect.state_directory import STATE_VARIABLE
 
 HOST = "127.0.0.1:8080"
@@ -73,9 +72,7 @@ def catalogue(tmp_path: Path) -> Catalogue:
 def served(catalogue: Catalogue, tmp_path: Path) -> Served:
     keys = Keys()
     instances = Instances(catalogue, tmp_path / "datasets")
-    return Served(
-        Access(make_app(instances, Models(tmp_path / "models"), keys), keys, frozenset({HOST})), keys, instances
-    )
+    return Served(Access(make_app(instances, tmp_path / "models", keys), keys, frozenset({HOST})), keys, instances)
 
 
 @pytest.fixture

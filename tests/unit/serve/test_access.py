@@ -1,7 +1,9 @@
 """Access to the server by tokens, codes, origins and names of hosts: one test for each way in."""
 
 import logging
+import stat
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +12,7 @@ from starlette.testclient import TestClient, WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
 from tests.unit.serve.conftest import HOST, Served
 
+from throwcollect.errors import ConfigError
 from throwcollect.serve import access
 from throwcollect.serve.access import Keys
 
@@ -155,9 +158,7 @@ def test_a_code_can_be_exchanged_only_once(served: Served) -> None:
     code = served.client().post("/api/v1/codes").json()["code"]
     anybody = served.client("")
     assert exchange(anybody, code).json() == {"token": served.keys.full}
-    answer = exchange(anybody, code)
-    assert "exchanged already" in problem_of(answer, 403)
-    assert answer.json()["hint"] == "throwcollect view"
+    assert "exchanged already" in problem_of(exchange(anybody, code), 403)
     assert exchange(anybody, "guessed").status_code == 403
 
 
@@ -211,3 +212,31 @@ def test_an_unexpected_error_gives_a_log_line_and_a_problem_response(
     assert problem_of(answer, 500) == "internal error"
     assert "secret" not in answer.text
     assert caplog.messages[0] == "GET /api/v1/instances/a 500 full"
+
+
+def test_tokens_of_a_file_outlive_the_server(tmp_path: Path) -> None:
+    path = tmp_path / "tokens"
+    first = Keys.of_file(path)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    again = Keys.of_file(path)
+    assert (again.full, again.read_only) == (first.full, first.read_only)
+    assert first.full != first.read_only
+
+
+@pytest.mark.parametrize(
+    ("text", "mode", "reason"),
+    [
+        (f"{'a' * 20}\n{'b' * 20}\n", 0o644, "others can read it"),
+        (f"{'a' * 20}\n", 0o600, "should have two tokens"),
+        (f"{'a' * 20}\n{'a' * 20}\n", 0o600, "should have two tokens"),
+        (f"{'a' * 20}\nshort\n", 0o600, "should have two tokens"),
+    ],
+)
+def test_a_token_file_that_cannot_keep_others_out_is_rejected(
+    tmp_path: Path, text: str, mode: int, reason: str
+) -> None:
+    path = tmp_path / "tokens"
+    path.write_text(text)
+    path.chmod(mode)
+    with pytest.raises(ConfigError, match=reason):
+        Keys.of_file(path)

@@ -70,6 +70,10 @@ def test_without_a_catalogue_every_component_is_unknown(directory: Path) -> None
             "components:\n  a:\n    config: small.yaml\n    cpus: 2\n",
             ":4: components.a.cpus: should be left out; it is",
         ),
+        (
+            "components:\n  a:\n    config: small.yaml\n    volumes: [/srv:/a]\n",
+            ":4: components.a.volumes: should be left out",
+        ),
         ("components:\n  a:\n    image: x\n    volumes: [/etc]\n", "components.a.volumes.0: should match pattern"),
         ("components:\n  a:\n    image: x\n    privileged: true\n", ":4: components.a.privileged: unknown key"),
         ("components:\n  ../a: {config: small.yaml}\n", "should be at most 63 of a-z, 0-9, - and _, got '../a'"),

@@ -1,14 +1,13 @@
-"""The newest throws, as they are sent to the page, and the thread that listens for them."""
+"""The newest throws, as they are sent to the page, and how they are heard."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-import threading
-import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,53 +22,42 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import looks_of
-from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
-from throwcollect.serve import throws
+from throwcollect.runtimes.runtime import NodeState
+from throwcollect.serve.rosbridge.feed import Listener
 from throwcollect.serve.throws import PlannedTrials, ThrowWatch, encode_throw
 
-_ALL: list[Any] = []
+
+class Graph:
+    """Takes the place of a bridge: ``hear`` has the listeners by their topics, and ``look`` lets its timers run out."""
+
+    def __init__(self) -> None:
+        self.hear: dict[str, Listener] = {}
+        self._timers: list[Callable[[], None]] = []
+
+    def submit(self, action: Callable[[], None]) -> None:
+        action()
+
+    def later(self, _seconds: float, action: Callable[[], None]) -> None:
+        self._timers.append(action)
+
+    def listen(self, topic: str, _type: str, listener: Listener) -> Any:
+        assert topic not in self.hear
+        self.hear[topic] = listener
+        return SimpleNamespace(remove=lambda _: self.hear.pop(topic))
+
+    def look(self) -> None:
+        timers, self._timers = self._timers, []
+        for each in timers:
+            each()
 
 
-class Listener:
-    """Takes the place of a node, and counts how often it was asked to listen."""
-
-    def __init__(self, _on_progress: object, *, on_connect: object) -> None:
-        self.spins = 0
-        _ALL.append(self)
-
-    def __enter__(self) -> Listener:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def spin(self, _connection: Connection | None, seconds: float) -> None:
-        self.spins += 1
-        time.sleep(seconds)
-
-
-@pytest.fixture
-def listeners(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    _ALL.clear()
-    monkeypatch.setattr(throws, "RunListener", Listener)
-    monkeypatch.setattr(throws, "_SPIN_S", 0.02)
-    return _ALL
-
-
-def threads() -> list[threading.Thread]:
-    return [each for each in threading.enumerate() if each.name.startswith("throws of")]
-
-
-def watch(run: Run, scenario: Callable[[ThrowWatch], Awaitable[None]]) -> None:
+def watch(scenario: Callable[[ThrowWatch, Graph], Awaitable[None]]) -> None:
     async def whole() -> None:
-        await asyncio.wait_for(scenario(ThrowWatch(run)), 10)
+        graph: Any = Graph()
+        await asyncio.wait_for(scenario(ThrowWatch(Records().get("a"), graph), graph), 10)
 
     asyncio.run(whole())
-    for each in threads():
-        each.join(5)
-    assert not threads()
 
 
 POST = {"shape": "sphere", "radius_m": 0.1, "position_m": [1, 2, 3]}
@@ -136,45 +124,55 @@ def test_a_throw_has_the_bodies_of_its_own_trial(tmp_path: Path) -> None:
     assert [bodies[0].position_m[0] for bodies in found if bodies] == [1.0, 2.0]
 
 
-def test_listeners_share_one_thread_until_the_last_leaves(remember: Remember, listeners: list[Any]) -> None:
-    remember("a")
+def make_nodes(*names: str) -> tuple[NodeState, ...]:
+    return tuple(NodeState(name, "running", 0, "1", "") for name in names)
 
-    async def scenario(heard: ThrowWatch) -> None:
-        async with heard.throws(), heard.throws():
-            assert len(threads()) == 1
-        assert heard.is_idle
-        # A listener that comes while the thread ends gets a new thread.
-        async with heard.throws():
-            while (len(threads()), len(listeners)) != (1, 2):
-                await asyncio.sleep(0.01)
 
-    watch(Records().get("a"), scenario)
+def test_listeners_share_subscriptions_to_all_simulations_until_the_last_leaves(remember: Remember) -> None:
+    run = remember("a", nodes=make_nodes("router", "sim_0"))
+    both = {"/coordinator/shown/sim_0", "/coordinator/shown/sim_1"}
+
+    async def scenario(watch: ThrowWatch, graph: Graph) -> None:
+        async with watch.throws(), watch.throws():
+            assert set(graph.hear) == {"/coordinator/shown/sim_0"}
+            run.update(nodes=make_nodes("sim_0", "sim_1"))
+            graph.look()
+            assert set(graph.hear) == both
+        async with watch.throws():
+            graph.look()
+            assert set(graph.hear) == both
+        graph.look()
+        assert not graph.hear
+        async with watch.throws():
+            assert set(graph.hear) == both
+
+    watch(scenario)
 
 
 def test_a_slow_listener_gets_the_newest_throw_and_a_late_one_the_last(
-    remember: Remember, listeners: list[Any]
+    remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    remember("a")
+    remember("a", nodes=make_nodes("sim_0"))
+    monkeypatch.setattr(ThrowWatch, "_encode", lambda _self, _simulation, message: message)
 
-    async def scenario(heard: ThrowWatch) -> None:
-        async with heard.throws() as next_throw:
-            for frame in (b"1", b"2", b"3"):
-                heard._newest = frame
-                for queue in heard._listeners:
-                    throws._replace(queue, frame)
+    async def scenario(watch: ThrowWatch, graph: Graph) -> None:
+        async with watch.throws() as next_throw:
+            for data in (b"1", b"2", b"3"):
+                await watch._pass_on("sim_0", data)
             assert await next_throw() == b"3"
             with pytest.raises(TimeoutError):
                 await asyncio.wait_for(next_throw(), 0.05)
-            async with heard.throws() as late:
+            async with watch.throws() as late:
                 assert await late() == b"3"
 
-    watch(Records().get("a"), scenario)
+    watch(scenario)
 
 
-def test_messages_that_are_no_signed_episodes_are_ignored(remember: Remember, listeners: list[Any]) -> None:
-    run = remember("a")
-    heard = ThrowWatch(Records().get("a"))
-    assert run.key.directory.exists()
-    for message in (b"", b"nonsense", bytes(10_000)):
-        heard._hear("sim_0", message)
-    assert heard._newest is None
+def test_messages_that_are_no_signed_episodes_are_ignored(remember: Remember) -> None:
+    remember("a")
+
+    async def scenario(watch: ThrowWatch, _: Graph) -> None:
+        for message in (b"", b"nonsense", bytes(10_000)):
+            assert watch._encode("sim_0", message) is None
+
+    watch(scenario)

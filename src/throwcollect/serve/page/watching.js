@@ -120,7 +120,8 @@ export class Watching {
   /** Listen for throws as long as the run can have some, and the page is visible. */
   #follow() {
     const { instance } = this;
-    const wanted = instance?.kind === "collection" && lives(instance) && !document.hidden;
+    // Before it has robots, it may have no router, and the server would close the socket again and again.
+    const wanted = instance?.kind === "collection" && lives(instance) && instance.robots.length > 0 && !document.hidden;
     if (wanted && this.#socket === null) {
       this.#socket = this.connection.open(`/instances/${encodeURIComponent(instance.id)}/shown`, {
         receive: (data) => this.#receive(decodeThrow(data)),

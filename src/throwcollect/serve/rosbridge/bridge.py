@@ -1,4 +1,4 @@
-"""A bridge connects all clients of one run to its ROS graph, in a thread of its own."""
+"""A node in the ROS graph of one run, which acts for all clients of rosbridge, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -8,194 +8,177 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
+from functools import partial
+from queue import SimpleQueue
+from typing import Any
 
 from throwcollect import ros
-from throwcollect.errors import ThrowcollectError
+from throwcollect.errors import ConfigError, UnreachableError
 from throwcollect.ros.connection import Connection
+from throwcollect.ros.graph_names import find_interface, full_name, make_own_name
 from throwcollect.ros.router_endpoint import answers
-from throwcollect.serve.rosbridge.bridge_client import BridgeClient
-from throwcollect.serve.rosbridge.bridge_session import BridgeSession
-from throwcollect.serve.rosbridge.codec import Frame
-from throwcollect.serve.rosbridge.offers import FAREWELL_S
-from throwcollect.serve.rosbridge.peer import Peer
+from throwcollect.serve.rosbridge.feed import Feed, Listener
 
 _logger = logging.getLogger(__name__)
 
+FAREWELL_S = 0.2
+"""Time in which nodes get the last results of an action, before it is withdrawn."""
 _LOOK_S = 1.0
 """Time between two looks at the router and at the quality of service that publishers offer."""
-_RETRY_S = 0.2
 _MISSES = 2
 """After this many looks without an answer, the router counts as gone; on a busy machine, one answer may be late."""
 
 
 class Bridge:
-    """Takes part in the ROS graph of one run for any number of clients.
+    """Takes part in the ROS graph of one run until it is closed, or the router of the run has gone.
 
-    Several bridges may live in one process, each in another run. On Fast DDS a process is in one run at a time.
+    Any thread may call `submit` and `close`; everything else belongs to the bridge's thread, which calls what was
+    submitted. Several bridges may live in one process, each in another run. On Fast DDS a process is in one run at a
+    time.
 
     Args:
-        connection: The way into the run; None if its router has no address yet, which `move` then sets.
+        connection: The way into the run.
+
+    Attributes:
+        node: The node of the bridge.
+        advertised: The services by which one knows what clients offer; all clients of the bridge share this set.
+        is_over: Whether the bridge has left the graph; clients then connect again.
+
+    Raises:
+        ConfigError: If the connection cannot be used.
+        ThrowcollectError: If there is no router.
     """
 
-    def __init__(self, connection: Connection | None) -> None:
-        self._connection = connection
-        self._session: BridgeSession | None = None
-        self._joined: Connection | None = None
-        self._clients: list[BridgeClient] = []
-        # This outlives a session, as the offers of clients do.
-        self.offered: set[str] = set()
+    def __init__(self, connection: Connection) -> None:
+        if not answers(connection.endpoint):
+            raise UnreachableError("the router of the run does not answer")
+        self._endpoint = connection.endpoint
+        self._context = ros.Context()
+        ros.init(context=self._context, connection=connection)
+        self.node = ros.Node(
+            make_own_name(), context=self._context, enable_rosout=False, start_parameter_services=False
+        )
+        ros.let_callbacks_wait(self.node)
+        self._executor = ros.SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self.advertised: set[str] = set()
+        self.is_over = False
+        self._feeds: dict[tuple[str, str, object], Feed] = {}
+        self._clients: dict[tuple[str, str], Any] = {}
         self._work: SimpleQueue[Callable[[], None]] = SimpleQueue()
         # The number orders timers of equal time, because functions cannot be compared.
         self._timers: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
         self._lock = threading.Lock()
-        self._closing = threading.Event()
-        self._looked_at = 0.0
+        self._ends = False
         self._misses = 0
+        self._changes: int | None = None
         self._thread = threading.Thread(target=self._run, name="rosbridge", daemon=True)
         self._thread.start()
 
-    def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> BridgeClient:
-        """Add a client, which the caller has to close.
-
-        The bridge's thread calls ``send`` with each frame for the client, so ``send`` may neither wait nor fail.
-        """
-        client = BridgeClient(self, send, read_only=read_only)
-        self.submit(lambda: self._clients.append(client))
-        return client
-
-    def move(self, connection: Connection | None) -> None:
-        """Use another way into the run, whose router has another address; None while the router has no address."""
-        self._connection = connection
-        self.submit(_do_nothing)
+    def submit(self, action: Callable[[], None]) -> None:
+        """Call an action soon, in the bridge's thread; when the bridge is over, nothing happens."""
+        with self._lock:
+            if not self.is_over:
+                # rclpy does not do tasks in the order in which they were made, but the queue keeps it.
+                self._work.put(action)
+                self._executor.create_task(lambda: self._attempt(self._work.get_nowait()))
 
     def close(self) -> None:
-        """End the bridge, and withdraw all that its clients have."""
-        self._closing.set()
-        self.submit(_do_nothing)
+        """Leave the graph, when nodes had time to get the last results."""
+        self.submit(lambda: self.later(FAREWELL_S, self._end))
         self._thread.join()
 
-    @property
-    def is_connected(self) -> bool:
-        """Whether the bridge is in the graph of its run by now."""
-        return self._session is not None
-
-    @property
-    def session(self) -> BridgeSession:
-        """The place in the ROS graph; only for the bridge's thread."""
-        if self._session is None:
-            raise ThrowcollectError("the router of the run does not answer")
-        return self._session
-
     def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Call an action after a time [s]; only for the bridge's thread."""
+        """Call an action after a time [s]."""
         heapq.heappush(self._timers, (time.monotonic() + seconds, next(self._numbers), action))
 
-    def submit(self, action: Callable[[], None]) -> None:
-        """Call an action soon, in the bridge's thread."""
-        self._work.put(action)
-        with self._lock:
-            if self._session is not None:
-                # During a session, the thread waits in the executor, and only a task wakes it.
-                self._session.executor.create_task(self._do_next)
+    def type_of(self, topic: str, wanted: str) -> str:
+        """Full name of the type of a topic, which a client may name in full, as ``pkg/Type``, or not at all."""
+        # Only the endpoints of this topic are asked for: a list of all topics, made for each of thousands of requests,
+        # would keep all clients of the bridge waiting.
+        endpoints = self.node.get_publishers_info_by_topic(topic) + self.node.get_subscriptions_info_by_topic(topic)
+        types = sorted({each.topic_type for each in endpoints})
+        if not wanted:
+            if len(types) != 1:
+                what = f"has {len(types)} types" if types else "is published by nobody, and no type is named"
+                raise ConfigError(f"{topic} {what}", expected=f"one of {', '.join(types)}" if types else "a type")
+            return types[0]
+        name = full_name("msg", wanted)
+        find_interface("msg", name)
+        if types and name not in types:
+            raise ConfigError(f"{topic} is no {name}", expected=", ".join(types))
+        return name
 
-    def forget(self, client: Peer) -> None:
-        """Take a client off the list."""
-        self._clients = [each for each in self._clients if each is not client]
+    def listen(self, topic: str, type_name: str, listener: Listener) -> Feed:
+        """Give the messages of a topic to a listener; a latched topic begins with its earlier messages."""
+        # Earlier messages of a latched topic come only with a new subscription, so a later listener gets its own.
+        alone = (topic, type_name, listener)
+        shared = (topic, type_name, None)
+        feed = self._feeds.get(shared)
+        if feed is None or feed.is_latched:
+            key = shared if feed is None else alone
+            feed = self._feeds[key] = Feed(self.node, topic, type_name, lambda: self._feeds.pop(key, None))
+        feed.add(listener)
+        return feed
+
+    def service_client(self, service: str, type_name: str) -> Any:
+        """A client of a service, given by its absolute name; all clients of the bridge share it."""
+        key = service, type_name
+        if key not in self._clients:
+            self._clients[key] = self.node.create_client(find_interface("srv", type_name), service)
+        return self._clients[key]
+
+    def offers(self, service: str) -> bool:
+        """Whether a client of the bridge or a node offers a service, given by its absolute name."""
+        # All clients offer through the one node of the bridge, so the graph does not tell their offers apart.
+        return service in self.advertised or any(
+            service in dict(self.node.get_service_names_and_types_by_node(*other))
+            for other in self.node.get_node_names_and_namespaces()
+            if other[0] != self.node.get_name()
+        )
 
     def _run(self) -> None:
-        while not self._closing.is_set():
-            self._attempt(self._look)
-            self._call_timers()
-            wait_s = min(self._timers[0][0] - time.monotonic(), _LOOK_S) if self._timers else _LOOK_S
-            if self._session is not None:
-                self._spin(self._session, max(wait_s, 0.0))
-            else:
-                # With a time of 0, `_do_next` would not wait, and this loop would use a whole core.
-                self._do_next(max(min(wait_s, _RETRY_S), 0.001))
-        for client in list(self._clients):
-            client.close()
-        while not self._work.empty():
-            self._do_next()
-        # Timers withdraw the actions of clients a bit later, so that nodes get the last results before.
-        end = time.monotonic() + FAREWELL_S
-        while self._session is not None and self._timers and self._timers[0][0] <= end:
-            self._spin(self._session, max(self._timers[0][0] - time.monotonic(), 0.0))
-            self._call_timers()
-        self._leave()
+        self.later(_LOOK_S, self._look)
+        while not self._ends:
+            wait_s = self._timers[0][0] - time.monotonic() if self._timers else _LOOK_S
+            self._attempt(partial(self._executor.spin_once, timeout_sec=max(wait_s, 0.0)))
+            while self._timers and self._timers[0][0] <= time.monotonic():
+                self._attempt(heapq.heappop(self._timers)[2])
+        with self._lock:
+            self.is_over = True
+        self._attempt(self._leave)
 
-    def _spin(self, session: BridgeSession, seconds: float) -> None:
-        try:
-            self._attempt(lambda: session.executor.spin_once(timeout_sec=seconds))
-        except ros.ExternalShutdownException:
-            # Something has shut down all contexts of this process.
-            self._lose()
-
-    def _do_next(self, seconds: float = 0.0) -> None:
-        try:
-            action = self._work.get(timeout=seconds) if seconds else self._work.get_nowait()
-        except Empty:
-            return
-        self._attempt(action)
+    def _end(self) -> None:
+        self._ends = True
 
     def _attempt(self, action: Callable[[], None]) -> None:
         try:
             action()
         except ros.ExternalShutdownException:
-            raise
+            # Something has shut down all contexts of this process.
+            self._end()
         except Exception:
             # A failing action must not end this thread, which serves all clients.
             _logger.exception("an action of the bridge failed")
 
-    def _call_timers(self) -> None:
-        while self._timers and self._timers[0][0] <= time.monotonic():
-            self._attempt(heapq.heappop(self._timers)[2])
-
     def _look(self) -> None:
-        """Join the run if its router answers, and notice when the router no longer answers."""
-        now = time.monotonic()
-        wait_s = _LOOK_S if self._session is not None else _RETRY_S
-        if now < self._looked_at + wait_s and self._joined == self._connection:
+        """Notice when the router no longer answers, and when publishers offer another quality of service by now."""
+        self.later(_LOOK_S, self._look)
+        self._misses = 0 if answers(self._endpoint) else self._misses + 1
+        if self._misses >= _MISSES:
+            self._end()
             return
-        self._looked_at = now
-        connection = self._connection
-        has_answered = connection is not None and answers(connection.endpoint)
-        self._misses = 0 if has_answered else self._misses + 1
-        if self._session is not None and (self._misses >= _MISSES or connection != self._joined):
-            self._lose()
-        if self._session is None and connection is not None and has_answered:
-            self._join(connection)
-        if self._session is not None:
-            self._session.look_around()
-
-    def _join(self, connection: Connection) -> None:
-        try:
-            session = BridgeSession(connection)
-        except ThrowcollectError as error:
-            _logger.warning("the bridge cannot join the run: %s", error)
-            return
-        with self._lock:
-            self._session = session
-        self._joined = connection
-        for client in self._clients:
-            client.restore()
-        # Actions that were submitted while there was no session have no task in its executor, so they are done here.
-        while not self._work.empty():
-            self._do_next()
-
-    def _lose(self) -> None:
-        for client in self._clients:
-            client.lose()
-        self._leave()
+        changes = ros.graph_changes(self.node)
+        if changes != self._changes:
+            self._changes = changes
+            for feed in list(self._feeds.values()):
+                feed.renew()
 
     def _leave(self) -> None:
-        with self._lock:
-            session, self._session = self._session, None
-        self._joined = None
-        if session is not None:
-            self._attempt(session.close)
-
-
-def _do_nothing() -> None:
-    """Work that only wakes the bridge."""
+        try:
+            self._executor.shutdown()
+            self.node.destroy_node()
+        finally:
+            # At the end of the process, all contexts are shut down.
+            self._context.try_shutdown()

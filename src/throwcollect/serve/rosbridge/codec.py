@@ -10,7 +10,6 @@ import base64
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import cbor2
@@ -20,11 +19,10 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import plain
-from throwcollect.serve.rosbridge.request import BridgeRequest, RequestId
+from throwcollect.serve.rosbridge.operations import Fragment, RequestId
 
 LONGEST_FRAME = 10 * 2**20
 """Largest number of bytes of a frame that a client may send, whole or in fragments."""
-_MOST_PARTS = 100_000
 _OF_A_PART = 64
 """Each part counts as this many characters more than its text, because even an empty part takes memory."""
 
@@ -37,8 +35,8 @@ _TAG_OF = {np.dtype(kind): tag for tag, kind in _TAGS.items()}
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
 
 
-def read_frame(frame: Frame) -> BridgeRequest:
-    """Read a frame of a client, which is JSON, or CBOR in a binary frame."""
+def read_frame(frame: Frame) -> Mapping[str, Any]:
+    """Read the fields of a frame of a client, which is JSON, or CBOR in a binary frame."""
     try:
         # The first byte decides: no CBOR map begins with a byte that can begin a JSON object.
         if isinstance(frame, str) or frame[:1].isspace() or frame[:1] == b"{":
@@ -49,7 +47,7 @@ def read_frame(frame: Frame) -> BridgeRequest:
         raise ConfigError(f"a frame is neither JSON nor CBOR: {error}") from error
     if not isinstance(fields, Mapping):
         raise ConfigError(f"a frame should be an object with an op, got {fields!r:.80}")
-    return BridgeRequest(fields)
+    return fields
 
 
 def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
@@ -98,50 +96,27 @@ def _encode_for_cbor(values: NDArray[Any], kind: str) -> Any:
     return cbor2.CBORTag(_TAG_OF[little.dtype], little.tobytes())
 
 
-@dataclass
-class _Unfinished:
-    total: int
-    parts: dict[int, str] = field(default_factory=dict)
-    size: int = 0
-
-
 class Reassembly:
     """Collects the parts of frames of one client."""
 
     def __init__(self) -> None:
-        self._frames: dict[RequestId, _Unfinished] = {}
+        self._frames: dict[RequestId, dict[int, str]] = {}
         self._size = 0
 
-    def add(self, request: BridgeRequest) -> str | None:
+    def add(self, part: Fragment) -> str | None:
         """Take a part.
 
         Returns:
             The frame, if this was its last part.
         """
-        number, total = request.natural_or("num", _MOST_PARTS), request.natural_or("total", 0)
-        data = request.any("data")
-        if request.id is None or not isinstance(data, str) or not number < total <= _MOST_PARTS:
-            raise ConfigError(
-                "fragment: should have an id, the text data, and num below total",
-                expected=f"at most {_MOST_PARTS} parts, counted from 0",
-            )
-        frame = self._frames.setdefault(request.id, _Unfinished(total))
-        if number not in frame.parts:
-            frame.parts[number] = data
-            frame.size += len(data) + _OF_A_PART
-            self._size += len(data) + _OF_A_PART
-        if frame.total != total:
-            self._drop(request.id)
-            raise ConfigError(f"fragment: total is {total}, and was {frame.total}", expected="the same in all parts")
-        if self._size > LONGEST_FRAME:
-            self._drop(request.id)
-            raise ConfigError(
-                "fragment: the parts are too long", expected=f"at most {LONGEST_FRAME} characters together"
-            )
-        if len(frame.parts) < total:
-            return None
-        self._drop(request.id)
-        return "".join(frame.parts[index] for index in range(total))
-
-    def _drop(self, number: RequestId) -> None:
-        self._size -= self._frames.pop(number).size
+        parts = self._frames.setdefault(part.id, {})
+        if part.num not in parts:
+            parts[part.num] = part.data
+            self._size += len(part.data) + _OF_A_PART
+        is_whole = len(parts) >= part.total
+        if is_whole or self._size > LONGEST_FRAME:
+            del self._frames[part.id]
+            self._size -= sum(len(each) + _OF_A_PART for each in parts.values())
+            if not is_whole:
+                raise ConfigError(f"fragment: should have at most {LONGEST_FRAME} characters in all parts together")
+        return "".join(parts[number] for number in sorted(parts)) if is_whole else None

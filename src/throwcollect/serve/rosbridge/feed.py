@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import orjson
-
 from throwcollect import ros
 from throwcollect.ros.graph_names import find_offered_qos
-from throwcollect.serve.rosbridge.codec import Frame, encode, json_text, plain_values
+from throwcollect.serve.rosbridge.codec import Frame, encode, plain_values
 from throwcollect.units import NS_PER_S
 
 
 class Sample:
-    """One message of a topic, as it came: bytes in CDR, with the time of receipt on the node's clock [ns]."""
+    """One message of a topic, as it came: ``data`` in CDR, with the time of receipt on the node's clock [ns]."""
 
     def __init__(self, data: bytes, message_type: Any, received_ns: int) -> None:
-        self._data = data
+        self.data = data
         self._type = message_type
         self._received_ns = received_ns
-        self._encoded: dict[str, Any] = {}
         self._frames: dict[tuple[str, str], Frame] = {}
 
     def frame(self, topic: str, compression: str) -> Frame:
@@ -28,20 +25,13 @@ class Sample:
         # All clients with the same name and compression get the same frame, which is encoded once.
         key = topic, compression
         if key not in self._frames:
-            fields = {"op": "publish", "topic": topic, "msg": self._make_content(compression)}
-            self._frames[key] = encode(fields, compression)
+            if compression == "cbor-raw":
+                secs, nsecs = divmod(self._received_ns, NS_PER_S)
+                content: Any = {"secs": secs, "nsecs": nsecs, "bytes": self.data}
+            else:
+                content = plain_values(ros.deserialize_message(self.data, self._type), compression)
+            self._frames[key] = encode({"op": "publish", "topic": topic, "msg": content}, compression)
         return self._frames[key]
-
-    def _make_content(self, compression: str) -> Any:
-        if compression == "cbor-raw":
-            secs, nsecs = divmod(self._received_ns, NS_PER_S)
-            return {"secs": secs, "nsecs": nsecs, "bytes": self._data}
-        if compression not in self._encoded:
-            values = plain_values(ros.deserialize_message(self._data, self._type), compression)
-            # The values are kept encoded, as they are the largest part of a frame, and do not depend on a client's name
-            # for the topic.
-            self._encoded[compression] = orjson.Fragment(json_text(values)) if compression == "none" else values
-        return self._encoded[compression]
 
 
 Listener = Callable[[Sample], None]

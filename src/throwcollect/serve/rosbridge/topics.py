@@ -5,35 +5,24 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.belongings import Belongings
-from throwcollect.serve.rosbridge.feed import Feed, Sample
+from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.feed import Sample
 from throwcollect.serve.rosbridge.guarded import open_topic
-from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import COMPRESSIONS, BridgeRequest, Form
+from throwcollect.serve.rosbridge.operations import (
+    COMPRESSIONS,
+    Publish,
+    RequestId,
+    Subscribe,
+    Withdraw,
+)
 
 _DEPTH = 100
 _HEADER = "std_msgs/Header"
-
-
-@dataclass(frozen=True)
-class SubscriptionRequest:
-    """What one subscription of a client asks for.
-
-    Attributes:
-        throttle_s: Least time between two messages [s].
-        queue_length: Messages that may wait for their time; beyond that, the oldest are left out.
-        form: How messages are sent.
-    """
-
-    throttle_s: float = 0.0
-    queue_length: int = 0
-    form: Form = field(default_factory=Form)
 
 
 class RateLimit:
@@ -42,24 +31,24 @@ class RateLimit:
     def __init__(self, send: Callable[[Sample], None], later: Callable[[float, Callable[[], None]], None]) -> None:
         self._send = send
         self._later = later
-        self._queue: deque[Sample] = deque()
-        self._request = SubscriptionRequest()
+        self._queue: deque[Sample] = deque(maxlen=0)
+        self._throttle_s = 0.0
         self._due = 0.0
         self._waits = False
 
-    def change(self, request: SubscriptionRequest) -> None:
-        """Use another rate and form from now on."""
-        self._request = request
-        self._queue = deque(self._queue, maxlen=request.queue_length)
+    def change(self, throttle_s: float, queue_length: int) -> None:
+        """Use another interval and queue from now on: when the queue is full, the oldest samples are left out."""
+        self._throttle_s = throttle_s
+        self._queue = deque(self._queue, maxlen=queue_length)
         # A shorter interval takes effect at once, and not only after the next sample.
-        self._due = min(self._due, time.monotonic() + request.throttle_s)
+        self._due = min(self._due, time.monotonic() + throttle_s)
 
     def offer(self, sample: Sample) -> None:
         """Send a sample, keep it until it is due, or leave it out."""
         now = time.monotonic()
         if now >= self._due and not self._queue:
             self._let_through(sample, now)
-        elif self._request.queue_length:
+        elif self._queue.maxlen:
             self._queue.append(sample)
             self._wait(now)
 
@@ -70,8 +59,8 @@ class RateLimit:
     def _let_through(self, sample: Sample, now: float) -> None:
         # Waiting samples are sent at even intervals, so the next interval begins when this sample was due, and not at
         # `now`, as the timer may be late.
-        is_late = now - self._due < self._request.throttle_s and self._request.queue_length
-        self._due = (self._due if is_late else now) + self._request.throttle_s
+        is_late = now - self._due < self._throttle_s and self._queue.maxlen
+        self._due = (self._due if is_late else now) + self._throttle_s
         self._send(sample)
 
     def _wait(self, now: float) -> None:
@@ -91,187 +80,131 @@ class RateLimit:
 class SubscribedTopic:
     """A topic of a client, which may have several subscriptions to it under different ids."""
 
-    def __init__(self, client: Peer, given: str, type_name: str) -> None:
-        self._client = client
-        self._given = given
-        self._topic = open_topic(given)
+    def __init__(self, client: Client, asked: Subscribe, topic: str, type_name: str) -> None:
         self.type_name = type_name
-        self.requests: dict[object, SubscriptionRequest] = {}
-        self._merged = SubscriptionRequest()
-        self._feed: Feed | None = None
-        self._pace = RateLimit(self._send, client.host.later)
+        self._client = client
+        self._given = asked.topic
+        self._asked: dict[RequestId, Subscribe] = {}
+        self._pace = RateLimit(self._send, client.bridge.later)
+        self.add(asked)
+        self._feed = client.bridge.listen(topic, type_name, self._pace.offer)
 
-    def want(self, name: object, request: SubscriptionRequest) -> None:
+    def add(self, asked: Subscribe) -> None:
         """Add one subscription of the client, or change it."""
-        self.requests[name] = request
+        self._asked[asked.id] = asked
         self._merge()
 
-    def leave(self, name: object) -> None:
-        """Remove one subscription of the client."""
-        del self.requests[name]
-        if self.requests:
+    def leave(self, asked: Withdraw) -> bool:
+        """End one subscription of the client, or all if no id is given; returns whether none is left."""
+        if asked.id is not None and asked.id not in self._asked:
+            raise ConfigError(f"unsubscribe: there is no subscription to {self._given} with the id {asked.id}")
+        self._asked = {each: other for each, other in self._asked.items() if asked.id not in (None, each)}
+        if self._asked:
             self._merge()
-
-    def open(self) -> None:
-        """Begin to listen, in the session of the bridge."""
-        self._feed = self._client.host.session.listen(self._topic, self.type_name, self._pace.offer)
-
-    def lose(self) -> None:
-        """Forget the session, which has ended, and all messages that came by it."""
-        self._feed = None
-        self._pace.clear()
+        else:
+            self.close()
+        return not self._asked
 
     def close(self) -> None:
         """Listen no more."""
-        if self._feed is not None:
-            self._feed.remove(self._pace.offer)
-            self._feed = None
+        self._feed.remove(self._pace.offer)
         # Nothing may come after the client has unsubscribed, also no message that waits for its time.
         self._pace.clear()
 
     def _merge(self) -> None:
-        requests = self.requests.values()
-        self._merged = SubscriptionRequest(
-            min(request.throttle_s for request in requests),
-            max(request.queue_length for request in requests),
-            Form(
-                max((request.form.compression for request in requests), key=COMPRESSIONS.index),
-                min((request.form.fragment_size for request in requests if request.form.fragment_size), default=0),
-            ),
-        )
-        self._pace.change(self._merged)
+        asked = self._asked.values()
+        self._compression = max((each.compression for each in asked), key=COMPRESSIONS.index)
+        self._fragment_size = min((each.fragment_size for each in asked if each.fragment_size), default=0)
+        self._pace.change(min(each.throttle_rate for each in asked) / 1000, max(each.queue_length for each in asked))
 
     def _send(self, sample: Sample) -> None:
         try:
-            frame = sample.frame(self._given, self._merged.form.compression)
+            frame = sample.frame(self._given, self._compression)
         except ValueError as error:
-            self._client.say("error", f"{self._topic}: a message cannot be read: {error}")
+            self._client.report("error", f"{self._given}: a message cannot be read: {error}")
             return
-        self._client.send(frame, self._merged.form.fragment_size)
+        self._client.send(frame, self._fragment_size)
 
 
-class Subscriptions(Belongings[SubscribedTopic]):
-    """All topics that a client subscribes to."""
+class Subscriptions:
+    """All topics that a client subscribes to, by its names for them."""
 
-    def subscribe(self, request: BridgeRequest) -> None:
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._topics: dict[str, SubscribedTopic] = {}
+
+    def subscribe(self, asked: Subscribe) -> None:
         """Subscribe to a topic."""
-        given = request.text("topic")
-        topic = open_topic(given)
-        wanted = SubscriptionRequest(
-            request.natural_or("throttle_rate", 0) / 1000,
-            request.natural_or("queue_length", 0),
-            request.form(),
-        )
-        type_name = self._client.host.session.type_of(topic, request.text_or("type", ""))
-        subscription = self._by_name.get(given)
-        if subscription is not None and subscription.type_name != type_name:
-            raise ConfigError(
-                f"subscribe: {given} is subscribed to as {subscription.type_name} already", expected="that type"
-            )
-        if subscription is None:
-            subscription = SubscribedTopic(self._client, given, type_name)
-            subscription.want(request.id, wanted)
-            subscription.open()
-            self._by_name[given] = subscription
+        topic = open_topic(asked.topic)
+        type_name = self._client.bridge.type_of(topic, asked.type)
+        known = self._topics.get(asked.topic)
+        if known is None:
+            self._topics[asked.topic] = SubscribedTopic(self._client, asked, topic, type_name)
+        elif known.type_name != type_name:
+            raise ConfigError(f"subscribe: {topic} is subscribed to as {known.type_name}", expected="that type")
         else:
-            subscription.want(request.id, wanted)
+            known.add(asked)
 
-    def unsubscribe(self, request: BridgeRequest) -> None:
+    def unsubscribe(self, asked: Withdraw) -> None:
         """End one subscription to a topic, or all if none is named."""
-        given = request.text("topic")
-        subscription = self._by_name.get(given)
-        if subscription is None or (request.id is not None and request.id not in subscription.requests):
-            which = "" if request.id is None else f" with the id {request.id}"
-            raise ConfigError(f"unsubscribe: there is no subscription to {given}{which}")
-        for name in list(subscription.requests) if request.id is None else [request.id]:
-            subscription.leave(name)
-        if not subscription.requests:
-            subscription.close()
-            del self._by_name[given]
-
-
-@dataclass
-class Advertised:
-    """A topic that a client publishes.
-
-    Attributes:
-        client: The client.
-        topic: Absolute name of the topic.
-        type_name: Full name of its type.
-        latched: Whether subscribers that join late get the last message.
-        depth: Messages that are kept for slow subscribers.
-        publisher: The publisher; None while there is no session.
-    """
-
-    client: Peer
-    topic: str
-    type_name: str
-    latched: bool
-    depth: int
-    publisher: ros.Publisher | None = None
-
-    def open(self) -> None:
-        """Announce the topic."""
-        qos = ros.QoSProfile(depth=1 if self.latched else self.depth)
-        if self.latched:
-            qos.durability = ros.DurabilityPolicy.TRANSIENT_LOCAL
-        message_type = ros.get_message(self.type_name)
-        self.publisher = self.client.host.session.node.create_publisher(message_type, self.topic, qos)
-
-    def lose(self) -> None:
-        """Forget the session, which has ended."""
-        self.publisher = None
+        if asked.topic not in self._topics:
+            raise ConfigError(f"unsubscribe: there is no subscription to {asked.topic}")
+        if self._topics[asked.topic].leave(asked):
+            del self._topics[asked.topic]
 
     def close(self) -> None:
-        """Withdraw the topic."""
-        if self.publisher is not None:
-            self.client.host.session.node.destroy_publisher(self.publisher)
+        """End all subscriptions."""
+        for topic in self._topics.values():
+            topic.close()
 
 
-class Publishers(Belongings[Advertised]):
-    """All topics that a client publishes."""
+class Publishers:
+    """All topics that a client publishes, each with the name of its type and its publisher."""
 
-    def advertise(self, request: BridgeRequest) -> None:
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._publishers: dict[str, tuple[str, ros.Publisher]] = {}
+
+    def advertise(self, asked: Publish) -> None:
         """Announce a topic."""
-        self._advertise(open_topic(request.text("topic")), request, request.text("type"))
+        topic = open_topic(asked.topic)
+        type_name = self._client.bridge.type_of(topic, asked.type)
+        if topic in self._publishers:
+            if (known := self._publishers[topic][0]) != type_name:
+                raise ConfigError(f"{topic} is advertised as {known} already", expected="that type")
+            return
+        qos = ros.QoSProfile(depth=1 if asked.latch else asked.queue_size or _DEPTH)
+        if asked.latch:
+            qos.durability = ros.DurabilityPolicy.TRANSIENT_LOCAL
+        publisher = self._client.bridge.node.create_publisher(ros.get_message(type_name), topic, qos)
+        self._publishers[topic] = type_name, publisher
 
-    def unadvertise(self, request: BridgeRequest) -> None:
+    def unadvertise(self, asked: Withdraw) -> None:
         """Withdraw a topic."""
-        topic = open_topic(request.text("topic"))
-        advertised = self._by_name.pop(topic, None)
-        if advertised is None:
-            self._client.say("warning", f"unadvertise: {topic} is not advertised", request.id)
+        topic = open_topic(asked.topic)
+        if topic in self._publishers:
+            _, publisher = self._publishers.pop(topic)
+            self._client.bridge.node.destroy_publisher(publisher)
         else:
-            advertised.close()
+            self._client.report("warning", f"unadvertise: {topic} is not advertised", asked.id)
 
-    def publish(self, request: BridgeRequest) -> None:
+    def publish(self, asked: Publish) -> None:
         """Publish a message; a topic that the client has not announced, but others have, is announced first."""
-        topic = open_topic(request.text("topic"))
-        advertised = self._by_name.get(topic) or self._advertise(topic, request, request.text_or("type", ""))
-        message = ros.get_message(advertised.type_name)()
-        values = request.any("msg")
-        self._stamp(message, values)
-        fill(message, {} if values is None else values)
-        if advertised.publisher is not None:
-            try:
-                advertised.publisher.publish(message)
-            except ValueError as error:
-                raise ConfigError(f"publish: {error}") from error
+        topic = open_topic(asked.topic)
+        if topic not in self._publishers:
+            self.advertise(asked)
+        type_name, publisher = self._publishers[topic]
+        message: Any = ros.get_message(type_name)()
+        if message.get_fields_and_field_types().get("header") == _HEADER and isinstance(asked.msg, Mapping):
+            # The stamp is the present time, unless the client has one.
+            message.header.stamp = self._client.bridge.node.get_clock().now().to_msg()
+        fill(message, {} if asked.msg is None else asked.msg)
+        try:
+            publisher.publish(message)
+        except ValueError as error:
+            raise ConfigError(f"publish: {error}") from error
 
-    def _advertise(self, topic: str, request: BridgeRequest, wanted: str) -> Advertised:
-        type_name = self._client.host.session.type_of(topic, wanted)
-        known = self._by_name.get(topic)
-        if known is not None:
-            if known.type_name != type_name:
-                raise ConfigError(f"{topic} is advertised as {known.type_name} already", expected="that type")
-            return known
-        depth = request.natural_or("queue_size", _DEPTH) or _DEPTH
-        advertised = Advertised(self._client, topic, type_name, request.flag("latch"), depth)
-        advertised.open()
-        self._by_name[topic] = advertised
-        return advertised
-
-    def _stamp(self, message: Any, values: object) -> None:
-        """Set the stamp of the header to the present time; `fill` replaces it if the client has one."""
-        if message.get_fields_and_field_types().get("header") == _HEADER and isinstance(values, Mapping):
-            message.header.stamp = self._client.host.session.node.get_clock().now().to_msg()
+    def close(self) -> None:
+        """Withdraw all topics."""
+        for _, publisher in self._publishers.values():
+            self._client.bridge.node.destroy_publisher(publisher)

@@ -10,8 +10,8 @@ from contextlib import suppress
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from throwcollect.serve.rosbridge.bridge import Bridge
-from throwcollect.serve.rosbridge.bridge_client import BridgeClient
-from throwcollect.serve.rosbridge.codec import LONGEST_FRAME, Frame, json_text
+from throwcollect.serve.rosbridge.codec import Frame, json_text
+from throwcollect.serve.rosbridge.requests import Requests
 
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20
@@ -19,7 +19,6 @@ MOST_BYTES = 32 * 2**20
 
 _MOST_WAITING = 100
 _POLL_S = 0.01
-_TOO_BIG = 1009
 _DROPPED = json_text(
     {
         "op": "status",
@@ -77,31 +76,27 @@ async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool) -> No
     """Accept the WebSocket of a client, and connect it to a bridge until it leaves."""
     await websocket.accept()
     outbox = Outbox(asyncio.get_running_loop())
-    client = bridge.attach(outbox.put, read_only=read_only)
+    requests = Requests(bridge, outbox.put, read_only=read_only)
     sending = asyncio.create_task(_send_all(websocket, outbox))
     try:
-        await _receive_all(websocket, bridge, client)
+        await _receive_all(websocket, bridge, requests)
     finally:
-        client.close()
+        requests.close()
         sending.cancel()
         with suppress(asyncio.CancelledError):
             await sending
 
 
-async def _receive_all(websocket: WebSocket, bridge: Bridge, client: BridgeClient) -> None:
+async def _receive_all(websocket: WebSocket, bridge: Bridge, requests: Requests) -> None:
     while True:
         message = await websocket.receive()
         if message["type"] == "websocket.disconnect":
             return
         text: str | None = message.get("text")
         frame: Frame = message["bytes"] if text is None else text
-        if len(frame) > LONGEST_FRAME or (text is not None and len(text.encode()) > LONGEST_FRAME):
-            await websocket.close(_TOO_BIG, "a frame is longer than 10 MiB")
-            return
-        client.receive(frame)
+        requests.receive(frame)
         # If a client sends faster than the bridge works, its frames are not read for a while, so TCP makes it wait.
-        # Without a router the bridge handles none, but only reading shows that the client has left.
-        while client.waiting > _MOST_WAITING and bridge.is_connected:
+        while requests.waiting > _MOST_WAITING and not bridge.is_over:
             await asyncio.sleep(_POLL_S)
 
 

@@ -23,7 +23,8 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware, uses_rclpy
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.serve.rosbridge import Bridge, attend
+from throwcollect.serve.rosbridge import Bridge, Requests, attend
+from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 from throwcollect.serve.server_process import WEBSOCKETS
 
 PATIENCE_S = 60.0
@@ -52,7 +53,7 @@ class Party:
     def __init__(self, bridge: Bridge, *, read_only: bool = False) -> None:
         self.frames: list[str | bytes] = []
         self.times: list[float] = []
-        self.client = bridge.attach(self._take, read_only=read_only)
+        self.client = Requests(bridge, self._take, read_only=read_only)
         self._taken = 0
 
     def _take(self, frame: str | bytes) -> None:
@@ -115,6 +116,7 @@ def serve_by_websocket(bridge: Bridge) -> Iterator[str]:
     options: dict[str, Any] = {
         "lifespan": "off",
         "ws": WEBSOCKETS,
+        "ws_max_size": LONGEST_FRAME,
         "ws_per_message_deflate": False,
         "timeout_graceful_shutdown": 1,
     }

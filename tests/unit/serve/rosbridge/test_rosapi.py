@@ -132,7 +132,7 @@ def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
     [
         ("get_param", {"name": "/other"}, "'/other' is no name of a parameter; expected: node:parameter"),
         ("get_param", {"name": "/gone:mass"}, "/gone:mass: there is no such node, or it has no such parameter"),
-        ("set_param", {"name": "/gone:mass", "value": "1"}, "/gone: there is no such node, or it tells nobody of its"),
+        ("set_param", {"name": "/gone:mass", "value": "1"}, "/gone: there is no such node, or it has no services"),
         ("get_param", {"name": "/other:trial.leases"}, "nobody but the coordinator may have this parameter"),
         ("set_param", {"name": "/other:trial.leases", "value": "[]"}, "nobody but the coordinator may have this"),
         ("set_param", {"name": "/other:mass", "value": "{}"}, "value should be that of a parameter in JSON"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import orjson
@@ -12,11 +11,10 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, is_hidden
 from throwcollect.ros.message_values import plain
-from throwcollect.serve.rosbridge.errands import Questions
+from throwcollect.serve.rosbridge.calls import Call
+from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.guarded import refuse_leases
-from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import sentence
-from throwcollect.serve.rosbridge.service_calls import Call
+from throwcollect.serve.rosbridge.pending import call_service
 
 _TIMEOUT_S = 5.0
 _NOT_SET = 0
@@ -29,36 +27,37 @@ _LIST = "rcl_interfaces/srv/ListParameters"
 class Parameters:
     """The services of rosapi for parameters, for one client."""
 
-    def __init__(self, client: Peer, questions: Questions) -> None:
+    def __init__(self, client: Client) -> None:
         self._client = client
-        self._questions = questions
 
     def get(self, call: Call) -> None:
-        """Answer with the value of a parameter, or the default that the client gives, in JSON or as a text."""
-        default = call.fields.text_or("default_value", "")
+        """Answer with the value of a parameter, or the default that the client gives, in JSON or as a string."""
+        asked = call.arguments
 
         def answer(value: Any) -> None:
-            if value.type != _NOT_SET:
-                call.reply({"value": orjson.dumps(plain(ros.parameter_value_to_python(value))).decode()})
-            elif default:
-                call.reply({"value": _as_json(default)})
+            if value is not None:
+                call.reply({"value": orjson.dumps(plain(value)).decode()})
+            elif asked.default_value:
+                call.reply({"value": _as_json(asked.default_value)})
             else:
-                call.fail(f"{call.fields.text('name')}: there is no such node, or it has no such parameter")
+                call.fail(f"{asked.name}: there is no such node, or it has no such parameter")
 
         self._get(call, answer)
 
     def has(self, call: Call) -> None:
         """Answer whether there is a parameter."""
-        self._get(call, lambda value: call.reply({"exists": value.type != _NOT_SET}))
+        self._get(call, lambda value: call.reply({"exists": value is not None}))
 
     def set(self, call: Call) -> None:
         """Set a parameter."""
         node, name = _read_name(call)
         try:
-            wanted = orjson.loads(call.fields.text("value"))
+            wanted = orjson.loads(call.arguments.value)
             ros.Parameter(name, value=wanted)
         except (TypeError, ValueError) as error:
-            raise ConfigError(f"{call.given}: value should be that of a parameter in JSON: {error}") from error
+            raise ConfigError(f"{call.asked.name}: value should be that of a parameter in JSON: {error}") from error
+        if not self._is_offered(f"{node}/set_parameters"):
+            raise ConfigError(f"{node}: there is no such node, or it has no services for its parameters")
 
         def answer(response: Any) -> None:
             (result,) = response.results
@@ -68,80 +67,63 @@ class Parameters:
                 call.fail(f"{node}:{name}: {result.reason}")
 
         def set_like(current: Any) -> None:
-            if not self._is_offered(f"{node}/set_parameters"):
-                call.fail(f"{node}: there is no such node, or it tells nobody of its parameters")
-                return
             # JavaScript writes 1.0 as 1, so numbers for a floating-point parameter are converted.
-            value = (
-                _as_floats(wanted) if isinstance(_take_first(ros.parameter_value_to_python(current)), float) else wanted
-            )
+            value = _as_floats(wanted) if isinstance(_take_first(current), float) else wanted
             request = ros.get_service(_SET).Request()
             request.parameters = [ros.Parameter(name, value=value).to_parameter_msg()]
-            try:
-                self._questions.ask(f"{node}/set_parameters", _SET, request, answer, call.fail, _TIMEOUT_S)
-            except ConfigError as error:
-                # This is a callback, whose errors nobody catches, so it has to answer the call itself.
-                call.fail(sentence(error))
+            call_service(self._client, f"{node}/set_parameters", _SET, request, answer, call.fail, _TIMEOUT_S)
 
         self._get(call, set_like)
 
-    def delete(self, call: Call) -> None:
-        """Answer that parameters of nodes cannot be deleted."""
-        call.fail(f"{call.given}: parameters of nodes cannot be deleted")
-
     def list_all(self, call: Call) -> None:
         """Answer with the names of the parameters of all nodes that answer in time."""
-        session = self._client.host.session
-        offered = dict(session.node.get_service_names_and_types())
-        nodes = [
-            service.rpartition("/")[0]
-            for service, types in sorted(offered.items())
-            if _LIST in types and not is_hidden(service)
-        ]
+        services = sorted(self._client.bridge.node.get_service_names_and_types())
+        waiting = {
+            service.rpartition("/")[0] for service, types in services if _LIST in types and not is_hidden(service)
+        }
         names: list[str] = []
-        waits_for = len(nodes)
 
-        def finish(node: str, response: Any) -> None:
-            nonlocal waits_for
-            waits_for -= 1
-            if response is not None:
-                names.extend(f"{node}:{name}" for name in response.result.names)
-            if waits_for == 0:
+        def finish(node: str, found: list[str]) -> None:
+            waiting.discard(node)
+            names.extend(f"{node}:{name}" for name in found)
+            if not waiting:
                 call.reply({"names": sorted(names)})
 
-        if not nodes:
+        if not waiting:
             call.reply({"names": []})
-        for node in nodes:
-            self._questions.ask(
+        for node in sorted(waiting):
+            call_service(
+                self._client,
                 f"{node}/list_parameters",
                 _LIST,
                 ros.get_service(_LIST).Request(),
-                partial(finish, node),
-                lambda _, node=node: finish(node, None),  # type: ignore[misc]
+                lambda response, node=node: finish(node, response.result.names),  # type: ignore[misc]
+                lambda _, node=node: finish(node, []),  # type: ignore[misc]
                 _TIMEOUT_S,
             )
 
     def _get(self, call: Call, answer: Callable[[Any], None]) -> None:
-        """Get the value of a parameter; if there is no such node, `answer` gets a value that is not set."""
+        """Get the value of a parameter, which is None if there is no such node or parameter."""
         node, name = _read_name(call)
-        unset = ros.get_message("rcl_interfaces/msg/ParameterValue")()
+        service = f"{node}/get_parameters"
 
         def take(response: Any) -> None:
-            answer(response.values[0] if response.values else unset)
+            values = [ros.parameter_value_to_python(each) for each in response.values if each.type != _NOT_SET]
+            answer(values[0] if values else None)
 
-        if self._is_offered(f"{node}/get_parameters"):
+        if self._is_offered(service):
             request = ros.get_service(_GET).Request(names=[name])
-            self._questions.ask(f"{node}/get_parameters", _GET, request, take, call.fail, _TIMEOUT_S)
+            call_service(self._client, service, _GET, request, take, call.fail, _TIMEOUT_S)
         else:
-            answer(unset)
+            answer(None)
 
     def _is_offered(self, service: str) -> bool:
-        return service in dict(self._client.host.session.node.get_service_names_and_types())
+        return service in dict(self._client.bridge.node.get_service_names_and_types())
 
 
 def _read_name(call: Call) -> tuple[str, str]:
     """Node and name of a parameter."""
-    given = call.fields.text("name")
+    given = call.arguments.name
     node, separator, name = given.partition(":")
     if not (separator and name):
         raise ConfigError(
@@ -152,7 +134,7 @@ def _read_name(call: Call) -> tuple[str, str]:
 
 
 def _as_json(default: str) -> str:
-    """Turn the default of a client into JSON: ROS# sends a plain text, all others send JSON."""
+    """Turn the default of a client into JSON: ROS# sends a plain string, all others send JSON."""
     try:
         orjson.loads(default)
     except ValueError:

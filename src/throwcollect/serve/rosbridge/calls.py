@@ -1,0 +1,84 @@
+"""Calls of services by a client: how they are answered, and how those of nodes are called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from throwcollect.errors import ConfigError
+from throwcollect.ros.graph_names import absolute_name, find_interface, full_name
+from throwcollect.ros.message_values import fill
+from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.codec import plain_values
+from throwcollect.serve.rosbridge.guarded import refuse_secrets
+from throwcollect.serve.rosbridge.operations import CallService, describe_error
+from throwcollect.serve.rosbridge.pending import call_service
+
+
+class Arguments(BaseModel):
+    """Arguments of the services that the bridge answers; each service has some of them."""
+
+    type: str = ""
+    topic: str = ""
+    service: str = ""
+    node: str = ""
+    name: str = ""
+    value: str = ""
+    default_value: str = ""
+
+
+class Call:
+    """One call of a client, which is answered once.
+
+    Attributes:
+        asked: What the client has sent.
+    """
+
+    def __init__(self, client: Client, asked: CallService) -> None:
+        self._client = client
+        self.asked = asked
+
+    @property
+    def arguments(self) -> Arguments:
+        """Arguments for the bridge."""
+        given = self.asked.args if isinstance(self.asked.args, Mapping) else {}
+        try:
+            return Arguments.model_validate({name: value for name, value in given.items() if value is not None})
+        except ValidationError as error:
+            raise ConfigError(
+                "; ".join(f"{self.asked.name}: {describe_error(each)}" for each in error.errors())
+            ) from error
+
+    def reply(self, values: object) -> None:
+        """Answer with the fields of the response."""
+        fields = {"op": "service_response", "id": self.asked.id, "service": self.asked.name}
+        self._client.answer({**fields, "values": values, "result": True}, self.asked)
+
+    def fail(self, reason: object) -> None:
+        """Answer that the call has failed."""
+        self._client.fail(self.asked, reason)
+
+
+def call_node(client: Client, call: Call) -> None:
+    """Call a service of a node, and answer the client when the node has answered."""
+    service, arguments = absolute_name(call.asked.name), call.asked.args
+    types = dict(client.bridge.node.get_service_names_and_types()).get(service, [])
+    if not types:
+        raise ConfigError(f"nobody offers a service {service}")
+    named = full_name("srv", call.asked.type)
+    type_name = named if named in types else types[0]
+    message = find_interface("srv", type_name).Request()
+    if isinstance(arguments, list):
+        names = list(message.get_fields_and_field_types())
+        if len(arguments) > len(names):
+            raise ConfigError(f"{len(arguments)} arguments are too many", expected=f"at most {len(names)}")
+        arguments = dict(zip(names, arguments, strict=False))
+    fill(message, {} if arguments is None else arguments)
+    refuse_secrets(type_name, message)
+
+    def reply(response: Any) -> None:
+        call.reply(plain_values(response, call.asked.compression))
+
+    call_service(client, service, type_name, message, reply, call.fail, call.asked.timeout)
