@@ -30,7 +30,8 @@ _COMMANDS = {
     "collect:join show:config show:plan show:fit_dmp show:doctor",
     "Runs": "runs:ps runs:wait runs:logs runs:events runs:scale runs:stop runs:down serve:serve serve:view",
     "From a dataset to a throw": "learning:fit learning:aim learning:throw learning:score learning:adapt",
-    "Nodes, as `up` starts them": "node_commands:router node_commands:sim node_commands:coordinator",
+    "Nodes, as `up` starts them": "node_commands:router node_commands:sim node_commands:sensors "
+    "node_commands:coordinator",
     "": "collect:begin",
 }
 """Modules and functions of the commands, by panel of the help; those without a panel are hidden."""

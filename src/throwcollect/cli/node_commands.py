@@ -1,4 +1,4 @@
-"""`throwcollect router`, `sim` and `coordinator`: the nodes, as `up` and Compose start them."""
+"""`throwcollect router`, `sim`, `sensors` and `coordinator`: the nodes, as `up` and Compose start them."""
 
 from __future__ import annotations
 
@@ -43,6 +43,19 @@ def sim(
     from throwcollect.runtimes.nodes import simulation_name_of
 
     run(config, name=name or simulation_name_of(gethostname()), namespace=namespace, record=record)
+
+
+def sensors(config: ConfigArgument = DEFAULT_CONFIG, *, namespace: str = "/sim_0") -> None:
+    """Publish what the sensors of a configuration see of a running simulation.
+
+    Simulations start this themselves when somebody subscribes to such a topic.
+
+    Options:
+        namespace: Namespace of the simulation.
+    """
+    from throwcollect.ros.nodes.sensors.node import run
+
+    run(config, namespace=namespace)
 
 
 def coordinator(directory: DatasetArgument, *, config: Path | None = None) -> None:

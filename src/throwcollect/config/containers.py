@@ -96,8 +96,6 @@ class ContainersConfig(Section):
     image: str | None = None
     """Image of all nodes; null takes `throwcollect` of this version (`make image`). Another one is pulled if it
     is missing."""
-    volume: None = None
-    """Always null; datasets of earlier versions have this key."""
     router: NodeContainerConfig = NodeContainerConfig()
     """The router."""
     sim: NodeContainerConfig = NodeContainerConfig()

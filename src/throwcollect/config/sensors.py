@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
@@ -12,6 +12,8 @@ from throwcollect.config.kinds import Angle
 from throwcollect.config.section import Section, any_of
 
 SensorName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+SensorSections = Mapping[str, object]
+"""Sections of sensors by name, as they are in YAML."""
 Stream = Literal["color", "depth", "segmentation"]
 _Triple = Annotated[list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)]
 _Pixels = Annotated[int, Field(ge=8, le=4096)]

@@ -15,6 +15,7 @@ from throwcollect.config.key import Effect, Key, key_of_field, overlay
 from throwcollect.config.problems import Location, find_problems, join_key, read_index, unknown_key
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section
+from throwcollect.config.sensors import SensorSections
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.wording import suggest
 
@@ -102,7 +103,7 @@ def list_operator_keys() -> tuple[str, ...]:
     return tuple(_find_operator_keys(Config))
 
 
-def with_sensors(config: Config, sensors: Mapping[str, Any]) -> Config:
+def with_sensors(config: Config, sensors: SensorSections) -> Config:
     """Make a copy of a configuration with other sensors: sections by name, as they are in YAML.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.config.sensors import SensorSections
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of, with_sensors, with_values
 from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
@@ -266,7 +267,7 @@ class Throw:
         """The configuration with the values of this trial."""
         return with_values(self._config, self.parameters)
 
-    def render(self, sensors: Mapping[str, Mapping[str, Any]]) -> dict[str, SensorFrames]:
+    def render(self, sensors: SensorSections) -> dict[str, SensorFrames]:
         """Render what other sensors see of the recorded samples.
 
         Args:

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
 from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.schema import Config
+from throwcollect.config.sensors import SensorSections
 from throwcollect.config.values import column_of, with_sensors
 from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.creation import create
@@ -68,9 +69,7 @@ class Copy(NamedTuple):
     trial: int
 
 
-def derive(
-    sources: Sequence[Dataset], output: Path, *, offered: int, sensors: Mapping[str, Any] | None = None
-) -> Derived:
+def derive(sources: Sequence[Dataset], output: Path, *, offered: int, sensors: SensorSections | None = None) -> Derived:
     """Make the dataset that consists of copies of the throws of some others, at least one, that have an episode.
 
     Args:
@@ -91,7 +90,7 @@ def count_without_episode(dataset: Dataset) -> dict[str, int]:
     return dict(sorted(Counter(throws.filter(throws["shard"].is_null())["outcome"].to_pylist()).items()))
 
 
-def _write(sources: Sequence[Dataset], directory: Path, sensors: Mapping[str, Any] | None) -> tuple[int, str]:
+def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections | None) -> tuple[int, str]:
     """Write the dataset; returns the number of its trials, and its digest."""
     began = time.monotonic()
     plan, firsts = join_plans([source.plan for source in sources])
@@ -271,7 +270,7 @@ def _choose(dataset: Dataset, where: str) -> Dataset:
 
 
 def render_sensors(
-    directory: StrPath, output: StrPath, sensors: Mapping[str, Any], *, where: str | None = None
+    directory: StrPath, output: StrPath, sensors: SensorSections, *, where: str | None = None
 ) -> Derived:
     """Copy a dataset, and let other sensors see its throws, as if it had been collected with them.
 

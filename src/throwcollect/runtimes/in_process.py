@@ -65,7 +65,7 @@ class InProcess:
         session.event("started", simulations=1)
         with TrialCollection.open(directory, say=session.say) as collection:
             collection.warn = session.warn
-            simulator = Simulator(self._config, renders=True)
+            simulator = Simulator(self._config, on_frame=lambda: None)
             try:
                 self._simulate(collection, simulator, session)
             finally:

@@ -108,7 +108,7 @@ class Camera:
         nearest = near.max(axis=0)
         steps = (nearest - near.min(axis=0) > _STEP * nearest) & (labels[0] != placed.scene.ground)
         edges = np.flatnonzero((labels != labels[0]).any(axis=0) | steps)
-        one, two, three, four = (shade(seen.choose(each[edges]), placed, optical) for each in quarters)
+        one, two, three, four = np.split(shade(seen.choose(quarters[:, edges].ravel()), placed, optical), 4, axis=1)
         picture[:, edges] = ((one + two) + (three + four)) / 4
 
     def _look(self, placed: PlacedScene, optical: Pose) -> Seen:

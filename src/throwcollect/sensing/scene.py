@@ -16,6 +16,7 @@ from throwcollect.engines.body import Vector
 from throwcollect.episode.frames import WORLD, Frame, FrameTree, MovingFrame, read_frames
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError
+from throwcollect.reproducible_math import cos, sin
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.decimation import Points, cross, dot
@@ -163,14 +164,16 @@ class Scene:
             positions: Position of each joint [rad or m], in the order of `Robot.joints`.
             bodies: Poses in world of the bodies that move, the object first.
         """
-        values = [float(position) for position in positions]
+        values = np.array([*positions], float)
+        # Every processor computes these alike, which the functions of C do not promise.
+        sines, cosines = sin(values / 2).tolist(), cos(values / 2).tolist()
         poses = [Pose()]
         for joint in self._joints:
-            value, (x, y, z) = values[joint.column], joint.frame.axis
+            value, (x, y, z) = float(values[joint.column]), joint.frame.axis
             if joint.frame.slides:
                 motion = Pose(origin=(x * value, y * value, z * value))
             else:
-                sine, cosine = math.sin(value / 2), math.cos(value / 2)
+                sine, cosine = sines[joint.column], cosines[joint.column]
                 motion = Pose.of((0.0, 0.0, 0.0), (x * sine, y * sine, z * sine, cosine))
             poses.append(poses[joint.parent] * joint.offset * motion)
         return PlacedScene(self, (*poses, *bodies))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Hashable, Iterable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -67,7 +67,7 @@ class LiveSimulator(Simulator):
         real_time_factor: Simulated over real time [-]; None for no limit.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, on_frame: Callable[[], None] = lambda: None) -> None:
         self.state = StateCode.PLAYING
         self.real_time_factor = config.sim.real_time_factor
         self._pace = Pace()
@@ -77,7 +77,7 @@ class LiveSimulator(Simulator):
         """Time at which a client last moved a limb [ns], or gave it something to do."""
         self._has_start = False
         """Whether the world has a start state to go on from, which it lacks after a reset of its state has failed."""
-        super().__init__(config, renders=True)
+        super().__init__(config, on_frame=on_frame)
 
     @property
     def running(self) -> bool:

@@ -6,7 +6,7 @@ Replays, scores, the runtime in one process and Python programs call `Simulator.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import replace
 from weakref import finalize
 
@@ -44,7 +44,7 @@ class Simulator:
     Args:
         config: The configuration.
         policy: Policy in the place of the one that the configuration names.
-        renders: Whether episodes have what the sensors of the configuration see.
+        on_frame: Called after each rendered frame of a sensor; None if episodes are to have no frames.
 
     Attributes:
         config: The configuration; a trial replaces some of its values.
@@ -60,8 +60,10 @@ class Simulator:
         WorkerError: If the physics engine does not start.
     """
 
-    def __init__(self, config: Config, policy: Policy | None = None, *, renders: bool = False) -> None:
-        self._renders = renders
+    def __init__(
+        self, config: Config, policy: Policy | None = None, *, on_frame: Callable[[], None] | None = None
+    ) -> None:
+        self._on_frame = on_frame
         self.world = World(config)
         self.close = finalize(self, self.world.close)
         # This is not called when the process ends, which frees all worlds, because engines may be unloaded by then.
@@ -100,7 +102,7 @@ class Simulator:
         self.channels = Channels(config, full_description(config))
         self._settings = Settings(config)
         self._encoder = ChunkEncoder(self.channels, level=config.record.zstd_level)
-        self._sensors = SensorRecorder(self.channels)
+        self._sensors = None if self._on_frame is None else SensorRecorder(self.channels, self._on_frame)
         self._columns = task_of(config).columns
         self.loop: PolicyLoop | None = None
         if config.task.policy is not None:
@@ -216,7 +218,7 @@ class Simulator:
         # The samples are judged as readers of the dataset see them: recorded velocities are in the frames of bodies.
         result = self._judge(config, motion, table.samples, header) if motion else ""
         # What sensors see follows from what is recorded, and is the same when it is rendered later.
-        seen = self._sensors.record(config, header.trial, table.samples) if self._renders else ()
+        seen = self._sensors.record(config, header.trial, table.samples) if self._sensors else ()
         return Episode(header, state, sensors=seen, result=result, conditions=conditions)
 
     def take_recording(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:

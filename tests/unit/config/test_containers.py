@@ -21,7 +21,6 @@ FULL = """\
 run: {simulations: 1, runtime: docker}
 containers:
   image: lab/throws:2
-  volume: null
   router: {ports: {80: 8080, 53/udp: 5353}}
   coordinator: {mounts: [/a:/b], options: {gpus: -1}}
   sim:

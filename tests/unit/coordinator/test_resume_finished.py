@@ -100,7 +100,7 @@ def flip_bit(path: Path) -> None:
 
 def flip_index(path: Path) -> None:
     """Flip a bit in the message index of an episode, which is no longer whole then."""
-    flip(path, (run := find_stored(path, 3).run).offset + run.chunk_index.chunk_length + 100)
+    flip(path, (run := find_stored(path, 3).run).offset + run.chunk_indexes[0].chunk_length + 100)
 
 
 def rename_to_part(path: Path) -> None:

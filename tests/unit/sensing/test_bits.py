@@ -29,8 +29,8 @@ assert len(np.unique(frame.labels)) > 20 and len(np.unique(scan.labels)) > 4
 pictures = [frame.color, frame.depth, frame.labels, head.color, head.depth, scan.ranges, scan.labels]
 # Few of the last bits of what pictures are made of would be seen in them.
 seen = View.of(placed, Pose.from_rpy((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), lambda *_: True)
-bodies = scene.corners, scene.normals, np.array(placed.poses[-2].rows)
-for each in (*pictures, *bodies, seen.corners, *seen.find_planes()):
+numbers = [scene.corners, scene.normals, np.array(placed.poses[-2].rows), seen.corners, *seen.find_planes()]
+for each in pictures + numbers:
     print(hashlib.sha256(each.tobytes()).hexdigest())
 """
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import time
 from functools import partial
 from pathlib import Path
@@ -14,9 +16,10 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves, with_values
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.sensor_topics import SensorTopic
+from throwcollect.episode.sensor_topics import SensorTopic, sensor_topics
 from throwcollect.episode.topics import odometry, put_stamps
 from throwcollect.errors import ConfigError
+from throwcollect.own_process import make_command
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.ros import Node, Parameter, Publisher, QoSProfile, get_message, graph_changes
@@ -136,18 +139,56 @@ class SensorNode(Node):
                 self._made[topic.name].publish(message.tobytes())
 
 
+class SensorProcess:
+    """Starts the node of the sensors of a simulation when one of their topics has a subscriber.
+
+    The simulation has publishers of these topics, too, by which subscribers find them.
+
+    Args:
+        node: Node of the simulation.
+        config: Its configuration, and the file of it.
+    """
+
+    def __init__(self, node: Node, config: Config, file: Path) -> None:
+        topics = [topic for each in sensor_topics(config).values() for topic in each.values() if topic.stream != "pose"]
+        self._node, self._file = node, file
+        self._offered = [
+            node.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED) for topic in topics
+        ]
+        self._process: subprocess.Popen[bytes] | None = None
+        self._noticed_changes = -1
+
+    def follow_up(self) -> None:
+        """Start the node if it is wanted and does not run."""
+        if not self._offered or (changes := graph_changes(self._node)) == self._noticed_changes:
+            return
+        self._noticed_changes = changes
+        wanted = any(publisher.get_subscription_count() for publisher in self._offered)
+        if wanted and (self._process is None or self._process.poll() is not None):
+            words = ["sensors", str(self._file), "--namespace", self._node.get_namespace()]
+            self._process = subprocess.Popen(make_command() + words, stdin=subprocess.DEVNULL)
+
+    def close(self) -> None:
+        """End the node."""
+        if self._process is not None:
+            self._process.terminate()
+            self._process.wait()
+
+
 def run(config: Path, *, namespace: str) -> None:
-    """Publish what the sensors of a configuration see of the simulation in a namespace, until a signal asks to stop.
+    """Publish what the sensors of a configuration see of the simulation in a namespace.
+
+    This ends by a signal, and with the process that has started it.
 
     Raises:
         ConfigError: If the configuration is wrong.
     """
-    read = load(config)
+    read, parent = load(config), os.getppid()
     ros.init()
     node = SensorNode(read, namespace)
     executor, stopped = begin_to_serve(node)
     try:
-        while not stopped():
+        while not stopped() and os.getppid() == parent:
             ros.spin_some(executor, timeout_sec=node.patience_s)
             node.follow_up()
     finally:

@@ -9,6 +9,7 @@ from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
+from throwcollect.ros.nodes.sensors.node import SensorProcess
 from throwcollect.ros.nodes.simulation.node import SimulationNode
 from throwcollect.ros.serving import begin_to_serve
 from throwcollect.sim.live import LiveSimulator
@@ -25,7 +26,8 @@ def run(config: Path, *, name: str, namespace: str | None = None, record: Path |
         namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
         record: Directory of the dataset that clients may record into; None if they may not.
     """
-    simulation = LiveSimulator(load(config))
+    heartbeat = Heartbeat()
+    simulation = LiveSimulator(load(config), heartbeat.beat)
     if namespace is None and simulation.config.run.root_namespace:
         namespace = "/"
     ros.init()
@@ -35,7 +37,7 @@ def run(config: Path, *, name: str, namespace: str | None = None, record: Path |
         raise ConfigError(str(error)) from error
     nodes = (node, *node.other_nodes)
     executor, stopped = begin_to_serve(*nodes)
-    heartbeat = Heartbeat()
+    sensors = SensorProcess(node, simulation.config, config)
     print(ready_line(name), flush=True)
     try:
         while not stopped() and not node.quitting:
@@ -45,8 +47,10 @@ def run(config: Path, *, name: str, namespace: str | None = None, record: Path |
             if simulation.running:
                 node.advance()
             node.follow_up()
+            sensors.follow_up()
         node.get_logger().info(f"ends: {signal.Signals(stopped()).name if stopped() else 'a client asked for it'}")
     finally:
+        sensors.close()
         for served in reversed(nodes):
             served.destroy_node()
         ros.shutdown()
