@@ -18,10 +18,11 @@ from plotly.subplots import make_subplots
 
 from throwcollect.report.contents import Tile
 from throwcollect.report.measured import JointPeaks, SweptKey, Throughput, choose_points, read_numbers
-from throwcollect.report.outcomes import SUCCESS, Outcomes, in_words
+from throwcollect.report.outcomes import Outcomes, in_words
 from throwcollect.robots.surroundings import BodyLook
+from throwcollect.tasks.outcome_styles import LANDED, style_of
 
-BLUE = SUCCESS.colour
+BLUE = style_of(LANDED).colour
 NEUTRAL = "#8a8f98"
 LEGEND_ABOVE = {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"}
 LIMIT_LINE = {"color": "#D55E00", "width": 1.5, "dash": "dash"}

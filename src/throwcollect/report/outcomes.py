@@ -8,45 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED
+from throwcollect.tasks.outcome_styles import LANDED, STYLES, Style, style_of
 
-
-@dataclass(frozen=True)
-class Style:
-    """How an outcome is drawn.
-
-    Attributes:
-        colour: In hex; people who confuse red and green tell these colours apart, on white and on black.
-        symbol: Marker, as plotly calls it.
-    """
-
-    colour: str
-    symbol: str
-
-
-SUCCESS = Style("#0072B2", "circle")
-_SHARED = {
-    LIMIT_VIOLATED: Style("#E69F00", "diamond"),
-    TRACKING_FAILED: Style("#999933", "cross"),
-    LOST: Style("#7F7F7F", "hexagon"),
-    REFUSED: Style("#B3B3B3", "star"),
-}
-"""Failures of any task."""
-_FAILURES = (
-    Style("#56B4E9", "square"),
-    Style("#8A63D2", "star-triangle-down"),
-    Style("#CC79A7", "triangle-up"),
-    Style("#D55E00", "x"),
-    Style("#44AA99", "hourglass"),
-    Style("#009E73", "triangle-down"),
-    Style("#332288", "diamond-tall"),
-    Style("#AA4499", "diamond-wide"),
-    Style("#CC6677", "bowtie"),
-    Style("#C4B04A", "triangle-left"),
-    Style("#117733", "triangle-right"),
-    Style("#882255", "pentagon"),
-)
-"""Styles of the other failures of a task, in its order."""
 _VERBS = {
     "landed": ("land", "landed"),
     "in_bin": ("stay in the bin", "stayed in the bin"),
@@ -74,10 +37,10 @@ class Outcomes:
     declared: tuple[str, ...]
 
     @classmethod
-    def of(cls, outcomes: Iterable[str], declared: Sequence[str] = ("landed",)) -> Outcomes:
+    def of(cls, outcomes: Iterable[str], declared: Sequence[str] = (LANDED,)) -> Outcomes:
         """Outcomes in the order of trials, and those that the task has, the success first."""
         listed = list(outcomes)
-        order = {name: place for place, name in enumerate(dict.fromkeys((*declared, *_SHARED)))}
+        order = {name: place for place, name in enumerate(dict.fromkeys((*declared, *STYLES)))}
         names = sorted(set(listed), key=lambda name: (order.get(name, len(order)), name))
         index = {name: code for code, name in enumerate(names)}
         return cls(tuple(names), np.array([index[name] for name in listed], dtype=np.intp), tuple(order))
@@ -104,11 +67,7 @@ class Outcomes:
 
     def style_of(self, name: str) -> Style:
         """How an outcome is drawn."""
-        if name == self.success:
-            return SUCCESS
-        known = dict.fromkeys((*self.declared, *self.names))
-        failures = [each for each in known if each not in _SHARED and each != self.success]
-        return _SHARED.get(name) or _FAILURES[failures.index(name) % len(_FAILURES)]
+        return style_of(name, self.success)
 
     def are(self, name: str) -> NDArray[np.bool_]:
         """Which trials have an outcome, shape ``(n_trials,)``."""

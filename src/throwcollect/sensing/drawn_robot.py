@@ -150,7 +150,7 @@ def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
         if look.name not in moving:
             frame, (place, turn) = WORLD, _move(Placement(look.position_m, look.rpy_rad), look.within)
         shapes.append(
-            DrawnShape(frame, place, turn, look.size_m, look.shape, look.mesh, _read_hex(look.color), look.name)
+            DrawnShape(frame, place, turn, look.size_m, look.shape, look.mesh, read_hex(look.color), look.name)
         )
     return tuple(shapes)
 
@@ -195,7 +195,8 @@ def _make_material(name: str, rgba: Rgba) -> ElementTree.Element:
     return material
 
 
-def _read_hex(color: str) -> Rgba:
+def read_hex(color: str) -> Rgba:
+    """Read a colour such as ``#ff7300``."""
     r, g, b = (value / 255 for value in bytes.fromhex(color[1:]))
     return r, g, b, 1.0
 

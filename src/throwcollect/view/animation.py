@@ -23,6 +23,7 @@ from throwcollect.files import write_file
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import bodies_of, looks_of, object_of, starts_in_tool
 from throwcollect.sensing.drawn_robot import draw_bodies_of, draw_robot_of
+from throwcollect.tasks.outcome_styles import style_of
 from throwcollect.view.viewer_directory import choose_throws
 
 _OUTWARD = np.array([0.32, -1.0, 0.22])
@@ -52,7 +53,7 @@ _ROOM_M = 0.15
 _GRID_M = 0.5
 # The components are multiples of four, as Pillow uses only their upper six bits to find the nearest colour of a GIF.
 _SKY, _GROUND, _LINE = (244, 248, 252), (232, 236, 240), (208, 216, 224)
-_HELD, _FLOWN, _LANDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
+_HELD = (150, 156, 164)
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,10 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
     require("PIL")
     dataset = Dataset.open(directory)
     throw = choose_throws(dataset, None if trial is None else [trial])[0]
-    pictures = _draw_all(throw, dataset.config_of(throw), slow)
+    colour = style_of(throw.outcome, dataset.config.task.success).colour
+    pictures = _draw_all(throw, dataset.config_of(throw), slow, colour)
     if kind == "GIF":
-        pictures = _reduce_colours(pictures)
+        pictures = _reduce_colours(pictures, colour)
     times = [_FRAME_MS] * (len(pictures) - 1) + [_LAST_FRAME_MS]
     buffer = io.BytesIO()
     pictures[0].save(
@@ -92,8 +94,8 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
     return Animation(output, throw.trial, len(pictures), shown_s, len(buffer.getvalue()))
 
 
-def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
-    """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
+def _draw_all(throw: Throw, config: Config, slow: float, colour: str) -> list[Any]:
+    """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample, with a flight of this colour."""
     (_, samples), landing = throw.read_samples(), throw.events.end
     joints = robot_of(config).joints
     times_s = samples.seconds_since(samples.stamps_ns[0])
@@ -124,11 +126,11 @@ def _draw_all(throw: Throw, config: Config, slow: float) -> list[Any]:
             end = landing.position if landing and number == shown[-1] else None
             if flies := starts_in_tool(config):
                 ground.shade(picture, path[-1])
-                ground.mark(picture, path, released, end)
+                ground.mark(picture, path, released, end, colour)
             ground.paste(picture, renderer)
             # What slides on a body would have its path behind the picture of that body.
             if not flies:
-                ground.mark(picture, path, released, end)
+                ground.mark(picture, path, released, end, colour)
             pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
     return pictures
 
@@ -146,16 +148,16 @@ def _find_heading(flight: NDArray[np.float64]) -> float:
     return float(np.arctan2(y, x)) if np.hypot(x, y) >= _FAR_FLIGHT_M else 0.0
 
 
-def _reduce_colours(pictures: list[Any]) -> list[Any]:
+def _reduce_colours(pictures: list[Any], flight: str) -> list[Any]:
     """Give pictures the 256 colours that a GIF can have.
 
-    Thin lines have so few pixels that their colours would not be chosen, and the cross would be as orange as the path.
-    So the colours of lines, and of their smooth edges on the ground, are set here.
+    Thin lines have so few pixels that their colours would not be chosen. So the colours of lines, and of their smooth
+    edges on the ground, are set here.
     """
     ground = np.array(_GROUND)
     fixed = [_SKY, _GROUND, _LINE] + [
         tuple(np.round(ground + share * (np.array(color) - ground)).astype(int).tolist())
-        for color in (_HELD, _FLOWN, _LANDED)
+        for color in (_HELD, tuple(bytes.fromhex(flight[1:])))
         for share in (0.25, 0.5, 0.75, 1.0)
     ]
     others = pictures[-1].quantize(256 - len(fixed)).getpalette()
@@ -210,18 +212,20 @@ class Ground:
         body = images.fromarray(seen)
         picture.paste(body, (0, 0), body)
 
-    def mark(self, picture: Any, path: NDArray[np.float64], left: int, end: NDArray[np.float64] | None) -> None:
+    def mark(
+        self, picture: Any, path: NDArray[np.float64], left: int, end: NDArray[np.float64] | None, colour: str
+    ) -> None:
         """Draw a path of the object's centre in world [m], shape ``(n, 3)``, and a cross where it ended.
 
-        It left the tool with the sample of number `left`.
+        It left the tool with the sample of number `left`, and is drawn in this colour from there on.
         """
         pen = drawing.Draw(picture)
-        for part, color in ((path[: left + 1], _HELD), (path[left:], _FLOWN)):
+        for part, color in ((path[: left + 1], _HELD), (path[left:], colour)):
             if len(part) > 1:
                 pen.line(self._find_pixels(part), fill=color, width=3, joint="curve")
         if end is not None:
             for step in (np.array([0.1, 0.1, 0.0]), np.array([0.1, -0.1, 0.0])):
-                pen.line(self._find_pixels(np.stack([end - step, end + step])), fill=_LANDED, width=3)
+                pen.line(self._find_pixels(np.stack([end - step, end + step])), fill=colour, width=3)
 
     def shade(self, picture: Any, place: NDArray[np.float64]) -> None:
         """Draw the shadow of the object on the ground."""

@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 from rclzenoh.interfaces import get_message
 from throwcollect.config.schema import Config
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import Row, body_state
+from throwcollect.dataset.throws_table import body_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import make_header
 from throwcollect.errors import ConfigError
-from throwcollect.sensing.drawn_robot import DrawnShape, Rgba, draw_bodies_of
+from throwcollect.sensing.drawn_robot import DrawnShape, Rgba, draw_bodies_of, read_hex
+from throwcollect.tasks.outcome_styles import style_of
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
-_SUCCEEDED: Rgba = (0.0, 0.75, 0.35, 1.0)
-_FAILED: Rgba = (0.9, 0.1, 0.1, 1.0)
 _PLANE: Rgba = (0.3, 0.5, 0.9, 0.15)
 _LABEL: Rgba = (1.0, 1.0, 1.0, 1.0)
 _OTHERS_ALPHA = 0.25
@@ -47,6 +46,11 @@ class ShownThrow:
     config: Config
     start_ns: int
     path: NDArray[np.float64]
+
+    @property
+    def rgba(self) -> Rgba:
+        """Colour of its outcome."""
+        return read_hex(style_of(self.throw.outcome, self.config.task.success).colour)
 
 
 def shape_markers(name: str, shapes: Sequence[DrawnShape], locate: Callable[[str], Path], stamp_ns: int) -> Any:
@@ -84,7 +88,7 @@ def throw_markers(throw: ShownThrow) -> Any:
     markers += shape_markers("bodies", draw_bodies_of(throw.config), Path, stamp).markers
     markers.append(_make_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
     for point in throw.config.task.events:
-        markers += _make_point(point, throw.throw.row, stamp)
+        markers += _make_point(point, throw)
     return array(markers=markers)
 
 
@@ -127,20 +131,19 @@ def _make_path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float
     rate, left, last = throw.config.record.rate_hz, throw.throw.events.left, len(throw.path) - 1
     chosen = [*range(0, last, max(1, rate // _POINTS_PER_S)), last]
     release = math.inf if left is None else left.time_s * rate
-    flown = _SUCCEEDED if throw.throw["outcome"] == throw.config.task.success else _FAILED
-    colors = {held: color(r=r, g=g, b=b, a=a * alpha) for held, (r, g, b, a) in ((True, _HELD), (False, flown))}
+    colors = {held: color(r=r, g=g, b=b, a=a * alpha) for held, (r, g, b, a) in ((True, _HELD), (False, throw.rgba))}
     marker = get_message("visualization_msgs/msg/Marker")
     line = _make_marker(
-        namespace, marker.LINE_STRIP, (*flown[:3], alpha), (width, 0.0, 0.0), stamp_ns, number=throw.throw["trial"]
+        namespace, marker.LINE_STRIP, (*throw.rgba[:3], alpha), (width, 0.0, 0.0), stamp_ns, number=throw.throw["trial"]
     )
     line.points = [point(x=x, y=y, z=z) for x, y, z in throw.path[chosen].tolist()]
     line.colors = [colors[sample < release] for sample in chosen]
     return line
 
 
-def _make_point(name: str, row: Row, stamp_ns: int) -> list[Any]:
+def _make_point(name: str, throw: ShownThrow) -> list[Any]:
     """A dot with a label; nothing if the throw has no such point."""
-    state = body_state(row, name)
+    state, stamp_ns = body_state(throw.throw.row, name), throw.start_ns
     if state is None:
         return []
     (x, y, z), speed = state.position, math.hypot(*state.velocity)
@@ -150,7 +153,7 @@ def _make_point(name: str, row: Row, stamp_ns: int) -> list[Any]:
         "landing": f"landing x {x:.2f} m, y {y:.2f} m, {speed:.2f} m/s",
         "rest": f"rest x {x:.2f} m, y {y:.2f} m",
     }.get(name, f"{name} {state.time_s:.2f} s, {speed:.2f} m/s")
-    dot = _make_marker(name, marker.SPHERE, _SUCCEEDED, (_POINT_M,) * 3, stamp_ns)
+    dot = _make_marker(name, marker.SPHERE, throw.rgba, (_POINT_M,) * 3, stamp_ns)
     label = _make_marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text
     _place(dot, x, y, z)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from throwcollect.report.contents import format_duration, format_share, format_size
-from throwcollect.report.outcomes import SUCCESS, Outcomes
+from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.sections import tabulate_failures
 from throwcollect.report.throw.flights import Residuals, show_physics
 from throwcollect.tasks.result import REFUSED
@@ -28,7 +28,7 @@ def test_every_outcome_of_a_task_has_a_colour_of_its_own() -> None:
         found = Outcomes.of([*(outcome.value for outcome in task), REFUSED, "unheard of"], list(task))
         assert found.names[0] == found.success
         styles = [found.style_of(name) for name in found.names]
-        assert styles[0] == SUCCESS
+        assert styles[0] == style_of("landed")
         for looks in ({each.colour for each in styles}, {each.symbol for each in styles}):
             assert len(looks) == len(styles)
         # An outcome looks the same whichever others occur.

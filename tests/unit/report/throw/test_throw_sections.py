@@ -13,7 +13,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.figures import Points
-from throwcollect.report.outcomes import SUCCESS, Outcomes
+from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.throw.throw_sections import (
     CellAxis,
     _show_cells,
@@ -21,6 +21,7 @@ from throwcollect.report.throw.throw_sections import (
     draw_coverage_map,
     report_throws,
 )
+from throwcollect.tasks.outcome_styles import style_of
 from throwcollect.tasks.throw_into.into_result import IntoOutcome
 
 
@@ -119,4 +120,4 @@ def test_a_report_on_throws_into_a_bin_shows_the_bin_and_which_throws_stayed_in_
         assert (max(pole_drawn.x), max(pole_drawn.y)) == pytest.approx((1.1, 2.1 if column == 1 else 1.0), abs=1e-3)
         assert pole_drawn.fillcolor == "rgba(63, 111, 176, 0.200)"
     legend = {trace.name: trace.marker.color for trace in above.figure.data if trace.showlegend is not False}
-    assert legend["in bin"] == SUCCESS.colour
+    assert legend["in bin"] == style_of("landed").colour
