@@ -12,8 +12,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
+import throwcollect
 from tests.e2e.chromium import browse, chromium
-from tests.e2e.collection import FAST, write_config
+from tests.e2e.collection import FAST, collect_here, write_config
 from tests.e2e.page import CHANGED, find_own_errors, load, press, serve
 from tests.unit.serve.made_model import make_model
 from throwcollect.runs.records import Records
@@ -116,11 +117,11 @@ def test_a_session_is_recorded_by_a_button(address: str) -> None:
 
 
 @pytest.fixture
-def over() -> Iterator[tuple[str, str]]:
-    """Two runs that have ended."""
+def over(tmp_path: Path) -> Iterator[tuple[str, str]]:
+    """Two runs that have ended; the dataset of the first one is not there."""
     runs, now = [Records().new(name) for name in ("early", "late")], datetime.now(timezone.utc)
-    for run in runs:
-        record = RunRecord(run.id, "small", "local", "/none", "/none/logs", 0, now, 1, 1, ended=now, exit_code=0)
+    for run, place in zip(runs, ("/none", str(tmp_path / "data")), strict=True):
+        record = RunRecord(run.id, "small", "local", place, f"{place}/logs", 0, now, 1, 1, ended=now, exit_code=0)
         run.write(record)
         run.close()
     yield runs[0].run, runs[1].run
@@ -140,6 +141,51 @@ def test_the_page_shows_the_run_that_its_address_names(address: str, over: tuple
         tab.ask("Page.navigate", url=make_page_address(server, over[1]))
         tab.wait_for(f"{watched} === {json.dumps(over[1])}")
         assert tab.evaluate("location.hash") == ""
+        tab.wait_for("document.querySelector('#empty').textContent.includes('is not there')")
+        assert [error for error in find_own_errors(tab) if "404" not in error] == []
+
+
+_CLICK_LANDING = """
+((trial) => {
+  const map = document.querySelector('#map');
+  const { left, top } = map.getBoundingClientRect();
+  for (let y = 0; y < map.clientHeight; y += 2) {
+    for (let x = 0; x < map.clientWidth; x += 2) {
+      const at = { clientX: left + x, clientY: top + y };
+      map.dispatchEvent(new MouseEvent('mousemove', at));
+      if (map.title.startsWith(`trial ${trial},`)) return map.dispatchEvent(new MouseEvent('click', at));
+    }
+  }
+  return false;
+})
+"""
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_a_landing_of_a_run_that_has_ended_is_clicked_and_its_throw_is_replayed(
+    address: str, over: tuple[str, str], tmp_path: Path
+) -> None:
+    collect_here(write_config(tmp_path, trials=4, sim=FAST), tmp_path / "data")
+    throws = throwcollect.load(tmp_path / "data")
+    with browse(f"{address}&run={over[1]}", width=390, height=800) as tab:
+        load(tab)
+        replayed = "throwcollect.playback.at('replay')?.shown.trial"
+        tab.wait_for(f"{replayed} === 0 && throwcollect.view.stations.get('replay').robot?.isWhole")
+        assert tab.evaluate(f"{_CLICK_LANDING}(2)"), "no landing of trial 2 can be clicked"
+        tab.wait_for(f"{replayed} === 2")
+        landing = tab.evaluate("throwcollect.playback.at('replay').shown.landing")
+        assert landing == throws[2].events.landing.position.tolist()
+        assert tab.evaluate("location.hash") == f"#run={over[1]}&trial=2"
+        tab.evaluate("document.querySelector('#compare').click(); document.querySelector('#stored-after').click()")
+        tab.wait_for(f"{replayed} === 3 && throwcollect.view.stations.get('replay').trails.count === 2")
+        # The address opens the same two throws again.
+        tab.ask("Page.reload")
+        load(tab)
+        tab.wait_for(f"{replayed} === 3 && throwcollect.view.stations.get('replay').trails.count === 2")
+        assert tab.evaluate("document.querySelector('#time').value").endswith(
+            "trial 3, landed; transparent: trial 2, landed"
+        )
+        assert tab.evaluate("document.documentElement.scrollWidth") == 390
         assert find_own_errors(tab) == []
 
 

@@ -51,7 +51,7 @@ class Section(BaseModel):
         schema = handler(core_schema)
         properties = handler.resolve_ref_schema(schema).get("properties", {})
         for name, docstring in _read_docstrings(cls).items():
-            properties[name]["description"] = docstring
+            properties[cls.model_fields[name].alias or name]["description"] = docstring
         return schema
 
 

@@ -115,7 +115,7 @@ def read_commits(
 
     Args:
         path: The file; if it is missing, it has no trials.
-        columns: Values to read of each trial: `trial`, `outcome`, and numbers. Trials without one of them are left out.
+        columns: Values to read of each trial: `trial`, `outcome`, and numbers; None where there is none.
         first: Where the part begins [bytes]: 0, or where an earlier part has ended.
         most_bytes: Largest size of the part, which is more than that of a line.
 
@@ -136,9 +136,8 @@ def read_commits(
     whole = data[: data.rfind(b"\n") + 1]
     entries = [_parse(line) for line in whole.splitlines() if b'"commit"' in line]
     found = [
-        [entry[name] for name in columns]
+        [value if isinstance(value := entry.get(name), int | float | str) else None for name in columns]
         for entry in entries
-        if all(isinstance(entry.get(name), int | float | str) for name in columns)
     ]
     return found, first + len(whole), bool(rest)
 

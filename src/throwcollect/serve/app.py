@@ -14,7 +14,7 @@ from fastapi.staticfiles import StaticFiles
 from throwcollect.errors import NotFoundError
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
-from throwcollect.serve.instance_routes import make_instance_routes, make_log_routes
+from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
 from throwcollect.serve.models import make_model_routes
@@ -23,6 +23,7 @@ from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import STATES, ComponentState, WholeState
 from throwcollect.serve.states import States
+from throwcollect.serve.throw_routes import make_throw_routes
 from throwcollect.serve.view_routes import make_view_routes
 from throwcollect.version import __version__
 
@@ -43,9 +44,11 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
     states, bridges = States(instances.catalogue), Bridges()
     for routes in (
         _make_general_routes(states, keys),
+        make_component_routes(instances.catalogue),
         make_instance_routes(instances, states),
         make_log_routes(instances),
         make_dataset_routes(instances),
+        make_throw_routes(instances),
         make_view_routes(instances, bridges),
         make_model_routes(models),
     ):

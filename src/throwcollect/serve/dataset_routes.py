@@ -9,16 +9,12 @@ import tarfile
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 from fastapi.responses import FileResponse, StreamingResponse
-from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
-from throwcollect.config.loader import load
-from throwcollect.dataset.directory import CARD, JOURNAL, MANIFEST, PROVENANCE, THROWS, config_path
-from throwcollect.dataset.journal import read_commits
+from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE
 from throwcollect.dataset.manifest import FileEntry, read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
@@ -26,34 +22,10 @@ from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe
-from throwcollect.sweep.parquet_file import read_parquet
 
 _PIECE_BYTES = 1 << 20
 _OWN_FILES = {CARD, PROVENANCE}
 """Files that the manifest leaves out, because they differ between two collections of the same dataset."""
-_MOST_LANDINGS = 20_000
-_JOURNAL_BYTES = 4_000_000
-"""Most landings, and most bytes of a journal (about 15,000 throws), for one answer."""
-
-
-class LandingPoints(BaseModel):
-    """Where throws came down.
-
-    Attributes:
-        landings: x and y [m], outcome and trial; a trial that was collected again may be there twice.
-        total: Number of landings that these were evenly chosen from.
-        outcomes: Of a finished dataset, how many trials with an episode ended with each outcome.
-        following: What to ask for as `first` next, for landings that come later, if the dataset grows.
-        is_finished: Whether the dataset is finished.
-        has_more: Whether there are later ones by now.
-    """
-
-    landings: list[tuple[float, float, str, int]]
-    total: int
-    outcomes: dict[str, int]
-    following: int
-    is_finished: bool
-    has_more: bool
 
 
 def make_dataset_routes(instances: Instances) -> APIRouter:
@@ -95,20 +67,11 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
         async with reporting:
             return await asyncio.to_thread(lambda: _report(_find_finished(instances, instance), instance))
 
-    @router.get("/landings")
-    def landings(instance: str, first: Annotated[int, Query(ge=0)] = 0) -> LandingPoints:
-        """Where throws came down, or pucks rest, of a finished dataset or of one that grows; none for other tasks."""
-        directory = _get_collection(instances, instance).context.directory
-        end = next(reversed(load(config_path(directory)).task.events), "landing")
-        columns = (f"{end}_x_m", f"{end}_y_m", "outcome", "trial")
-        if _is_finished(directory):
-            return _read_landings(directory, columns)
-        return _read_landings_so_far(directory, columns, first)
-
     return router
 
 
-def _get_collection(instances: Instances, instance: str) -> Run:
+def get_collection(instances: Instances, instance: str) -> Run:
+    """Find a run whose dataset has a directory on this machine."""
     run = instances.get(instance)
     if run.record.kind != "collection":
         raise NotFoundError(f"run {instance} has no dataset in a directory")
@@ -137,7 +100,8 @@ def _report(directory: Path, name: str) -> FileResponse:
     return FileResponse(page, filename=page.name, background=BackgroundTask(scratch.cleanup))
 
 
-def _is_finished(directory: Path) -> bool:
+def is_finished(directory: Path) -> bool:
+    """Whether a dataset has come to its end, and no run goes on with it."""
     # A dataset that another run continues is not finished, even if it has a manifest.
     grows = any(each.status == "running" for each in Records().into(directory))
     return not grows and (directory / MANIFEST).is_file()
@@ -145,9 +109,9 @@ def _is_finished(directory: Path) -> bool:
 
 def _find_finished(instances: Instances, instance: str) -> Path:
     """Directory of the finished dataset of a run."""
-    run = _get_collection(instances, instance)
+    run = get_collection(instances, instance)
     directory = run.context.directory
-    if not _is_finished(directory):
+    if not is_finished(directory):
         raise ConflictError(f"run {instance}: its dataset is not finished")
     return directory
 
@@ -158,31 +122,6 @@ def _list_names(directory: Path) -> list[str]:
         MANIFEST,
         *sorted(_OWN_FILES & set(os.listdir(directory))),
     ]
-
-
-def _read_landings(directory: Path, columns: tuple[str, ...]) -> LandingPoints:
-    """Read the landings of a finished dataset."""
-    # All columns of a million throws would take half a gigabyte.
-    table = read_parquet(directory / THROWS, (*columns, "digest"))
-    recorded = table.filter(table["digest"].is_valid())
-    outcomes = {each["values"]: each["counts"] for each in recorded["outcome"].value_counts().to_pylist()}
-    rows: list[Any] = []
-    total = 0
-    if set(columns) <= set(table.column_names):
-        landed = table.select([*columns]).drop_null()
-        total = len(landed)
-        # The step is rounded up, so that there are never more landings than allowed.
-        some = landed.take([*range(0, total, max(1, -(-total // _MOST_LANDINGS)))])
-        rows = list(zip(*(column.to_pylist() for column in some.columns), strict=True))
-    return LandingPoints(landings=rows, total=total, outcomes=outcomes, following=0, is_finished=True, has_more=False)
-
-
-def _read_landings_so_far(directory: Path, columns: tuple[str, ...], first: int) -> LandingPoints:
-    """Read the landings of a dataset that grows, from a byte of its journal on."""
-    rows, following, has_more = read_commits(directory / JOURNAL, columns, first=first, most_bytes=_JOURNAL_BYTES)
-    return LandingPoints(
-        landings=rows, total=len(rows), outcomes={}, following=following, is_finished=False, has_more=has_more
-    )
 
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:

@@ -13,12 +13,15 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, StrictInt
 
+from throwcollect.config.loader import load
+from throwcollect.config.shape import shape_of
+from throwcollect.config.values import leaves
 from throwcollect.errors import NotFoundError
 from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS, parse
 from throwcollect.runs.run_record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.serve.catalogue import LONGEST_NAME
+from throwcollect.serve.catalogue import LONGEST_NAME, Catalogue
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe
 from throwcollect.serve.states import States
@@ -53,6 +56,33 @@ class Scaling(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     simulations: StrictInt = Field(ge=0, le=256)
+
+
+class SettableKey(BaseModel):
+    """A key that a request may set: its dotted name, its value in the component's configuration, and what it takes."""
+
+    key: str
+    value: JsonValue
+    takes: str
+
+
+def make_component_routes(catalogue: Catalogue) -> APIRouter:
+    """Make the route on what a request may set for an instance of a component."""
+    router = APIRouter()
+
+    @router.get("/components/{name}/keys")
+    def keys(name: str) -> list[SettableKey]:
+        """Keys that a request may set for an instance of a component; none for a container."""
+        source = catalogue.get(name).source
+        found = leaves(load(source)) if isinstance(source, Path) else ()
+        # An item of a list is set with the whole list.
+        return [
+            SettableKey(key=leaf.name, value=leaf.value, takes=str(shape_of(leaf.name)))
+            for leaf in found
+            if not leaf.key.operator and not any(part.isdecimal() for part in leaf.name.split("."))
+        ]
+
+    return router
 
 
 def make_instance_routes(instances: Instances, states: States) -> APIRouter:

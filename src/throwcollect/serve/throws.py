@@ -8,7 +8,7 @@ import struct
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -72,22 +72,23 @@ def encode_throw(
     return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))
 
 
-class PlannedTrials:
-    """Values and bodies of the trials of a run; its plan is read when first needed, and when it has grown."""
+def read_plan(directory: Path) -> Plan:
+    """Read the plan of a dataset, unless it was read before and has not grown since."""
+    return _read_plan(directory, (directory / PLAN).stat().st_mtime_ns)
 
-    def __init__(self, directory: Path) -> None:
-        self._directory = directory
-        self._plan: Plan | None = None
 
-    def of(self, trial: int) -> tuple[Mapping[str, float], tuple[BodyLook, ...] | None]:
-        """Swept values of a trial, by dotted key, and its bodies; none if the plan cannot be read on this machine."""
-        try:
-            if self._plan is None or trial not in self._plan.trials.numbers:
-                self._plan = Plan.read(self._directory / PLAN, load(config_path(self._directory)))
-            planned = self._plan.trial(trial)
-            return planned.values, looks_of(self._plan.config_of(planned))
-        except (ThrowcollectError, IndexError):
-            return {}, None
+@lru_cache(maxsize=4)
+def _read_plan(directory: Path, _changed_ns: int) -> Plan:
+    return Plan.read(directory / PLAN, load(config_path(directory)))
+
+
+def describe_trial(directory: Path, trial: int) -> tuple[Mapping[str, float], tuple[BodyLook, ...] | None]:
+    """Swept values of a trial, by dotted key, and its bodies; none if the plan cannot be read on this machine."""
+    try:
+        planned = (plan := read_plan(directory)).trial(trial)
+        return planned.values, looks_of(plan.config_of(planned))
+    except (ThrowcollectError, OSError, IndexError):
+        return {}, None
 
 
 class ThrowWatch:
@@ -96,7 +97,6 @@ class ThrowWatch:
     def __init__(self, run: Run, bridge: Bridge) -> None:
         self._run = run
         self._bridge = bridge
-        self._planned = PlannedTrials(run.context.directory)
         self._loop = asyncio.get_running_loop()
         self._queues: list[asyncio.Queue[bytes]] = []
         self._newest: bytes | None = None
@@ -159,7 +159,8 @@ class ThrowWatch:
             episode = unpack(message, Signer.of_key(self._run.key))
             if not isinstance(episode, Episode) or not episode.result:
                 return None
-            return encode_throw(episode, simulation, *self._planned.of(episode.header.trial))
+            planned = describe_trial(self._run.context.directory, episode.header.trial)
+            return encode_throw(episode, simulation, *planned)
         except ThrowcollectError:
             # Another node has published something else on this topic.
             return None

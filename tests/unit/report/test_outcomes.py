@@ -9,6 +9,7 @@ from throwcollect.report.contents import format_duration, format_share, format_s
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.sections import tabulate_failures
 from throwcollect.report.throw.flights import Residuals, show_physics
+from throwcollect.tasks.outcome_styles import style_of
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 from throwcollect.tasks.throw_into.into_result import IntoOutcome

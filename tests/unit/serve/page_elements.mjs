@@ -37,9 +37,12 @@ function makeElement() {
     clientWidth: 0,
     clientHeight: 0,
     textContent: "",
+    value: "",
+    dataset: {},
     addEventListener: (name, act) => acts.set(name, act),
     click: () => acts.get("click")(),
-    change: () => acts.get("change")(),
+    change: () => acts.get("change")({ target: get("none") }),
+    clickAt: (offsetX, offsetY, shiftKey = false) => acts.get("click")({ offsetX, offsetY, shiftKey }),
     append(...parts) {
       this.textContent += parts.map((part) => part?.textContent ?? part).join("");
     },
@@ -52,6 +55,8 @@ function makeElement() {
 }
 
 const named = new Map();
+/** What the browser keeps from visit to visit. */
+const kept = new Map();
 /** @type {any[]} all elements that were made, in their order */
 const made = [];
 const get = (id) => named.get(id) ?? named.set(id, makeElement()).get(id);
@@ -79,6 +84,16 @@ Object.assign(globalThis, {
     }
   },
   Document: class {},
+  location: { hash: "", pathname: "/", search: "" },
+  history: {
+    replaceState: (_state, _title, address) => {
+      location.hash = address.replace(/^[^#]*/, "");
+    },
+  },
+  localStorage: {
+    getItem: (key) => kept.get(key) ?? null,
+    setItem: (key, value) => kept.set(key, value),
+  },
   Element: class {},
   HTMLElement,
   DOMParser: class {
@@ -93,8 +108,9 @@ const { Watching } = await load("watching.js");
 const { Problem } = await load("connection.js");
 const { showProblem } = await load("dom.js");
 const { LandingMap } = await load("landing_map.js");
-const { Landings } = await load("landings.js");
+const { StoredThrows } = await load("stored_throws.js");
 const { PlotPanel } = await load("plot_panel.js");
+const { REPLAY, Replay } = await load("replay.js");
 const { RunRecords } = await load("run_records.js");
 
 /** Let everything that waits for nothing but its turn have it. */
@@ -201,7 +217,13 @@ test("the map draws an even selection of very many landings", () => {
   assert.equal(get("legend").textContent, "landed 4, dropped 1");
 });
 
-/** Landings of a run, as the server gives them; what it answers can be changed. */
+/** Columns of throws, as the server gives them; each row has x, y, outcome and trial. */
+const toColumns = (rows, facts) => ({
+  trial: rows.map((row) => row[3]), outcome: rows.map((row) => row[2]), x_m: rows.map((row) => row[0]), y_m: rows.map((row) => row[1]),
+  values: {}, counts: {}, total: rows.length, noun: "throw", end: "landing", success: "landed", following: 0, is_finished: true, has_more: false, ...facts,
+});
+
+/** Throws of a run, as the server gives them; what it answers can be changed. */
 function follow() {
   const map = new LandingMap(() => {});
   const server = { answer: async () => null };
@@ -210,7 +232,7 @@ function follow() {
     asked.push(path);
     return server.answer();
   };
-  const landings = new Landings({ read }, map);
+  const landings = new StoredThrows({ read }, map);
   landings.begin("run");
   const put = async (facts) => {
     landings.follow({ id: "run", kind: "collection", status: "ended", progress: { ended: 3 }, summary: null, ...facts });
@@ -221,12 +243,12 @@ function follow() {
 
 test("the legend of a finished dataset counts all throws, also those that are not on the map", async () => {
   const { landings, server, put } = follow();
-  const found = { landings: [[1, 0, "landed", 0], [2, 0, "landed", 2]], total: 4, outcomes: { landed: 4, dropped: 7 }, following: 0, is_finished: true, has_more: false };
+  const found = toColumns([[1, 0, "landed", 0], [2, 0, "landed", 2]], { total: 4, counts: { landed: 4, dropped: 7 } });
   server.answer = async () => found;
   await put({ summary: {} });
   assert.equal(get("legend").textContent, "dropped 7, landed 4");
   landings.begin("run");
-  server.answer = async () => ({ ...found, landings: [], total: 0, outcomes: { dropped: 7 } });
+  server.answer = async () => toColumns([], { counts: { dropped: 7 } });
   await put({ summary: {} });
   assert.equal(get("legend").textContent, "dropped 7");
   assert.equal(get("map-text").textContent, "None of these throws has landed.");
@@ -280,7 +302,7 @@ test("the map draws a single landing among very many dropped throws", () => {
   map.addAll(Array.from({ length: 30_000 }, (_, i) => [null, null, "dropped", i]));
   assert.equal(get("map-text").textContent, "None of these throws has landed.");
   map.addAll([[1, 0, "landed", 30_001]]);
-  assert.match(get("map-text").textContent, /^1 landings so far: 1\.00 to 1\.00 m/);
+  assert.match(get("map-text").textContent, /^1 landing so far: 1\.00 to 1\.00 m/);
   assert.equal(get("legend").textContent, "dropped 30000, landed 1");
 });
 
@@ -294,11 +316,11 @@ test("the page asks again for landings after a lost connection", async () => {
       throw new Problem(0, {});
     };
     await put(facts);
-    server.answer = async () => ({ landings: [[1, 0, "landed", 0]], total: 1, outcomes: { landed: 1 }, following: 9, is_finished: true, has_more: false });
+    server.answer = async () => toColumns([[1, 0, "landed", 0]], { counts: { landed: 1 }, following: 9 });
     // It asks by itself, after two seconds.
     await new Promise((resolve) => setTimeout(resolve, 2100));
     assert.equal(asked.length, 2);
-    assert.match(get("map-text").textContent, /^1 landings of all throws/);
+    assert.match(get("map-text").textContent, /^1 landings? of all throws/);
   }
   landings.begin(null);
 });
@@ -342,4 +364,119 @@ test("a zoom of a replay stays from throw to throw, and one of live values ends 
   zoomIn.click();
   await settle();
   assert.deepEqual(await measure(makeThrow(3)), [middle, 2 * half]);
+});
+
+/** A map of four throws of slides, of which one missed the puck. */
+function makeMap(pick = () => {}, choose = () => {}) {
+  const map = new LandingMap(choose, pick);
+  map.clear();
+  map.know({ noun: "slide", end: "rest", success: "at_rest", values: { speed: [] } });
+  map.put([[1, 0, "at_rest", 0, { speed: 1 }], [null, null, "missed_puck", 1, { speed: 2 }], [2, 0, "at_rest", 2, { speed: 3 }], [3, 0, "at_rest", 5, { speed: 4 }]], 3, { at_rest: 3, missed_puck: 1 });
+  return map;
+}
+
+const setFilter = (key, min, max) => {
+  [["key", key], ["min", min], ["max", max]].forEach(([name, value]) => Object.assign(get(`filter-${name}`), { value }));
+};
+
+test("a click on a landing replays its throw, and one elsewhere or with Shift sets the target", () => {
+  const picked = [];
+  const places = [];
+  const map = makeMap((trial) => picked.push(trial), (...place) => places.push(place));
+  Object.assign(map.canvas, { clientWidth: 300, clientHeight: 300 });
+  const { centre, scale } = map.paint(makeElement(), 300, 300, 1);
+  const at = [150 - (0 - centre[1]) * scale, 150 - (2 - centre[0]) * scale];
+  map.canvas.clickAt(at[0] + 3, at[1]);
+  map.canvas.clickAt(at[0] + 40, at[1]);
+  map.canvas.clickAt(at[0], at[1], true);
+  assert.deepEqual(picked, [2]);
+  assert.deepEqual(places.map(([x]) => x.toFixed(3)), ["2.000", "2.000"]);
+  Object.assign(map.canvas, { clientWidth: 0, clientHeight: 0 });
+});
+
+test("the map speaks of what its task does, and shows what passes the filter", () => {
+  const map = makeMap();
+  assert.equal(get("map-title").textContent, "Map of rests");
+  assert.match(get("map-text").textContent, /^3 rests of all slides: 1\.00 to 3\.00 m/);
+  setFilter("speed", "2", "");
+  map.refresh();
+  assert.match(get("map-text").textContent, /^2 of 3 rests of all slides: 2\.00 to 3\.00 m/);
+  assert.deepEqual(map.list.ordered.filter(map.filter.accepts).map((row) => row[3]), [1, 2, 5]);
+  map.filter.toggle("at_rest");
+  assert.equal(get("map-text").textContent, "No rest passes the filter.");
+  assert.equal(get("legend").textContent, "at_rest 3, missed_puck 1");
+  map.filter.toggle("at_rest");
+  setFilter("", "", "");
+  map.put([], 0, {});
+  assert.equal(get("map-text").textContent, "No rest yet.");
+});
+
+/** A replay of a run, and what it asked for and drew. */
+function makeReplay(map, answer) {
+  const asked = [];
+  const shown = [];
+  const notes = [];
+  const connection = {
+    ask: async (_method, path) => {
+      const trial = Number(path.split("/").at(-1));
+      asked.push(trial);
+      return { arrayBuffer: () => answer(trial) };
+    },
+  };
+  const playback = { show: ({ trial, simulation }) => shown.push([trial, simulation]) };
+  const replay = new Replay({ connection, view: makeFake({ stations: new Map() }), playback, map, tell: (text) => notes.push(text), changed: () => {} });
+  replay.begin("run-1");
+  return { replay, asked, shown, notes };
+}
+
+/** A message with a throw of one sample, without joints. */
+function encode(trial) {
+  const text = new TextEncoder().encode(JSON.stringify({ trial, outcome: "at_rest", joints: [], samples: 1, rate_hz: 100, landing: null, values: {} }));
+  const start = 4 + Math.ceil(text.length / 4) * 4;
+  const bytes = new Uint8Array(start + 40);
+  new DataView(bytes.buffer).setUint32(0, text.length, true);
+  bytes.set(text, 4);
+  return bytes.buffer;
+}
+
+test("stored throws follow each other as the filter has them, and the address leads back to each", async () => {
+  const map = makeMap();
+  const { replay, asked, shown } = makeReplay(map, async (trial) => encode(trial));
+  replay.step(1);
+  await settle();
+  replay.compare();
+  setFilter("speed", "3", "");
+  replay.step(1);
+  await settle();
+  assert.deepEqual(shown, [[0, REPLAY], [2, REPLAY]]);
+  assert.equal(location.hash, "#run=run-1&trial=2&compared=0");
+  assert.equal(get("stored-count").textContent, "2 of 4 slides");
+  replay.step(1);
+  await settle();
+  assert.deepEqual([get("stored-before").disabled, get("stored-after").disabled], [false, true]);
+  replay.step(1);
+  await settle();
+  assert.deepEqual(asked, [0, 2, 5]);
+  setFilter("", "", "");
+  // Another visit compares with the same throw.
+  assert.deepEqual(JSON.parse(kept.get("throwcollect.layout")).compared, { run: "run-1", trial: 0 });
+  const later = makeReplay(map, async (trial) => encode(trial));
+  await settle();
+  assert.equal(later.replay.compared.trial, 0);
+  replay.leave();
+  assert.equal(location.hash, "");
+  kept.clear();
+});
+
+test("a throw that comes late does not replace one that was chosen since, and a missing one is named", async () => {
+  const answers = new Map();
+  const { replay, shown, notes } = makeReplay(makeMap(), (trial) => new Promise((resolve, reject) => answers.set(trial, { resolve, reject })));
+  for (const trial of [0, 2, 7]) replay.show(trial);
+  await settle();
+  answers.get(2).resolve(encode(2));
+  answers.get(0).resolve(encode(0));
+  answers.get(7).reject(new Error("trial 7 has no episode"));
+  await settle();
+  assert.deepEqual([shown, notes], [[], ["trial 7 has no episode"]]);
+  replay.leave();
 });

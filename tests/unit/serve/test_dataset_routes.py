@@ -1,4 +1,4 @@
-"""Routes by which clients get files, archive and landings of a dataset."""
+"""Routes by which clients get files and archive of a dataset."""
 
 from __future__ import annotations
 
@@ -83,32 +83,6 @@ def test_the_archive_holds_all_files_of_the_dataset(client: TestClient, director
     assert client.get(f"{URL}/a/dataset.tar").content == answer.content
 
 
-def test_the_landings_of_a_finished_dataset_are_returned(client: TestClient, directory: Path) -> None:
-    found = client.get(f"{URL}/a/landings").json()
-    landings = found["landings"]
-    assert [(outcome, trial) for _, _, outcome, trial in landings] == [("landed", 0), ("landed", 1), ("landed", 2)]
-    assert all(isinstance(x, float) and 0 < x < 20 for x, *_ in landings)
-    assert (found["total"], found["is_finished"], found["has_more"]) == (3, True, False)
-
-
-def test_landings_of_a_growing_dataset_come_in_parts(client: TestClient, directory: Path, remember: Remember) -> None:
-    """A growing dataset gives the same landings as the finished one, but in parts and in order of arrival."""
-    finished = client.get(f"{URL}/a/landings").json()["landings"]
-    remember("growing", directory=str(directory))
-    journal = directory / "logs" / "journal.jsonl"
-    lines = journal.read_bytes().splitlines(keepends=True)
-    commits = [number for number, line in enumerate(lines) if b'"commit"' in line]
-    # The journal ends within the second commit, as if it was just being written.
-    journal.write_bytes(b"".join(lines[: commits[1]]) + lines[commits[1]][:-20])
-    first = client.get(f"{URL}/growing/landings").json()
-    assert (len(first["landings"]), first["is_finished"], first["has_more"]) == (1, False, False)
-    journal.write_bytes(b"".join(lines))
-    then = client.get(f"{URL}/growing/landings", params={"first": first["following"]}).json()
-    assert sorted(first["landings"] + then["landings"], key=lambda row: row[3]) == finished
-    last = client.get(f"{URL}/growing/landings", params={"first": then["following"]}).json()
-    assert (last["landings"], last["following"]) == ([], then["following"])
-
-
 def test_the_report_of_a_finished_dataset_is_one_page_and_leaves_no_file(
     client: TestClient, directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,7 +104,7 @@ def test_files_of_an_unfinished_dataset_are_refused(client: TestClient, director
     for what in ("files", "files/config.yaml", "dataset.tar", "report"):
         found = {name: client.get(f"{URL}/{name}/{what}").status_code for name in ("growing", "torn")}
         assert found == {"growing": 409, "torn": 409}, what
-    for what in ("files", "files/config.yaml", "dataset.tar", "report", "landings"):
+    for what in ("files", "files/config.yaml", "dataset.tar", "report", "throws", "throws/0"):
         for name in ("session", "nobody", ".."):
             assert client.get(f"{URL}/{name}/{what}").status_code == 404, (name, what)
 

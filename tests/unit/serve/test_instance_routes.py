@@ -88,3 +88,11 @@ def test_logs_and_events_of_an_instance_can_be_read(client: TestClient, remember
         assert "secret\n" not in answer.text
     for tail in ("0", "10001", "x"):
         assert client.get(f"{URL}/a/log/sim_0?tail={tail}").status_code == 422
+
+
+def test_a_component_lists_the_keys_that_a_request_may_set(client: TestClient) -> None:
+    found = {each["key"]: each for each in client.get("/api/v1/components/throws/keys").json()}
+    assert found["trials"]["value"] == 3
+    assert found["ball.mass_kg"]["takes"] == "number > 0, ≤ 2 kg"
+    assert not [key for key in found if key.startswith(("run.", "containers."))]
+    assert client.get("/api/v1/components/nothing/keys").status_code == 404

@@ -22,8 +22,9 @@ def test_the_rests_of_pucks_are_on_the_map(client: TestClient, tmp_path: Path, r
     remember("slides", directory=str(tmp_path / "data"))
     dataset = throwcollect.load(tmp_path / "data")
     rests = [tuple(throw.events.rest.position[:2]) for throw in dataset]
-    found = client.get("/api/v1/collections/slides/landings").json()["landings"]
-    assert [(x, y) for x, y, *_ in found] == rests
+    found = client.get("/api/v1/collections/slides/throws").json()
+    assert list(zip(found["x_m"], found["y_m"], strict=True)) == rests
+    assert (found["noun"], found["end"], found["success"]) == ("slide", "rest", "at_rest")
     simulator = Simulator(dataset.config)
     episode = simulator.run(Trial(0, dataset[0].parameters, 0, ""))
     simulator.close()

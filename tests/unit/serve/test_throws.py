@@ -25,7 +25,7 @@ from throwcollect.robots.surroundings import looks_of
 from throwcollect.runs.records import Records
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.rosbridge.feed import Listener
-from throwcollect.serve.throws import PlannedTrials, ThrowWatch, encode_throw
+from throwcollect.serve.throws import ThrowWatch, describe_trial, encode_throw
 
 
 class Graph:
@@ -108,19 +108,21 @@ def test_an_encoded_throw_holds_the_poses_of_bodies_that_move(collected: Path) -
 
 
 def test_planned_values_come_from_the_plan(collected: Path, tmp_path: Path) -> None:
-    planned = PlannedTrials(collected)
     for trial in Dataset.open(collected).plan.trials:
-        assert planned.of(trial.number) == (trial.values, looks_of(Dataset.open(collected).plan.config_of(trial)))
-    assert set(planned.of(0)[0]) == {"task.end.arm_right_4_joint", "task.duration_s", "ball.mass_kg"}
-    assert planned.of(99) == ({}, None)
-    assert PlannedTrials(tmp_path).of(0) == ({}, None)
+        assert describe_trial(collected, trial.number) == (
+            trial.values,
+            looks_of(Dataset.open(collected).plan.config_of(trial)),
+        )
+    assert set(describe_trial(collected, 0)[0]) == {"task.end.arm_right_4_joint", "task.duration_s", "ball.mass_kg"}
+    assert describe_trial(collected, 99) == ({}, None)
+    assert describe_trial(tmp_path, 0) == ({}, None)
 
 
 def test_a_throw_has_the_bodies_of_its_own_trial(tmp_path: Path) -> None:
     swept = {"task.bin.x_m": {"values": [1.0, 2.0]}}
     settings = {"trials": None, "task": {"name": "throw_into"}, "sweep": {"sampler": "grid", "parameters": swept}}
-    planned = PlannedTrials(Collection(settings).collect(tmp_path / "a"))
-    found = [planned.of(number)[1] for number in (0, 1)]
+    directory = Collection(settings).collect(tmp_path / "a")
+    found = [describe_trial(directory, number)[1] for number in (0, 1)]
     assert [bodies[0].position_m[0] for bodies in found if bodies] == [1.0, 2.0]
 
 

@@ -3,7 +3,9 @@
 import { get, make, makeButton, setChoices, setText, showProblem } from "./dom.js";
 import { legendItem } from "./landing_map.js";
 import { RunRecords } from "./run_records.js";
+import { saveFile } from "./saving.js";
 import { lives, steps } from "./state.js";
+import { count } from "./words.js";
 
 const KINDS = {
   collection: "collects a dataset",
@@ -64,6 +66,8 @@ export class Controls {
     keep(get("instances"), this.#instances, living, (each) => each.id, makeCard);
     keep(get("ended"), this.#instances, ended, (each) => each.id, makeCard);
     get("no-instances").hidden = living.length > 0;
+    // At first, runs that have ended are offered if there is nothing else to watch.
+    if (get("ended-box").hidden && !living.length) get("ended").parentElement.open = true;
     get("ended-box").hidden = ended.length === 0;
     setText(get("ended-count"), String(ended.length));
   }
@@ -81,8 +85,14 @@ function keep(place, cards, things, keyOf, makeCard) {
   while (place.children.length > things.length) place.lastElementChild.remove();
 }
 
+/** Number of lists that have been made, so that each has an id of its own. */
+let numbered = 0;
+
 /** A component, and the form that starts an instance of it. */
 class ComponentCard {
+  /** @type {Map<string, {value: unknown, takes: string}> | null} keys that may be set; null before they are known */
+  #known = null;
+
   constructor(controls) {
     this.controls = controls;
     this.name = make("h3");
@@ -92,8 +102,14 @@ class ComponentCard {
     this.changes = make("textarea", { rows: 2, spellcheck: false, placeholder: "trials: 50" });
     this.problem = make("div", { className: "problem", role: "alert" });
     this.button = make("button", { type: "submit" }, "Start");
-    this.more = make("details", {}, make("summary", {}, "Changed keys"),
-      make("label", {}, "One a line, KEY: VALUE ", this.changes));
+    this.keys = make("datalist", { id: `keys-${++numbered}` });
+    this.key = make("input", { type: "text", spellcheck: false, autocomplete: "off", placeholder: "find a key, such as ball.mass_kg", "aria-label": "find a key" });
+    this.key.setAttribute("list", this.keys.id);
+    this.key.addEventListener("input", () => this.#insert());
+    this.takes = make("p", { className: "muted" });
+    this.more = make("details", {}, make("summary", {}, "Change the configuration"), this.key, this.keys, this.takes,
+      make("label", {}, "One key a line, KEY: VALUE ", this.changes));
+    this.more.addEventListener("toggle", () => this.#offerKeys());
     this.count = make("label", {}, "Simulations ", this.simulations);
     this.run = make("label", {}, "Joins ", this.joins);
     this.form = make("form", {}, make("div", { className: "row" }, this.count, this.run, this.button), this.more,
@@ -115,6 +131,38 @@ class ComponentCard {
     for (const element of [this.count, this.more]) element.hidden = isContainer;
     this.run.hidden = !isContainer;
     if (isContainer) setChoices(this.joins, [["", "no run"], ...this.controls.joinable.map((id) => [id, id])]);
+  }
+
+  async #offerKeys() {
+    if (!this.more.open || this.#known) return;
+    this.#known = new Map();
+    try {
+      const found = await this.controls.connection.read("GET", `/components/${encodeURIComponent(this.component.name)}/keys`);
+      for (const { key, value, takes } of found) this.#known.set(key, { value, takes });
+      this.keys.replaceChildren(...found.map(({ key, value }) => make("option", { value: key }, JSON.stringify(value))));
+    } catch (error) {
+      this.#known = null;
+      showProblem(this.problem, error);
+    }
+  }
+
+  /** Write the key that was found into a line of its own, with the value that it has. */
+  #insert() {
+    const found = this.#known?.get(this.key.value);
+    if (!found) {
+      setText(this.takes, "");
+      return;
+    }
+    const { key: { value: key }, changes } = this;
+    setText(this.takes, `${key}: ${found.takes === "anything" ? "any value" : found.takes}`);
+    const lines = changes.value.split("\n").filter((line) => line.trim() && !line.startsWith(`${key}:`));
+    const line = `${key}: ${JSON.stringify(found.value)}`;
+    changes.value = [...lines, line].join("\n");
+    changes.rows = Math.max(2, lines.length + 1);
+    this.key.value = "";
+    changes.focus();
+    // The value is selected, so that typing replaces it.
+    changes.setSelectionRange(changes.value.length - line.length + key.length + 2, changes.value.length);
   }
 
   async #start() {
@@ -153,8 +201,11 @@ class InstanceCard {
     this.stop = makeButton("Stop", () => this.#ask("DELETE", ""));
     this.force = makeButton("End now", () => this.#force());
     this.resume = makeButton("Resume", () => this.#resume());
-    this.report = makeButton("Report", () => this.#save("report", "html"));
-    this.download = makeButton("Download", () => this.#save("dataset.tar", "tar"));
+    this.report = makeButton("Save report", () => this.#save("report", "html", "the report is being made, which takes some seconds …"), {
+      title: "a page with figures, which opens without this server",
+    });
+    this.download = makeButton("Save dataset", () => this.#save("dataset.tar", "tar", "the dataset is being packed …"), { title: "all files as one .tar" });
+    this.saved = make("p", { className: "muted", role: "status" });
     this.simulations = make("input", { type: "number", min: "0", max: "256", inputMode: "numeric" });
     this.scale = make("form", { className: "row" }, make("label", {}, "Simulations ", this.simulations),
       make("button", { type: "submit" }, "Scale"));
@@ -165,7 +216,7 @@ class InstanceCard {
     this.records = new RunRecords(controls.connection);
     this.element = make("article", { className: "card" }, this.name, this.status, this.bar, this.counts, this.outcomes,
       this.nodes, make("div", { className: "row" }, this.watch, this.stop, this.resume, this.report, this.download,
-        this.force), this.scale, this.problem,
+        this.force), this.saved, this.scale, this.problem,
       this.records.element);
   }
 
@@ -215,7 +266,7 @@ class InstanceCard {
     const [done, all] = steps(progress);
     this.#putSteps(done, all);
     const speed = lives(this.instance) ? `, ${progress.throws_per_s.toFixed(1)} ${progress.noun}s/s` : "";
-    setText(this.counts, `${done} of ${all}${speed}`);
+    setText(this.counts, `${done} of ${count(all, progress.noun)}${speed}`);
     const outcomes = JSON.stringify(progress.outcomes);
     if (this.outcomes.dataset.shown === outcomes) return;
     this.outcomes.dataset.shown = outcomes;
@@ -224,7 +275,7 @@ class InstanceCard {
 
   async #force() {
     const { id } = this.instance;
-    const what = lives(this.instance) ? `End ${id} at once? Throws that are running are lost; ` : `Forget ${id}? `;
+    const what = lives(this.instance) ? `End ${id} at once? What its simulations do at the moment is lost; ` : `Forget ${id}? `;
     if (await confirm(`${what}it disappears from this list. Its dataset is kept.`)) await this.#ask("DELETE", "?force=true");
   }
 
@@ -240,13 +291,16 @@ class InstanceCard {
   }
 
   /** Save a file that the server makes from a finished dataset; a plain link would not do, as it sends no token. */
-  #save(what, suffix) {
-    return this.#attempt(async () => {
+  async #save(what, suffix, meanwhile) {
+    const name = `${this.instance.id}.${suffix}`;
+    setText(this.saved, meanwhile);
+    let told = "";
+    await this.#attempt(async () => {
       const answer = await this.controls.connection.ask("GET", `/collections/${this.#id}/${what}`);
-      const link = make("a", { href: URL.createObjectURL(await answer.blob()), download: `${this.instance.id}.${suffix}` });
-      link.click();
-      URL.revokeObjectURL(link.href);
+      saveFile(await answer.blob(), name);
+      told = `${name} is saved where the browser puts downloads`;
     });
+    setText(this.saved, told);
   }
 
   get #id() {

@@ -1,8 +1,11 @@
-/** The landing map: landings seen from above; the robot stands at the origin, and its x points up in the picture. */
+/** The landing map: places where throws ended, seen from above; the robot stands at the origin, and its x points up in the picture. */
 
-import { get, make, setText } from "./dom.js";
+import { get, make, makeButton, setText } from "./dom.js";
+import { Filter } from "./filter.js";
 import { describeModel, drawModel } from "./model_map.js";
-import { TARGET_COLOR, colorOf } from "./outcomes.js";
+import { TARGET_COLOR, addSuccess, colorOf } from "./outcomes.js";
+import { ThrowList } from "./throw_list.js";
+import { THROWS, count, nameMap } from "./words.js";
 
 const DOT_PX = 2.5;
 const MARGIN_PX = 26;
@@ -10,34 +13,32 @@ const MARGIN_PX = 26;
 const BODIES_M = 3;
 /** Two lines of the grid are no closer than this. */
 const CLOSEST_PX = 25;
-/** Most landings that are drawn. If there are more, every second one is dropped, now and of all later landings. */
-const MOST = 20000;
+/** A click this near to a landing means the landing. */
+const NEAR_PX = 9;
 
-const SHOWN = "of throws that were shown";
+const SHOWN = "of those that were shown";
 const SO_FAR = "so far";
-const ALL = "of all throws";
+const ALL = "of all";
 
-/** @typedef {[number | null, number | null, string, number]} Landing x, y [m], outcome, trial */
+/** @typedef {import("./throw_list.js").Row} Row */
 
 /** Draws landings into the canvas of the page. */
 export class LandingMap {
-  /** @type {Landing[]} the landings that are drawn; each has a place */
-  #landings = [];
-  #trials = new Set();
-  /** @type {Map<string, number>} how many throws ended with each outcome, drawn or not */
-  #outcomes = new Map();
-  /** One of this many landings is drawn. */
-  #stride = 1;
+  list = new ThrowList();
+  /** @type {import("./words.js").Words} */
+  words = THROWS;
+  /** Called when throws or the filter have changed. */
+  changed = () => {};
   /** Which landings the map shows, in words. */
   #which = SHOWN;
-  /** Number of all landings, from which the drawn ones are evenly chosen. */
-  #total = 0;
   /** @type {[number, number] | null} */
   #target = null;
   /** @type {import("./bodies.js").Body[]} */
   #bodies = [];
   /** @type {import("./throws.js").Throw | null} */
   #newest = null;
+  /** @type {import("./throws.js").Throw | null} */
+  #compared = null;
   /** @type {number[] | null} */
   #chosen = null;
   /** @type {import("./model_map.js").ModelOnMap | null} */
@@ -45,45 +46,81 @@ export class LandingMap {
   /** Grows with each change. */
   revision = 0;
 
-  /** @param {(x: number, y: number) => void} choose called with the place of each click on the ground [m], frame world */
-  constructor(choose) {
+  /**
+   * @param {(x: number, y: number) => void} choose called with the place of each click on the ground [m], frame world
+   * @param {(trial: number) => void} pick called with the trial of each landing that is clicked
+   */
+  constructor(choose, pick = () => {}) {
     this.canvas = get("map");
-    this.canvas.addEventListener("click", ({ offsetX, offsetY }) => choose(...this.#frame(this.canvas.clientWidth, this.canvas.clientHeight).from(offsetX, offsetY)));
+    this.filter = new Filter(() => this.refresh());
+    this.canvas.addEventListener("click", ({ offsetX, offsetY, shiftKey }) => {
+      const row = shiftKey ? null : this.#near(offsetX, offsetY);
+      if (row) pick(row[3]);
+      else choose(...this.#frame(this.canvas.clientWidth, this.canvas.clientHeight).from(offsetX, offsetY));
+    });
+    this.canvas.addEventListener("mousemove", ({ offsetX, offsetY }) => {
+      const row = this.#near(offsetX, offsetY);
+      this.canvas.style.cursor = row ? "pointer" : "";
+      this.canvas.title = row ? `trial ${row[3]}, ${row[2]}: click to replay` : "";
+    });
     new ResizeObserver(() => this.#draw()).observe(this.canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
   }
 
-  /** Forget all landings. */
+  /** Forget all throws. */
   clear() {
-    this.#trials.clear();
-    this.#newest = null;
+    this.list = new ThrowList();
+    this.#newest = this.#compared = null;
     this.#target = null;
     this.#bodies = [];
-    this.put([], 0, {});
     this.#which = SHOWN;
+    this.filter.offer([]);
+    this.#use(THROWS);
+    this.refresh();
+  }
+
+  /** @param {string} noun word for a trial of the run, whose words for places come with its first throws */
+  name(noun) {
+    if (noun !== this.words.noun) this.#use({ noun, end: "end" });
+  }
+
+  #use(words) {
+    this.words = words;
+    setText(get("map-title"), nameMap(words));
+  }
+
+  /** @param {{noun: string, end: string, success: string, values: Record<string, unknown>}} facts of the task whose throws these are */
+  know({ noun, end, success, values }) {
+    this.#use({ noun, end });
+    addSuccess(success);
+    this.filter.offer(Object.keys(values));
   }
 
   /**
-   * @param {Landing[]} landings of a finished dataset, evenly chosen
-   * @param {number} total number of its landings
+   * @param {Row[]} rows throws of a finished dataset, evenly chosen
+   * @param {number} total number of its throws with a place
    * @param {Record<string, number>} outcomes how many of its throws ended with each outcome
    */
-  put(landings, total, outcomes) {
-    this.#total = total;
-    this.#stride = 1;
+  put(rows, total, outcomes) {
     this.#which = ALL;
-    this.#landings = landings.filter(isPlaced);
-    this.#outcomes = new Map(Object.entries(outcomes));
-    this.#tell();
-    this.#draw();
+    this.list = new ThrowList();
+    this.list.add(rows);
+    this.list.setTotals(total, outcomes);
+    this.refresh();
   }
 
-  /** @param {Landing[]} landings of a dataset that grows; those that are known already are left out */
-  addAll(landings) {
+  /** @param {Row[]} rows throws of a dataset that grows; those that are known already are left out */
+  addAll(rows) {
     this.#which = SO_FAR;
-    for (const landing of landings) this.#push(landing);
+    this.list.add(rows);
+    this.refresh();
+  }
+
+  /** Draw anew, because throws or the filter have changed. */
+  refresh() {
     this.#tell();
     this.#draw();
+    this.changed();
   }
 
   /** @param {[number, number] | null} distances between which throws are to land [m] */
@@ -119,47 +156,64 @@ export class LandingMap {
   }
 
   /** @param {import("./throws.js").Throw} shown a new throw of a run that is collecting */
-  add({ trial, outcome, landing }) {
+  add({ trial, outcome, landing, values }) {
     if (this.#which === ALL) return;
-    this.#push([landing?.[0] ?? null, landing?.[1] ?? null, outcome, trial]);
-    this.#tell();
-    this.#draw();
+    this.list.add([[landing?.[0] ?? null, landing?.[1] ?? null, outcome, trial, values]]);
+    this.refresh();
   }
 
-  #push(landing) {
-    const [, , outcome, trial] = landing;
-    if (this.#trials.has(trial)) return;
-    this.#trials.add(trial);
-    this.#outcomes.set(outcome, (this.#outcomes.get(outcome) ?? 0) + 1);
-    if (!isPlaced(landing)) return;
-    this.#total += 1;
-    if ((this.#total - 1) % this.#stride) return;
-    this.#landings.push(landing);
-    if (this.#landings.length <= MOST) return;
-    this.#landings = this.#landings.filter((_, i) => i % 2 === 0);
-    this.#stride *= 2;
-  }
-
-  /** @param {import("./throws.js").Throw | null} shown the throw to mark */
-  mark(shown) {
+  /**
+   * @param {import("./throws.js").Throw | null} shown the throw to mark
+   * @param {import("./throws.js").Throw | null} [compared] the throw that it is compared with
+   */
+  mark(shown, compared = null) {
     this.#newest = shown;
+    this.#compared = compared;
     this.#draw();
+  }
+
+  get #placed() {
+    return this.filter.isActive ? this.list.placed.filter(this.filter.accepts) : this.list.placed;
+  }
+
+  /** The landing that is drawn nearest to a place in the picture [px]; undefined if there is none. */
+  #near(x, y) {
+    const { at } = this.#frame(this.canvas.clientWidth, this.canvas.clientHeight);
+    let [nearest, least] = [undefined, NEAR_PX];
+    for (const row of this.#placed) {
+      const [right, down] = at(row[0], row[1]);
+      const away = Math.hypot(right - x, down - y);
+      if (away <= least) [nearest, least] = [row, away];
+    }
+    return nearest;
   }
 
   #tell() {
-    const items = [...this.#outcomes].sort(([, a], [, b]) => b - a).map(([outcome, count]) => legendItem(outcome, count));
-    get("legend").replaceChildren(...items);
-    const placed = this.#landings;
+    const { list, words: { noun, end }, filter } = this;
+    const focused = document.activeElement?.dataset?.outcome;
+    const items = [...list.outcomes].sort(([, a], [, b]) => b - a).map(([outcome, number]) => this.#makeToggle(outcome, number));
+    get("legend").replaceChildren(...items.map(({ item }) => item));
+    items.find(({ button }) => focused && button.dataset.outcome === focused)?.button.focus();
+    const placed = this.#placed;
     if (!placed.length) {
-      setText(get("map-text"), this.#outcomes.size ? "None of these throws has landed." : "Nothing has landed yet.");
+      setText(get("map-text"), filter.isActive && list.placed.length ? `No ${end} passes the filter.` : describeNothing(this.words, list.outcomes.size));
       return;
     }
     const [x0, x1] = range(placed.map(([x]) => x));
     const [y0, y1] = range(placed.map(([, y]) => y));
-    const count = this.#total > placed.length ? `${placed.length} of ${this.#total}` : placed.length;
-    const text = `${count} landings ${this.#which}: ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
+    const number = filter.isActive || list.total > placed.length ? `${placed.length} of ${count(list.total, end)}` : count(placed.length, end);
+    const text = `${number} ${this.#which === SO_FAR ? SO_FAR : `${this.#which}${this.#which === ALL ? ` ${noun}s` : ""}`}: `
+      + `${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
       + `${y0.toFixed(2)} to ${y1.toFixed(2)} m to its left.${this.#target ? " Aimed at: between the arcs." : ""}`;
     setText(get("map-text"), text);
+  }
+
+  #makeToggle(outcome, number) {
+    const isShown = !this.filter.hidden.has(outcome);
+    const button = makeButton("", () => this.filter.toggle(outcome), { className: "outcome", "aria-pressed": isShown, title: isShown ? `leave ${outcome} out` : `show ${outcome} again` });
+    button.dataset.outcome = outcome;
+    button.append(makeDot(outcome), `${outcome} ${number}`);
+    return { button, item: make("li", {}, button) };
   }
 
   #draw() {
@@ -175,7 +229,7 @@ export class LandingMap {
     // The robot is always in the picture.
     const near = (value) => Math.min(Math.max(value, -BODIES_M), BODIES_M);
     const corners = this.#outlines.flatMap((each) => each.corners.map((corner) => corner.map(near)));
-    const places = [...this.#landings, ...(this.#model?.reached ?? []), ...corners];
+    const places = [...this.list.placed, ...(this.#model?.reached ?? []), ...corners];
     const [x0, x1] = range([...places.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1, chosenX]);
     const [y0, y1] = range([...places.map(([, y]) => y), -0.5, 0.5, chosenY]);
     const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
@@ -202,7 +256,7 @@ export class LandingMap {
     const pen = canvas.getContext("2d");
     pen.scale(ratio, ratio);
     const style = getComputedStyle(this.canvas);
-    const placed = this.#landings;
+    const placed = this.#placed;
     const { at, scale, centre } = this.#frame(width, height);
     drawGrid(pen, style, at, scale, { width, height });
     for (const outline of this.#outlines) drawOutline(pen, at, outline);
@@ -217,13 +271,8 @@ export class LandingMap {
       pen.fill();
     }
     pen.globalAlpha = 1;
-    if (this.#newest?.landing) {
-      pen.strokeStyle = style.color;
-      pen.lineWidth = 2;
-      pen.beginPath();
-      pen.arc(...at(this.#newest.landing[0], this.#newest.landing[1]), 3 * DOT_PX, 0, 7);
-      pen.stroke();
-    }
+    if (this.#compared?.landing) drawRing(pen, at, this.#compared.landing, style.getPropertyValue("--muted"));
+    if (this.#newest?.landing) drawRing(pen, at, this.#newest.landing, style.color);
     if (this.#chosen) drawChosen(pen, at(this.#chosen[0], this.#chosen[1]));
     return { centre, scale };
   }
@@ -231,17 +280,30 @@ export class LandingMap {
 
 /**
  * @param {string} outcome
- * @param {number} count
+ * @param {number} number
  * @returns {HTMLElement} an item of a legend
  */
-export function legendItem(outcome, count) {
-  const dot = make("span", { className: "dot", "aria-hidden": "true" });
-  dot.style.background = colorOf(outcome);
-  return make("li", {}, dot, `${outcome} ${count}`);
+export function legendItem(outcome, number) {
+  return make("li", {}, makeDot(outcome), `${outcome} ${number}`);
 }
 
-function isPlaced([x, y]) {
-  return Number.isFinite(x) && Number.isFinite(y);
+function makeDot(outcome) {
+  const dot = make("span", { className: "dot", "aria-hidden": "true" });
+  dot.style.background = colorOf(outcome);
+  return dot;
+}
+
+function describeNothing({ noun, end }, ended) {
+  if (end === "landing") return ended ? `None of these ${noun}s has landed.` : "Nothing has landed yet.";
+  return ended ? `None of these ${noun}s has a ${end}.` : `No ${end} yet.`;
+}
+
+function drawRing(pen, at, [x, y], color) {
+  pen.strokeStyle = color;
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.arc(...at(x, y), 3 * DOT_PX, 0, 7);
+  pen.stroke();
 }
 
 function range(values) {

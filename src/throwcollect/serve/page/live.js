@@ -54,15 +54,14 @@ export class Live {
    * @param {import("./scene.js").View} parts.view
    * @param {import("./watching.js").Watching} parts.watching
    * @param {(text: string) => void} parts.tell says what is wrong
+   * @param {() => void} parts.choose shows one simulation alone
    */
-  constructor({ connection, view, watching, tell }) {
-    Object.assign(this, { connection, view, watching, tell });
+  constructor({ connection, view, watching, tell, choose }) {
+    Object.assign(this, { connection, view, watching, tell, choose });
     watching.known = () => this.#follow();
     get("live").addEventListener("click", () => {
-      if (!this.#alone) {
-        this.tell("choose one simulation first: it is slowed down to real time while it is watched");
-        return;
-      }
+      // Only one simulation at a time is slowed down to real time.
+      if (!this.#alone) this.choose();
       this.#wanted = !this.#wanted;
       this.tell("");
       this.#follow();
@@ -114,14 +113,14 @@ export class Live {
     const wanted = !isSeen ? [] : isSession ? this.view.shown : this.#wanted && this.#alone ? [this.#alone] : [];
     for (const name of [...this.simulations]) if (!wanted.includes(name)) this.#leave(name);
     for (const name of wanted) if (!this.simulations.has(name)) this.#join(name, !isSession);
-    if (isSeen) for (const name of this.view.shown) this.#describe(name);
+    if (isSeen) for (const name of this.view.shown) if (instance.robots.includes(name)) this.#describe(name);
   }
 
   #showButton(instance, isSeen) {
     const button = get("live");
     const isPressed = this.#wanted || instance?.kind === "session";
     button.hidden = !isSeen || instance.kind === "session";
-    button.setAttribute("aria-disabled", String(!this.#alone));
+    button.title = isPressed ? "" : "slow one simulation down to real time, and see it as it moves";
     button.setAttribute("aria-pressed", String(isPressed));
     setText(button, isPressed ? "Live: back to replays" : "Live");
   }
@@ -137,6 +136,7 @@ export class Live {
     const isRecorded = this.#recorded.has(this.#recordable);
     button.hidden = !isSeen || instance.kind !== "session";
     button.setAttribute("aria-disabled", String(!this.#recordable));
+    button.title = this.#recordable ? "record what clients do as episodes of a dataset" : "choose one simulation first: each records its own episodes";
     button.setAttribute("aria-pressed", String(isRecorded));
     setText(button, isRecorded ? "Stop recording" : "Record");
   }

@@ -6,16 +6,19 @@ import { Controls } from "./controls.js";
 import { get, makeButton, setChoices, setText } from "./dom.js";
 import { listenForKeys } from "./keys.js";
 import { LandingMap } from "./landing_map.js";
+import { keepLayout, readLayout } from "./layout.js";
 import { Live } from "./live.js";
 import { Models } from "./model.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
+import { REPLAY, Replay } from "./replay.js";
 import { Meshes } from "./robot.js";
 import { Room } from "./room.js";
 import { View } from "./scene.js";
 import { inOrder, lives, steps, watchable } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
+import { addSuccess } from "./outcomes.js";
 
 /** Most simulations in one grid; the others are on further pages of the grid. */
 const MOST_TILES = 16;
@@ -50,6 +53,15 @@ function signIn(why) {
   };
 }
 
+/** @typedef {{run: string | null, trial: number | null, compared: number | null}} Link */
+
+/** @returns {Link} run and throws that the address names */
+function readLink() {
+  const parts = new URLSearchParams(location.hash.slice(1));
+  const number = (name) => (/^\d+$/.test(parts.get(name) ?? "") ? Number(parts.get(name)) : null);
+  return { run: parts.get("run"), trial: number("trial"), compared: number("compared") };
+}
+
 /** The page of a user who has a token. */
 class Page {
   /** @type {import("./state.js").Instance[]} runs, as the newest state has them */
@@ -58,18 +70,18 @@ class Page {
   #before = 0;
   /** When the next picture is wanted [ms]. */
   #due = 0;
-  /** Id of the run that the address names, until the first state is known. */
+  /** @type {Link} what the address names, until it is shown */
   #named;
 
   /**
    * @param {string} token
-   * @param {string | null} named id of the run that the address names
+   * @param {Link} named what the address names
    */
   constructor(token, named) {
     this.#named = named;
     this.connection = new Connection(token);
     this.view = new View(get("canvas"));
-    this.map = new LandingMap((x, y) => this.target.setOnGround(x, y));
+    this.map = new LandingMap((x, y) => this.target.setOnGround(x, y), (trial) => this.replay.show(trial));
     this.playback = new Playback((shown) => this.watching.begin(shown));
     const fetchMesh = async (path) => (await this.connection.ask("GET", `/meshes/${path}`)).arrayBuffer();
     this.meshes = new Meshes(fetchMesh);
@@ -78,7 +90,10 @@ class Page {
     const { connection, view, playback, map, meshes } = this;
     const tell = (text) => this.tell(text);
     this.watching = new Watching({ connection, view, playback, map, meshes, tell });
-    this.live = new Live({ connection, view, watching: this.watching, tell });
+    this.replay = new Replay({ connection, view, playback, map, tell, changed: () => this.#show() });
+    this.watching.replay = this.replay;
+    this.watching.stored.came = () => this.#offerThrows();
+    this.live = new Live({ connection, view, watching: this.watching, tell, choose: () => this.#chooseOne() });
     this.plots = new Plots({ view, playback, live: this.live });
     this.watching.described = (simulation, urdf) => this.plots.bind(simulation, urdf);
     const watch = (id) => this.#watch(id);
@@ -87,6 +102,7 @@ class Page {
     this.room = new Room({ view, map, target: this.target, plots: this.plots, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
     this.controls = new Controls(connection, watch);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
+    this.#restoreLayout();
     this.#listen();
     this.#connect();
     requestAnimationFrame((now) => this.#frame(now));
@@ -95,6 +111,17 @@ class Page {
   /** @param {string} text says what is wrong in the view */
   tell(text) {
     setText(get("view-note"), text);
+  }
+
+  #restoreLayout() {
+    const { speed, filter } = readLayout();
+    if (filter) this.map.filter.put(filter);
+    if ([...get("speed").options].some(({ value }) => value === speed)) get("speed").value = speed;
+    this.playback.speed = Number(get("speed").value);
+    this.map.changed = () => {
+      keepLayout({ filter: this.map.filter.choice });
+      this.replay.put();
+    };
   }
 
   #connect() {
@@ -125,10 +152,19 @@ class Page {
   #put(state) {
     this.#instances = state.instances;
     this.controls.put(state);
-    const ids = watchable(state.instances, [this.watching.id, this.#named]);
-    const wanted = ids.includes(this.#named) ? this.#named : get("watched").value;
-    this.#named = null;
-    setChoices(get("watched"), [...ids.map((id) => [id, id]), ...(ids.length ? [] : [["", "none"]])]);
+    for (const { progress } of state.instances) if (progress) addSuccess(progress.success);
+    const ids = watchable(state.instances, [this.watching.id, this.#named.run]);
+    const wanted = ids.includes(this.#named.run) ? this.#named.run : get("watched").value;
+    if (this.#named.run !== null && !ids.includes(this.#named.run)) {
+      this.tell(`this machine remembers no run ${this.#named.run}`);
+      this.#named = { run: null, trial: null, compared: null };
+    }
+    this.#named.run = null;
+    const over = state.instances.filter((each) => !lives(each) && (each.kind === "collection" || ids.includes(each.id)));
+    const living = ids.filter((id) => !over.some((each) => each.id === id));
+    setChoices(get("watched"), [
+      ...(ids.length ? [] : [["", "none"]]), ...living.map((id) => [id, id]), ...over.map(({ id, status }) => [id, `${id} (${status})`]),
+    ]);
     this.#watch(ids.includes(wanted) ? wanted : (ids[0] ?? ""));
   }
 
@@ -140,43 +176,80 @@ class Page {
     }
     select.value = id;
     const instance = this.#instances.find((each) => each.id === id);
-    if (this.watching.id !== (instance?.id ?? null)) {
+    const isOther = this.watching.id !== (instance?.id ?? null);
+    if (isOther) {
       this.#first = 0;
       this.tell("");
+      this.replay.begin(instance?.id ?? null);
     }
     this.watching.put(instance);
-    if (instance && !lives(instance) && this.view.shown.length) this.tell(`${instance.id} has ended; its last throws are replayed`);
+    if (instance?.progress) this.map.name(instance.progress.noun);
+    if (isOther) this.replay.put();
+    if (instance && !lives(instance) && this.view.shown.length && !this.replay.isOn) this.tell(`${instance.id} has ended; its last throws are replayed`);
     this.#showBoxes();
     const names = this.#names(instance);
     setChoices(get("alone"), [["", "all"], ...names.map((name) => [name, name])]);
     this.#show();
   }
 
+  /** Replay the throw that the address names or, of a run that has ended, the first one. */
+  #offerThrows() {
+    const { instance, stored } = this.watching;
+    const { trial, compared } = this.#named;
+    this.#named = { run: null, trial: null, compared: null };
+    const isEmpty = !lives(instance) && !this.view.shown.length && !this.replay.isOn;
+    if (!stored.problem && trial !== null) this.replay.show(trial, compared);
+    else if (!stored.problem && isEmpty) {
+      const { list, filter } = this.map;
+      const first = list.find(null, 1, filter.accepts) ?? list.find(null, 1, () => true);
+      if (first !== null) this.replay.show(first);
+    }
+    this.#showBoxes();
+    this.#show();
+  }
+
+  /** @param {Link} link to a run and a throw of this server */
+  open(link) {
+    this.#named = link;
+    const { run, trial } = link;
+    if (this.watching.id === run) {
+      if (trial !== null && trial !== this.replay.shown?.trial) this.replay.show(trial, link.compared);
+      return;
+    }
+    this.#watch(this.#instances.some(({ id }) => id === run) ? run : this.watching.id ?? "");
+  }
+
   #showBoxes() {
-    const { instance } = this.watching;
-    get("map-box").hidden = instance?.kind !== "collection" && !this.models.isOnMap;
-    get("target-box").hidden = !instance && !this.models.isOnMap;
+    const { instance, stored } = this.watching;
+    const isGone = Boolean(instance) && !lives(instance) && stored.problem !== "";
+    get("map-box").hidden = (instance?.kind !== "collection" || isGone) && !this.models.isOnMap;
+    get("target-box").hidden = (!instance || isGone) && !this.models.isOnMap;
   }
 
   /** Simulations of a run; after its end, the simulations that the page has shown. */
   #names(instance) {
     if (!instance) return [];
-    return inOrder(lives(instance) || !this.view.stations.size ? instance.robots : [...this.view.stations.keys()]);
+    const seen = [...this.view.stations.keys()].filter((name) => name !== REPLAY);
+    return inOrder(lives(instance) || !seen.length ? instance.robots : seen);
   }
 
   #show() {
     const instance = this.watching.instance;
     const names = this.#names(instance);
+    const { isOn } = this.replay;
+    if (isOn) get("alone").value = "";
     const alone = get("alone").value;
     if (this.#first >= names.length) this.#first = 0;
-    const shown = alone ? [alone] : names.slice(this.#first, this.#first + MOST_TILES);
+    const shown = isOn ? [REPLAY] : alone ? [alone] : names.slice(this.#first, this.#first + MOST_TILES);
     if (shown.join() !== this.view.shown.join() || shown.some((name) => !this.view.stations.get(name)?.robot)) {
       this.watching.show(shown);
     }
-    this.#label(alone ? [] : shown);
-    get("pages").hidden = Boolean(alone) || names.length <= MOST_TILES;
+    this.#label(alone || isOn ? [] : shown);
+    get("alone-box").hidden = !names.length;
+    get("newest").hidden = !isOn || !names.length;
+    get("pages").hidden = Boolean(alone) || isOn || names.length <= MOST_TILES;
     setText(get("page-shown"), `${this.#first + 1} to ${this.#first + shown.length} of ${names.length}`);
-    setText(get("empty"), shown.length ? "" : emptiness(instance));
+    setText(get("empty"), shown.length ? "" : emptiness(instance, this.watching.stored.problem));
     this.live.put(instance, alone);
     this.plots.put(shown);
   }
@@ -196,7 +269,14 @@ class Page {
 
   #alone(name) {
     get("alone").value = name;
+    this.replay.leave();
     this.#show();
+  }
+
+  /** Show a simulation alone, because the user wants to see it live. */
+  #chooseOne() {
+    const [name] = this.#names(this.watching.instance);
+    if (name) this.#alone(name);
   }
 
   #number(key) {
@@ -220,13 +300,14 @@ class Page {
 
   #listen() {
     get("watched").addEventListener("change", ({ target }) => this.#watch(target.value));
-    get("alone").addEventListener("change", () => this.#show());
+    get("alone").addEventListener("change", ({ target }) => this.#alone(target.value));
     get("page-before").addEventListener("click", () => this.#turnPages(-1));
     get("page-after").addEventListener("click", () => this.#turnPages(1));
     get("play").addEventListener("click", () => this.#toggle());
     get("scrub").addEventListener("input", ({ target }) => this.playback.seek(Number(target.value)));
     get("speed").addEventListener("change", ({ target }) => {
       this.playback.speed = Number(target.value);
+      keepLayout({ speed: target.value });
     });
     get("keys-button").addEventListener("click", () => get("keys-dialog").showModal());
     new ResizeObserver(() => this.#show()).observe(get("stage"));
@@ -239,6 +320,9 @@ class Page {
       { keys: ["1", "2", "3", "4", "5", "6", "7", "8", "9"], text: "one simulation alone", act: (key) => this.#number(key) },
       { keys: ["g"], text: "all simulations", act: () => this.#alone("") },
       { keys: ["l"], text: "live or replay", act: () => get("live").click() },
+      { keys: ["n"], text: "next stored throw", act: () => this.replay.step(1) },
+      { keys: ["b"], text: "stored throw before", act: () => this.replay.step(-1) },
+      { keys: ["c"], text: "compare with this throw, or end that", act: () => get("compare").click() },
       { keys: ["p"], text: "add a plot", act: () => get("add-plot").click() },
       { keys: ["?"], text: "this list", act: () => get("keys-dialog").showModal() },
     ], [
@@ -297,7 +381,9 @@ class Page {
     scrub.max = at.shown.duration.toFixed(2);
     if (document.activeElement !== scrub || playing) scrub.value = at.time.toFixed(2);
     const { shown, time } = at;
-    setText(get("time"), `${time.toFixed(2)} of ${shown.duration.toFixed(2)} s, trial ${shown.trial}, ${shown.outcome}`);
+    const { compared } = this.replay;
+    const other = compared && shown.simulation === REPLAY && compared.trial !== shown.trial ? `; transparent: trial ${compared.trial}, ${compared.outcome}` : "";
+    setText(get("time"), `${time.toFixed(2)} of ${shown.duration.toFixed(2)} s, trial ${shown.trial}, ${shown.outcome}${other}`);
     scrub.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
     setText(get("values"), inWords(shown.values));
   }
@@ -308,17 +394,19 @@ function inWords(values) {
   return Object.entries(values).map(([key, value]) => `${key.replace(/^(task|ball|scene)\./, "")} ${Number(value.toPrecision(4))}`).join(", ");
 }
 
-function emptiness(instance) {
+function emptiness(instance, problem) {
   if (!instance) return "Nothing runs. Start a component, or look at a run that has ended.";
   if (instance.status === "planning") return `${instance.id} is being planned …`;
   if (instance.status === "starting") return `${instance.id} is starting …`;
   if (instance.kind === "container") return `${instance.id} is a container, and has no simulations.`;
   if (lives(instance)) return `${instance.id} has no simulation that is ready yet.`;
-  return `${instance.id} has ended; nothing moves any more.`;
+  if (problem) return problem;
+  if (instance.kind === "session") return `${instance.id} has ended; a session has no dataset whose throws could be replayed.`;
+  return `${instance.id} has ended; no throw of it is stored.`;
 }
 
 async function begin() {
-  const named = new URLSearchParams(location.hash.slice(1)).get("run");
+  const named = readLink();
   let token;
   try {
     token = await takeToken();
@@ -336,6 +424,10 @@ async function begin() {
 }
 
 // If the user opens an address in a tab that has the page already, only the fragment changes.
-window.addEventListener("hashchange", () => location.hash.includes("code=") && location.reload());
+window.addEventListener("hashchange", () => {
+  const link = readLink();
+  if (location.hash.includes("code=")) location.reload();
+  else if (link.run !== null) window.throwcollect?.open(link);
+});
 
 begin();

@@ -25,6 +25,11 @@ export class Playback {
     else track.next = newest;
   }
 
+  /** @param {Throw} shown is replayed at once, in place of the throw before */
+  show(shown) {
+    this.#begin(shown);
+  }
+
   /** Forget all throws. */
   clear() {
     this.#tracks.clear();

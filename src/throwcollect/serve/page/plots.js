@@ -1,6 +1,7 @@
 /** Plots bound to links: panels that follow a link of a robot on the screen, or are docked below the view. */
 
 import { get, setChoices } from "./dom.js";
+import { keepLayout, readLayout } from "./layout.js";
 import { PlotPanel } from "./plot_panel.js";
 import { widestJoint } from "./throws.js";
 import { readTooltips } from "./tooltips.js";
@@ -10,6 +11,10 @@ export class Plots {
   /** @type {PlotPanel[]} */
   panels = [];
   #simulations = [];
+  /** Panels that the user has added, and not a description. */
+  #own = new Set();
+  /** Plots of the layout whose simulation was not shown yet. */
+  #waiting = readLayout().plots ?? [];
 
   /**
    * @param {object} parts
@@ -26,6 +31,8 @@ export class Plots {
     get("plot-dialog").firstElementChild.addEventListener("submit", ({ submitter }) => {
       if (submitter.value === "add" && get("plot-simulation").value) this.#add();
     });
+    // Whether a panel follows its link may have changed.
+    addEventListener("pagehide", () => this.#keep());
   }
 
   /** @param {string[]} simulations that are shown; plots of others are hidden */
@@ -35,7 +42,7 @@ export class Plots {
   }
 
   /**
-   * Add the plots that a description binds to links, unless they are there already.
+   * Add the plots that a description binds to links, unless they are there already, and those of the layout.
    * @param {string} simulation whose robot it describes
    * @param {string} urdf
    */
@@ -45,6 +52,15 @@ export class Plots {
         && choice.name === tooltip.name && choice.link === tooltip.link;
       if (!this.panels.some(isThere)) this.#put({ simulation, ...tooltip }, true);
     }
+    const joints = this.view.stations.get(simulation)?.robot?.joints ?? [];
+    const fits = ({ choice }) => choice.simulation === simulation && (choice.field === "ball" || joints.includes(choice.name));
+    const fitting = this.#waiting.filter(fits);
+    this.#waiting = this.#waiting.filter((each) => !fits(each));
+    for (const { choice, follows } of fitting) this.#own.add(this.#put(choice, follows));
+  }
+
+  #keep() {
+    keepLayout({ plots: [...this.#waiting, ...[...this.#own].map(({ choice, follows }) => ({ choice, follows }))] });
   }
 
   /** Draw new values, and move panels to their links. */
@@ -93,16 +109,19 @@ export class Plots {
 
   #add() {
     const [simulation, field, name, link] = ["simulation", "field", "name", "link"].map((key) => get(`plot-${key}`).value);
-    this.#put({ simulation, field, name, link }, get("plot-follows").checked);
+    this.#own.add(this.#put({ simulation, field, name, link }, get("plot-follows").checked));
+    this.#keep();
   }
 
   #put(choice, follows) {
     const slides = this.view.stations.get(choice.simulation)?.robot?.slides(choice.name);
     const panel = new PlotPanel({ ...choice, slides }, follows, () => {
       this.panels.splice(this.panels.indexOf(panel), 1);
+      if (this.#own.delete(panel)) this.#keep();
       get("add-plot").focus();
     });
     this.panels.push(panel);
+    return panel;
   }
 
   #drawLeaders(lines) {

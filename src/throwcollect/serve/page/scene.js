@@ -1,11 +1,15 @@
 /** The three-dimensional view: one tile a simulation, all seen from the same side; or all of them in a room. */
 
 import {
-  Color, DirectionalLight, GridHelper, Group, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
+  Color, DirectionalLight, GridHelper, Group, HemisphereLight, Mesh, MeshLambertMaterial, PerspectiveCamera, Scene, SphereGeometry,
+  Vector3, WebGLRenderer,
 } from "./vendor/three/build/three.module.js";
 import { OrbitControls } from "./vendor/three/examples/jsm/controls/OrbitControls.js";
 import { Bodies } from "./bodies.js";
 import { makeMarker } from "./marker.js";
+import { colorOf } from "./outcomes.js";
+import { saveFile } from "./saving.js";
+import { posesAt } from "./throws.js";
 import { Trails } from "./trails.js";
 
 const TARGET = new Vector3(0.6, 0, 1);
@@ -24,6 +28,9 @@ const SOFTWARE_SHARE = 1 / 3;
 const SOFTWARE_STEP_MS = [95, 400];
 /** Distance between two robots in a room [m]. */
 const SPACING_M = 1.5;
+/** The object of a throw that another one is compared with. */
+const GHOST = new SphereGeometry(0.04, 20, 14);
+const GHOST_OPACITY = 0.45;
 
 /** One simulation in the view. */
 export class Station {
@@ -55,7 +62,27 @@ export class Station {
     if (place) this.target.position.fromArray(place);
   }
 
+  /** @param {import("./throws.js").Throw | null} other throw whose object is drawn transparently; null for none */
+  setGhost(other) {
+    this.#ghost?.mesh.material.dispose();
+    this.#ghost?.mesh.removeFromParent();
+    this.#ghost = null;
+    if (!other) return;
+    const material = new MeshLambertMaterial({ color: colorOf(other.outcome), transparent: true, opacity: GHOST_OPACITY });
+    this.#ghost = { other, mesh: new Mesh(GHOST, material) };
+    this.group.add(this.#ghost.mesh);
+  }
+
+  /** @param {number} time [s] of the replay at which the ghost is drawn */
+  moveGhost(time) {
+    if (this.#ghost) this.#ghost.mesh.position.fromArray(posesAt(this.#ghost.other, time).at(-1));
+  }
+
+  /** @type {{other: import("./throws.js").Throw, mesh: Mesh} | null} */
+  #ghost = null;
+
   dispose() {
+    this.setGhost(null);
     this.trails.clear();
     this.bodies.clear();
     this.robot?.dispose();
@@ -300,16 +327,23 @@ export class View {
     this.#changed = false;
     this.#adapt(sinceMs);
     const beganMs = performance.now();
-    this.#choose();
-    this.#scene.updateMatrixWorld();
-    this.renderer.setScissorTest(true);
-    for (const station of this.stations.values()) station.group.visible = false;
-    for (const name of this.shown.length ? this.shown : [""]) this.#drawTile(name);
+    this.#drawTiles();
     if (this.#isBySoftware) {
       const gl = this.renderer.getContext();
       this.#drawn = { ended: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), beganMs };
       gl.flush();
     }
+  }
+
+  /**
+   * Save what is seen as PNG.
+   * @param {string} name of the file
+   */
+  async savePicture(name) {
+    // A browser keeps the pixels of a canvas only until the next picture, so this one is drawn and read at once.
+    this.#drawTiles();
+    const content = await new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
+    if (content) saveFile(content, name);
   }
 
   /** If software has drawn the picture, delay the next one, so that the processors are free in between. */
@@ -328,6 +362,14 @@ export class View {
   #choose() {
     const few = this.shown.length <= MOST_FINE && !this.#plain;
     for (const name of this.shown) this.stations.get(name).robot?.setCoarse(!few);
+  }
+
+  #drawTiles() {
+    this.#choose();
+    this.#scene.updateMatrixWorld();
+    this.renderer.setScissorTest(true);
+    for (const station of this.stations.values()) station.group.visible = false;
+    for (const name of this.shown.length ? this.shown : [""]) this.#drawTile(name);
   }
 
   #drawTile(name) {

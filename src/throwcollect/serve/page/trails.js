@@ -27,8 +27,9 @@ export class Trails {
   /** @param {Throw} shown becomes the newest */
   add(shown) {
     const points = [];
-    const step = Math.max(1, Math.floor(shown.samples / SEGMENTS));
-    for (let i = 0; i < shown.samples; i += step) points.push(new Vector3().fromArray(shown.path, 3 * i));
+    const last = shown.samples - 1;
+    const segments = Math.min(SEGMENTS, last);
+    for (let i = 0; i <= segments; i++) points.push(new Vector3().fromArray(shown.path, 3 * Math.round((i * last) / segments)));
     if (points.length < 2) return;
     const material = new MeshBasicMaterial({ color: colorOf(shown.outcome), transparent: true });
     // The curve is sampled by time: with arc lengths, a share of the tube would not be the same share of the time.

@@ -1,8 +1,9 @@
 /** The view of one run: its newest throws, its robots, its landings. */
 
-import { Landings } from "./landings.js";
+import { REPLAY } from "./replay.js";
 import { Robot } from "./robot.js";
 import { lives } from "./state.js";
+import { StoredThrows } from "./stored_throws.js";
 import { decodeThrow, jointsAt, posesAt } from "./throws.js";
 
 /** Watches one run at a time, and only while the page is visible. */
@@ -18,6 +19,8 @@ export class Watching {
   described = () => {};
   /** @type {() => void} called when the scene of the run is known */
   known = () => {};
+  /** @type {import("./replay.js").Replay | null} */
+  replay = null;
 
   /**
    * @param {object} parts
@@ -30,7 +33,7 @@ export class Watching {
    */
   constructor({ connection, view, playback, map, meshes, tell }) {
     Object.assign(this, { connection, view, playback, map, meshes, tell });
-    this.landings = new Landings(connection, map);
+    this.stored = new StoredThrows(connection, map);
     document.addEventListener("visibilitychange", () => this.#follow());
   }
 
@@ -42,7 +45,7 @@ export class Watching {
     this.#follow();
     if (instance) {
       this.#fetchDescription();
-      this.landings.follow(instance);
+      this.stored.follow(instance);
     }
   }
 
@@ -87,6 +90,7 @@ export class Watching {
       station.robot?.move(jointsAt(shown, time).map((position, i) => [shown.joints[i], position]));
       station.bodies.move(posesAt(shown, time));
       station.trails.reveal(shown.duration ? time / shown.duration : 1);
+      station.moveGhost(time);
       this.view.touch();
     }
   }
@@ -99,9 +103,15 @@ export class Watching {
   /** @param {import("./throws.js").Throw} shown begins to be replayed */
   begin(shown) {
     const station = this.view.stations.get(shown.simulation);
+    const isStored = shown.simulation === REPLAY;
+    if (station && isStored) {
+      this.replay.dress(station);
+      this.#fetchDescription();
+    }
     station?.trails.add(shown);
     if (shown.bodies) station?.bodies.put(shown.bodies);
-    this.map.mark(shown);
+    if (isStored) this.map.mark(shown, this.replay.compared);
+    else if (this.view.shown.includes(shown.simulation)) this.map.mark(shown);
   }
 
   #begin(id) {
@@ -114,7 +124,7 @@ export class Watching {
     this.view.clear();
     this.playback.clear();
     this.map.clear();
-    this.landings.begin(id);
+    this.stored.begin(id);
   }
 
   /** Listen for throws as long as the run can have some, and the page is visible. */
@@ -141,7 +151,9 @@ export class Watching {
   async #fetchDescription() {
     const { id, instance } = this;
     const run = `/instances/${encodeURIComponent(id)}`;
-    if (this.#urdf === null && instance.robots.length) {
+    // A run that has ended has no robots any more, but its dataset says what they looked like.
+    const isStored = this.view.shown.includes(REPLAY);
+    if (this.#urdf === null && (instance.robots.length || isStored)) {
       this.#urdf = "";
       const scene = await this.#ask(id, `${run}/scene`, (response) => response.json());
       const urdf = await this.#ask(id, `${run}/urdf`, (response) => response.text());
