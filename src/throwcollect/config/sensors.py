@@ -130,6 +130,8 @@ class CameraConfig(PictureConfig):
     """Kind of the sensor."""
     streams: Annotated[list[Stream], Field(min_length=1)] = ["color"]
     """What is recorded: `color`, `depth` along the optical axis, and `segmentation`, the link or body in each pixel."""
+    shadows: bool = False
+    """Whether robot and bodies throw shadows; a small picture takes twice as long with them."""
 
     @property
     def recorded(self) -> tuple[Stream, ...]:

@@ -38,6 +38,7 @@ from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import remove, unwritable
 from throwcollect.robots.description import full_description
+from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import Result
@@ -71,6 +72,7 @@ class SessionDataset:
                 )
             self._channels = Channels(self._config, full_description(self._config))
             self._encoder = ChunkEncoder(self._channels, level=self._config.record.zstd_level)
+            self._sensors = SensorRecorder(self._channels)
             self._read()
             self.close = held.pop_all().close
 
@@ -121,8 +123,8 @@ class SessionDataset:
             for each in header.contacts
         )
         header = replace(header, trial=number, start_ns=header.start_ns + shift_ns, contacts=contacts)
-        chunk, _ = self._encoder.encode(replace(samples, stamps_ns=samples.stamps_ns + shift_ns))
-        return Episode(header, chunk)
+        chunk, table = self._encoder.encode(replace(samples, stamps_ns=samples.stamps_ns + shift_ns))
+        return Episode(header, chunk, sensors=self._sensors.record(self._config, number, table.samples))
 
 
 def _as_recorded(config: Config, seed: int) -> Config:

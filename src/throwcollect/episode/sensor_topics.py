@@ -16,6 +16,7 @@ from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig
 from throwcollect.episode.frames import Frame, quaternion_of
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.topics import make_fixed_transforms, make_header
+from throwcollect.reproducible_math import cos, sin
 
 FIRST_SENSOR_ID = 1000
 _IDS_OF_SENSOR = 16
@@ -98,9 +99,10 @@ def frame_of(name: str, sensor: SensorConfig) -> Frame:
     return Frame(sensor.link, f"{name}_frame", (x, y, z), turn)
 
 
-def focal_length(camera: PictureConfig) -> float:
-    """Compute the focal length of a camera in pixels, across and down."""
-    return camera.height / 2 / math.tan(camera.vertical_fov_rad / 2)
+def focal_length(height: int, vertical_fov_rad: float) -> float:
+    """Compute the focal length of a camera in pixels, across and down, as every processor does alike."""
+    half = np.array([vertical_fov_rad / 2])
+    return float(height / 2 * cos(half)[0] / sin(half)[0])
 
 
 def _make_pose(name: str, sensor: SensorConfig) -> SensorTopic:
@@ -183,7 +185,11 @@ def make_label_info(names: Sequence[str]) -> Any:
 
 def intrinsics_of(camera: PictureConfig) -> Mapping[str, NDArray[np.float64]]:
     """Compute the matrices k, r and p of a sensor_msgs/CameraInfo, row by row."""
-    focal, across, down = focal_length(camera), (camera.width - 1) / 2, (camera.height - 1) / 2
+    focal, across, down = (
+        focal_length(camera.height, camera.vertical_fov_rad),
+        (camera.width - 1) / 2,
+        (camera.height - 1) / 2,
+    )
     return {
         "k": np.array([focal, 0, across, 0, focal, down, 0, 0, 1.0]),
         "r": np.eye(3).ravel(),

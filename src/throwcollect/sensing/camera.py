@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
 from throwcollect.episode.frames import WORLD
+from throwcollect.episode.sensor_topics import focal_length
 from throwcollect.sensing.pose import OPTICAL, Pose
 from throwcollect.sensing.raster import NONE, Outlines, clip_near, find_nearest
 from throwcollect.sensing.scene import PlacedScene
@@ -49,6 +50,7 @@ class Camera:
         near_m: It looks through what is nearer, along the optical axis, such as the link that it is in.
         far_m: It sees nothing beyond, along the optical axis.
         smooth: Whether edges in `Frame.color` are smooth: each pixel is the mean of four.
+        shadows: Whether what the sun does not reach is darker.
     """
 
     width: int
@@ -59,11 +61,12 @@ class Camera:
     near_m: float = 0.02
     far_m: float = 100.0
     smooth: bool = False
+    shadows: bool = True
 
     @property
     def focal_px(self) -> float:
         """Focal length in pixels, across and down."""
-        return self.height / 2 / math.tan(self.vertical_fov_rad / 2)
+        return focal_length(self.height, self.vertical_fov_rad)
 
     @property
     def matrix(self) -> tuple[Vector, Vector, Vector]:
@@ -91,7 +94,7 @@ class Camera:
         depth = seen.depth.astype(np.float32).reshape(self.height, self.width)
         if not color:
             return Frame(depth, labels, None)
-        picture = shade(seen, placed, optical)
+        picture = shade(seen, placed, optical, shadows=self.shadows)
         if self.smooth:
             self._smooth(picture, placed, optical)
         levels = (picture + np.float32(0.5)).astype(np.uint8).T
@@ -108,7 +111,8 @@ class Camera:
         nearest = near.max(axis=0)
         steps = (nearest - near.min(axis=0) > _STEP * nearest) & (labels[0] != placed.scene.ground)
         edges = np.flatnonzero((labels != labels[0]).any(axis=0) | steps)
-        one, two, three, four = np.split(shade(seen.choose(quarters[:, edges].ravel()), placed, optical), 4, axis=1)
+        chosen = seen.choose(quarters[:, edges].ravel())
+        one, two, three, four = np.split(shade(chosen, placed, optical, shadows=self.shadows), 4, axis=1)
         picture[:, edges] = ((one + two) + (three + four)) / 4
 
     def _look(self, placed: PlacedScene, optical: Pose) -> Seen:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig, SensorConfig
+from throwcollect.config.sensors import CameraConfig, LayersConfig, LidarConfig, PictureConfig, SensorConfig
 from throwcollect.episode.sensor_topics import POINT, frame_of, intrinsics_of
 from throwcollect.errors import ConfigError
 from throwcollect.sensing.camera import Camera, Frame
@@ -72,7 +72,8 @@ class CameraSensor(Sensor):
             Noise(section.noise, seed, trial, f"{name}/{stream}") for stream in ("color", "depth")
         )
         size = section.width, section.height, section.vertical_fov_rad
-        self.camera = Camera(*size, section.link, self.pose, near_m=section.near_m, far_m=section.far_m)
+        shadows = isinstance(section, CameraConfig) and section.shadows
+        self.camera = Camera(*size, section.link, self.pose, section.near_m, section.far_m, shadows=shadows)
 
     def see(self, placed: PlacedScene) -> Frame:
         """Render its picture of a scene in one state, without noise."""

@@ -74,9 +74,9 @@ class Seen:
 _PER_PIXEL = ("x", "y", "depth", "triangles", "on_ground")
 
 
-def shade(seen: Seen, placed: PlacedScene, optical: Pose) -> NDArray[np.float32]:
+def shade(seen: Seen, placed: PlacedScene, optical: Pose, *, shadows: bool) -> NDArray[np.float32]:
     """Compute the colours of pixels: red, green and blue, from 0 to 255, shape ``(3, n)``."""
-    direct = _find_light(seen, placed, optical)
+    direct = _find_light(seen, placed, optical) if shadows else np.ones(len(seen.depth), np.float32)
     color = _color_ground(seen, optical, direct)
     pixels = np.flatnonzero(seen.triangles != NONE)
     chosen = seen.choose(pixels)

@@ -188,7 +188,7 @@ def test_swept_cameras_have_their_own_intrinsics_and_places(tmp_path: Path) -> N
     directory = collect(tmp_path, SENSORS, swept=SWEPT, topics=", tf")
     dataset = throwcollect.load(directory)
     focal = [throw.sensors["side"].intrinsics[0, 0] for throw in dataset]
-    assert focal == [72 / np.tan(throw["sensors_side_vertical_fov_rad"] / 2) for throw in dataset]
+    assert focal == pytest.approx([72 / np.tan(throw["sensors_side_vertical_fov_rad"] / 2) for throw in dataset])
     assert len(set(focal)) == 3
     assert verify(directory) == []
     store = get_typestore(Stores.ROS2_JAZZY)
