@@ -39,8 +39,9 @@ _GROUPS = {
     "dataset": (
         "Look into datasets, and make others from them.",
         "dataset.info:info dataset.info:verify dataset.info:digest dataset.writing:export dataset.derive:merge "
-        "dataset.derive:filter_ dataset.derive:sample dataset.derive:split dataset.derive:stats dataset.writing:report "
-        "dataset.writing:view dataset.writing:render dataset.replay:replay",
+        "dataset.derive:filter_ dataset.derive:sample dataset.derive:split dataset.derive:render_sensors "
+        "dataset.derive:stats dataset.writing:report dataset.writing:view dataset.writing:render "
+        "dataset.writing:images dataset.replay:replay",
     ),
     "robot": (
         "Import, check and list robots.",

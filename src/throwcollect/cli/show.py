@@ -106,23 +106,27 @@ def plan(
     settings: SetOption = None,
     trials: TrialsOption = None,
     output: Path | None = None,
+    sensors: Path | None = None,
     json: JsonOption = False,
 ) -> None:
     """Print the trials without running them.
 
     Options:
         output (--output -o DIR): Freeze the plan in DIR, for `up --slice`, instead of printing it.
+        sensors (DIR): Write the first frame of each sensor as PNG file in DIR.
     """
     from throwcollect.config.loader import load_locating_errors
     from throwcollect.coordinator.prepare import count_trials, draw_plan, prepare
 
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
+        if sensors is not None and not config.sensors:
+            raise ConfigError(f"--sensors {sensors}: the configuration has no sensors")
         onlooker = display(quiet=json, bar=False)
         if output is None:
             found = draw_plan(config, directory=path.parent, processes=count_cores(), onlooker=onlooker)
         else:
             found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=onlooker)
-    _load_world(found)
+    _load_world(found, sensors, quiet=json)
     if json:
         facts = ("seed", "digest", "refused")
         targets = found.trials.points.target_names
@@ -146,16 +150,31 @@ def plan(
     tell(f"{count_trials(found)}; {len(found.trials.refused)} refused")
 
 
-def _load_world(plan: Plan) -> None:
-    """Load the world of the first trial that is not refused, because an engine may not take what a plan allows."""
+def _load_world(plan: Plan, pictures: Path | None, *, quiet: bool) -> None:
+    """Load the world of the first trial that is not refused, because an engine may not take what a plan allows.
+
+    If there are sensors, it prints what they cost, and writes what they see first into a directory that is given.
+    """
+    from throwcollect.coordinator.sensor_cost import measure_sensors
     from throwcollect.extras import MissingExtraError
     from throwcollect.sim.world import World
 
-    first = next(trial for trial in plan.trials if not trial.refused)
     try:
-        World(plan.config_of(first)).close()
+        if not plan.config.sensors:
+            World(plan.config_of(next(trial for trial in plan.trials if not trial.refused))).close()
+            return
+        cost = measure_sensors(plan)
     except MissingExtraError as error:
         tell(f"whether the engine takes the robot is not known: {error.one_line}")
+        return
+    for name, body in cost.inside.items():
+        tell(f"warning: sensors.{name}: {body} fills the first picture; the camera may be inside of it")
+    if not quiet:
+        tell(cost.words)
+    if pictures is not None:
+        from throwcollect.view.sensor_pictures import write_frames
+
+        write_frames([(name, frames, 0) for name, frames in cost.first.items()], pictures)
 
 
 def doctor(*, json: JsonOption = False) -> None:

@@ -20,6 +20,7 @@ from throwcollect.config.robot_config import AnyRobot, DescribedRobotConfig, Rob
 from throwcollect.config.scene import AnyBody, FileBodyConfig
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.section import Section
+from throwcollect.config.sensors import AnySensor, Sensors
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
 from throwcollect.files import StrPath
@@ -67,6 +68,25 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
         raise ConfigError(wrong)
     with _placing(document):
         yield config
+
+
+@contextmanager
+def load_sensors(path: Path) -> Iterator[Mapping[str, AnySensor]]:
+    """Read a file with the section `sensors` alone, and add its lines to a `ConfigError` of the block.
+
+    Raises:
+        ConfigError: If the file cannot be read or anything in it is wrong, or the block raises one.
+    """
+    document = Document(path)
+    sensors = document.validate(_SensorsOnly).sensors
+    try:
+        yield sensors
+    except ConfigError as error:
+        # Other arguments of the block are not in the file.
+        if not all(problem.key.startswith("sensors.") for problem in error.problems):
+            raise
+        with _placing(document):
+            raise
 
 
 @contextmanager
@@ -195,6 +215,10 @@ class _RobotOnly(Section):
 
 class _BodyOnly(Section):
     body: AnyBody
+
+
+class _SensorsOnly(Section):
+    sensors: Sensors
 
 
 def _find_sweep_problems(config: Config) -> Iterator[tuple[Location, str]]:

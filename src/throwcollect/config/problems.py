@@ -115,7 +115,7 @@ def _describe(details: ErrorDetails, location: Location, section: type[Section])
         message = kind
     elif kind == "union_tag_not_found" and isinstance(value, Mapping):
         # The key that chooses between sections takes a word of each.
-        tag = next((each for each in ("family", "shape") if each in value), "name")
+        tag = next((each for each in ("family", "shape", "kind") if each in value), "name")
         kinds = root(section).child(*location).alternatives
         # Sections of several tasks have the same motions.
         words = list(dict.fromkeys(word for each in kinds for word in each.child(tag).choices))

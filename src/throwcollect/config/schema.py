@@ -23,7 +23,7 @@ from throwcollect.config.robot_config import AnyRobot, RobotConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.scene import BALL, AnyBody, BallConfig, BodyName, FileBodyConfig, SceneConfig
 from throwcollect.config.section import Section, any_of
-from throwcollect.config.sensors import AnySensor, SensorName
+from throwcollect.config.sensors import Sensors
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
 from throwcollect.config.task_config import TaskConfig, UntilConfig
 from throwcollect.config.tool_config import ToolConfig
@@ -175,7 +175,7 @@ class Config(Section):
     """What varies from trial to trial."""
     record: Annotated[RecordConfig, Key(Effect.PHYSICS)] = RecordConfig()
     """What is recorded."""
-    sensors: Annotated[dict[SensorName, AnySensor], Field(max_length=32), Key(Effect.ENCODING, swept=False)] = {}
+    sensors: Annotated[Sensors, Key(Effect.ENCODING, swept=False)] = {}
     """Cameras and lidars that see the recorded states, by name; the name is that of topics and frames."""
     run: Annotated[RunConfig, Key(Effect.RUN, operator=True)] = RunConfig()
     """How it is run."""

@@ -207,3 +207,5 @@ else:
         {"camera": CameraConfig, "depth": DepthConfig, "lidar_2d": LidarConfig, "lidar_3d": LayersConfig},
         lambda value: value.get("kind", "camera") if isinstance(value, dict) else None,
     )
+
+Sensors = Annotated[dict[SensorName, AnySensor], Field(max_length=32)]

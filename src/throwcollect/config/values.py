@@ -118,10 +118,11 @@ def reason_not_sweepable(config: Config, key: str) -> str | None:
     Numbers of the task's motion, of the ball, the scene and the motors may vary from trial to trial. The world is built
     and the recording is set up only once, so their other keys may not.
     """
-    leaf = next((leaf for leaf in leaves(config) if leaf.name == key), None)
-    if leaf is not None:
-        return _find_obstacle(config, leaf)
-    above, _, name = key.rpartition(".")
+    found, (above, _, name) = {leaf.name: leaf for leaf in leaves(config)}, key.rpartition(".")
+    if key in found:
+        return _find_obstacle(config, found[key])
+    if above in found and name.isdecimal() and found[above].value is None:
+        return f"cannot be swept, as {above} is null"
     holder: Any = config
     for part in above.split("."):
         holder = getattr(holder, part, None)

@@ -20,6 +20,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.oddities import find_placeholders
+from throwcollect.sensing.sensor import check_sensors
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sim.policy import find_policy
 from throwcollect.sweep.plan import Check, Plan, check_some_left, make_trials, refusal
@@ -69,6 +70,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     ThrowsTable((), config)
     if config.task.policy is not None:
         find_policy(config)
+    check_sensors(config)
     refuse_many_files(config, len(points.values))
     count = count_first(config, len(points.values))
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)

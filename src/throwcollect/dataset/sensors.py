@@ -65,6 +65,9 @@ class SensorFrames:
         self._chunks = [chunk for chunk in chunks if topics.keys() == chunk.indexes.keys()]
         counts = (count_indexed(next(iter(chunk.indexes.values()))) for chunk in self._chunks)
         self._starts = [*accumulate(counts, initial=0)]
+        expected = len(range(0, header.samples, config.record.rate_hz // self.config.rate_hz))
+        if len(self) != expected:
+            raise DatasetError(f"chunk: {len(self)} frames of {name}", expected=str(expected))
         self._table: tuple[int, MessageTable] | None = None
 
     def __len__(self) -> int:
@@ -142,8 +145,10 @@ class SensorFrames:
     def _rows(self, chunk: int, stream: str) -> Rows:
         """View the messages of a stream in a chunk; the last chunk that was read is kept."""
         if self._table is None or self._table[0] != chunk:
-            table = read_frames(self._chunks[chunk])
-            self._table = chunk, table
+            try:
+                self._table = chunk, read_frames(self._chunks[chunk])
+            except DatasetError as error:
+                raise error.locate(place=f"trial {self._header.trial}, {self.name}") from error
         number, topic = self._topics[stream]
         messages = self._table[1].messages(number)
         if messages.shape[1] != topic.layout.dtype.itemsize:

@@ -17,7 +17,7 @@ import pyarrow as pa
 from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import SensorSections
-from throwcollect.config.values import column_of, with_sensors
+from throwcollect.config.values import column_of, reason_not_sweepable, with_sensors
 from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import data_card
@@ -33,11 +33,12 @@ from throwcollect.dataset.throws_table import Row, ThrowsTable, make_field
 from throwcollect.derive.joined_plan import join_plans
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, Problem
 from throwcollect.files import StrPath, new_directory, replacing, write_all, write_file
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
 from throwcollect.sensing.recorder import SensorRecorder
+from throwcollect.sensing.sensor import check_sensors
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.plan import Plan
@@ -96,6 +97,10 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     plan, firsts = join_plans([source.plan for source in sources])
     if sensors is not None:
         plan = replace(plan, config=with_sensors(plan.config, sensors))
+        for key in plan.keys:
+            if key.startswith("sensors.") and (reason := reason_not_sweepable(plan.config, key)):
+                raise ConfigError([Problem(f"the dataset varies it: {reason}", key)])
+        check_sensors(plan.config)
     elif any(source.config.sensors != plan.config.sensors for source in sources):
         raise ConfigError(
             "the datasets have different sensors", hint=f"{command('dataset', 'render-sensors')} makes them alike"

@@ -47,6 +47,8 @@ from throwcollect.episode.topics import (
 )
 from throwcollect.errors import DatasetError
 
+MOST_FRAMES_BYTES, _MOST_FRAME_BYTES = 4 * 2**20, 160 * 2**20
+"""Most bytes of a chunk with frames, as players decompress a whole one to show a single picture; and of one frame."""
 _HEADERS = np.dtype(
     {
         "names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"],
@@ -218,13 +220,16 @@ class MessageTable:
 
 def read_frames(chunk: Chunk) -> MessageTable:
     """Read the records of a chunk with frames of a sensor: one row a frame; `chunk` has its message indexes."""
-    return MessageTable(chunk.contents, max(map(count_indexed, chunk.indexes.values()), default=0))
+    count = max(map(count_indexed, chunk.indexes.values()), default=0)
+    if chunk.uncompressed_size > (most := MOST_FRAMES_BYTES if count > 1 else _MOST_FRAME_BYTES):
+        raise DatasetError(f"chunk: announces {chunk.uncompressed_size} bytes of frames", expected=f"at most {most}")
+    return MessageTable(chunk.contents, count)
 
 
 def check_frames(chunk: Chunk) -> None:
     """Compare the records of a chunk with frames of a sensor with their hash and their message indexes."""
-    chunk.check_records()
     table = read_frames(chunk)
+    chunk.check_records()
     if table.message_indexes != chunk.indexes:
         raise DatasetError("chunk: the message indexes behind it do not fit it")
 

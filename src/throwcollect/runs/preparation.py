@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -17,7 +17,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.configuration import reading_config
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.errors import WorkerError
+from throwcollect.errors import ThrowcollectError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runs.launcher import launch
@@ -210,6 +210,13 @@ def prepare_run(
         run.write(record)
         _warn_if_others_may_join(config, choice.middleware, onlooker)
         onlooker.say(f"plan: {describe_plan(made)}; dataset: {directory}")
+        if config.sensors:
+            from throwcollect.coordinator.sensor_cost import measure_sensors
+
+            # Nodes may be able to simulate what this process cannot.
+            with suppress(ThrowcollectError):
+                if (cost := measure_sensors(made)).throws > 1:
+                    onlooker.say(cost.words)
         launching = partial(launch, config=config, onlooker=onlooker)
         return run.prepared(config, directory, launching, held=held.pop_all(), undo=undo.pop_all())
 

@@ -11,7 +11,7 @@ import zstandard
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.message_table import MessageTable, make_row
+from throwcollect.episode.message_table import MOST_FRAMES_BYTES, MessageTable, make_row
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import put_stamps
 from throwcollect.robots.description import full_description
@@ -22,8 +22,6 @@ from throwcollect.units import NS_PER_S
 
 _LEVEL = 6
 """Level of zstd: takes 2 % of the time of rendering; with -1, a frame does not fit into its window."""
-_MOST_BYTES = 4 * 2**20
-"""Most bytes of a chunk, as players decompress a whole one to show a single picture."""
 
 
 class SensorRecorder:
@@ -57,7 +55,7 @@ class SensorRecorder:
             sensor = make_sensor(name, config, scene, trial)
             numbers = np.arange(0, len(samples), config.record.rate_hz // sensor.rate_hz)
             row = make_row({number: topic.layout for number, topic in topics.items()})
-            most = max(_MOST_BYTES // len(row), 1)
+            most = max(MOST_FRAMES_BYTES // len(row), 1)
             for first in range(0, len(numbers), most):
                 stamps = samples.stamps_ns[numbers[first : first + most]]
                 table = MessageTable(row * len(stamps), len(stamps))

@@ -11,8 +11,10 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import CameraConfig, LayersConfig, LidarConfig, PictureConfig, SensorConfig
+from throwcollect.episode.channels import Channels
 from throwcollect.episode.sensor_topics import POINT, frame_of, intrinsics_of
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.robots.description import full_description
 from throwcollect.sensing.camera import Camera, Frame
 from throwcollect.sensing.lidar import Lidar, Ranges
 from throwcollect.sensing.noise import Noise
@@ -52,10 +54,28 @@ def make_sensor(name: str, config: Config, scene: Scene, trial: int) -> Sensor:
     """
     section = config.sensors[name]
     if section.link not in scene.links:
-        raise ConfigError(f"sensors.{name}.link: there is no link {section.link!r}{suggest(section.link, scene.links)}")
+        sentence = f"there is no link {section.link!r}{suggest(section.link, scene.links)}"
+        raise ConfigError([Problem(sentence, f"sensors.{name}.link")])
     if isinstance(section, PictureConfig):
         return CameraSensor(name, section, config.seed, trial)
     return LidarSensor(name, section, config.seed, trial)
+
+
+def check_sensors(config: Config) -> None:
+    """Check that the sensors of a configuration can be made, and that nothing else has their names.
+
+    Raises:
+        ConfigError: If a name is taken, a link does not exist, or a mesh that sensors see cannot be read.
+    """
+    if not config.sensors:
+        return
+    scene, channels = Scene.of(config), Channels(config, full_description(config))
+    taken = {*scene.links, *scene.labels, *(channel.topic.split("/")[1] for channel in channels.recorded)}
+    for name in config.sensors:
+        if held := taken & {name, f"{name}_frame", f"{name}_optical_frame"}:
+            sentence = f"should have another name, as {held.pop()} is a frame or a topic already"
+            raise ConfigError([Problem(sentence, f"sensors.{name}")])
+        make_sensor(name, config, scene, 0)
 
 
 class CameraSensor(Sensor):

@@ -87,6 +87,28 @@ def split(
     show(found, *lines, *_list_left_out(found.without_episode), json=json)
 
 
+def render_sensors(
+    directory: DatasetArgument,
+    output: OutputArgument,
+    *,
+    sensors: Path,
+    where: str | None = None,
+    json: JsonOption = False,
+) -> None:
+    """Copy a dataset, and let other cameras and lidars see its throws.
+
+    Options:
+        sensors (FILE): YAML file with the section sensors of a configuration.
+        where (CONDITION): Take only trials that fulfil it, such as: landing_x_m > 1.5
+    """
+    from throwcollect.config.loader import load_sensors
+    from throwcollect.derive.derivation import render_sensors as render
+
+    with load_sensors(sensors) as sections:
+        derived = render(directory, output, sections, where=where)
+    _show(output, derived, json=json)
+
+
 def stats(directory: DatasetArgument, *, json: JsonOption = False) -> None:
     """Print statistics of the table of throws and of all trajectories."""
     from throwcollect.derive.statistics import statistics

@@ -42,18 +42,21 @@ def digest(directory: DatasetArgument) -> None:
     typer.echo(compute_digest(directory))
 
 
-def verify(directory: DatasetArgument, *, replay: int | None = None, json: JsonOption = False) -> None:
+def verify(
+    directory: DatasetArgument, *, replay: int | None = None, render: int | None = None, json: JsonOption = False
+) -> None:
     """Check a dataset against itself and against physics; exit code 4 if anything is wrong.
 
     Options:
         replay (N 0..): Simulate N throws again, chosen by the seed; 10 by default, where engine and libraries are the
             same.
+        render (N 0..): Render what sensors see of N throws again; 2 by default.
     """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.audit import verify_dataset
 
-    findings = verify_dataset(directory, replay=replay, processes=count_cores())
+    findings = verify_dataset(directory, replay=replay, render=render, processes=count_cores())
     if findings:
         show(findings, *map(str, findings), json=json)
         raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")

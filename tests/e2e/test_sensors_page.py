@@ -1,0 +1,64 @@
+"""The page on sensors, block by block and command by command."""
+
+import re
+import shlex
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import throwcollect
+from tests.e2e.collection import INPROCESS, call
+
+pytest.importorskip("mujoco")
+images = pytest.importorskip("PIL.Image")
+
+pytestmark = pytest.mark.e2e
+PAGE = (Path(__file__).parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
+
+
+def test_the_page_is_right(tmp_path: Path) -> None:
+    for name, text in zip(("seen.yaml", "other.yaml", "random.yaml"), blocks("yaml"), strict=True):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    printed = {}
+    for line in "".join(blocks("sh")).replace("up -n 2 ", "up ").splitlines():
+        words = shlex.split(line)[1:]
+        few = {"up": (*INPROCESS, "--set", "run.replay=2"), "plan": ()}.get(words[0])
+        done = call(*words, *(() if few is None else (*few, "--set", "sim.engine=mujoco")), cwd=tmp_path)
+        assert done.returncode == 0, (line, done.stderr)
+        assert "Traceback" not in done.stderr
+        printed[" ".join(words[:2])] = done.stdout + done.stderr
+    cost = (
+        r"sensors: \d+ frames a throw, about \+\d+ ms \([\d.]+ throws\) and \+\d+ kB; all 8 trials: \+\d+ s of one core"
+    )
+    assert re.search(cost, printed["plan seen.yaml"])
+    assert re.search(cost, printed["up seen.yaml"])
+    names = ["cloud_points", "scan_scan", "side_color", "side_depth", "side_segmentation", "wrist_depth"]
+    assert sorted(path.stem for path in (tmp_path / "first").iterdir()) == names
+    dataset = throwcollect.load(tmp_path / "data" / "seen")
+    side = dataset[3].sensors["side"]
+    # The pictures have what is recorded, with all of its bits.
+    stem = tmp_path / "frames" / "side_000003_0012_"
+    for stream, frames in (("color", side.images), ("segmentation", side.labels), ("depth", side.depth_m[:] * 1000)):
+        picture = np.asarray(images.open(f"{stem}{stream}.png"))
+        assert np.array_equal(picture, np.where(np.isinf(frames[12]), 0, np.rint(frames[12])))
+    assert struct.unpack(">B", Path(f"{stem}depth.png").read_bytes()[24:25]) == (16,)
+    assert len(list((tmp_path / "frames").iterdir())) == 3 * (len(side) + len(dataset[0].sensors["side"]))
+    front = throwcollect.load(tmp_path / "data" / "front")
+    assert [throw["digest"] for throw in front] == [throw["digest"] for throw in dataset][:4]
+    assert list(front[0].sensors) == ["front"]
+    eyes = throwcollect.load(tmp_path / "data" / "random")
+    assert len({throw.sensors["eye"].intrinsics[0, 0] for throw in eyes}) == 4
+    words = [sys.executable, "-c", blocks("python")[0]]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "SensorFrames(side: 1" in done.stdout
+    assert "(96, 96, 3) uint8" in done.stdout
+    assert "(360,) (16, 180)" in done.stdout
