@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from importlib.metadata import EntryPoints
+from typing import Any
 
 from throwcollect import members
 
@@ -19,6 +20,7 @@ if __name__ == "__main__":
 from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section
+from throwcollect.config.sensors import CameraConfig, LidarConfig
 from throwcollect.config.shape import ValueShape, json_schema, root
 from throwcollect.config.values import sweepable_keys
 from throwcollect.robots.talos import TALOS
@@ -102,6 +104,10 @@ def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
                 kind = f" with `{_find_discriminator(item)}`" if len(items) > 1 else ""
                 yield f"### Items of `{key}`{kind}\n\n{item.node['description']}\n"
                 yield _write_table(item, "")
+                for part, section in item.keys.items():
+                    if section.keys:
+                        yield f"Its section `{part}`: {_write_sentence(section)}\n"
+                        yield _write_table(section, f"{part}.")
 
 
 def _find_discriminator(shape: ValueShape) -> str:
@@ -164,6 +170,10 @@ def _list_sweepable() -> str:
     primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
     learned: Section = config.task.model_copy(update={"trajectory": primitive})
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
+    place: Any = {"position_m": [0.0] * 3, "rpy_rad": [0.0] * 3}
+    sensors = CameraConfig(kind="camera", **place), LidarConfig(kind="lidar_2d", **place)
+    for sensor in sensors:
+        keys += sweepable_keys(config.model_copy(update={"sensors": {"<name>": sensor}}))
     joints = "|".join(TALOS.joints)
     general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _generalise, key) for key in keys)
     where = (
