@@ -55,7 +55,7 @@ def main(kept: Path) -> None:
 
     wide, ur5, quickstart = (collect(name, kept / name) for name in ("wide", "ur5", "quickstart"))
     for picture, dataset in (("throw", wide), ("ur5", ur5)):
-        render(dataset, PICTURES / f"{picture}.webp", trial=far_throw(dataset), slow=1.5)
+        render(dataset, PICTURES / f"{picture}.webp", trials=[far_throw(dataset)], slow=1.5)
     page = Path(tempfile.mkdtemp(dir=kept), "report.html")
     command = [sys.executable, "-m", "throwcollect", "dataset", "report", str(quickstart)]
     subprocess.run([*command, "--output", str(page)], check=True)

@@ -35,6 +35,7 @@ EXTRA_OF = MappingProxyType(
         "mujoco": "mujoco",
         "onnx": "onnx",
         "orjson": "serve",
+        "av": "video",
         "pandas": "pandas",
         "plotly": "report",
         "PIL": "report",
@@ -62,7 +63,7 @@ ENGINE_PACKAGES = MappingProxyType(
 """The package of each engine of our own that needs one, by name of the engine."""
 
 _WHEELS = {
-    # Compiling Bullet would not help, because it would compute other bytes. Pictures need Bullet, too.
+    # Compiling Bullet would not help, because it would compute other bytes.
     "pybullet": (
         ((3, 10), (3, 11)),
         "Python 3.11, such as that of `uv venv --python 3.11`; or `up --runtime docker`; or, instead of the default "

@@ -18,7 +18,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
-from throwcollect.extras import explain_missing, require
+from throwcollect.extras import explain_missing
 from throwcollect.files import StrPath
 from throwcollect.members import names_of
 from throwcollect.robots.description import robot_of
@@ -27,6 +27,7 @@ from throwcollect.robots.surroundings import object_of
 from throwcollect.sim.policy import Observation, PolicyLoop, shape_observation
 from throwcollect.sim.simulator import Simulator
 from throwcollect.simulator import find_refusal, with_policy
+from throwcollect.view.throw_pictures import Still
 
 with explain_missing():
     import gymnasium
@@ -121,7 +122,7 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
         self._checked: Mapping[str, float] | None = None
         self._simulator = Simulator(self.config, self._given)
         self._shaped, self._hit_m = reward == "shaped", hit_m
-        self._picture: Any = None
+        self._picture: Still | None = None
         self._ended = True
         loop = self._loop
         low, high = (loop.lower, loop.upper) if command == "position" else (-loop.speed, loop.speed)
@@ -209,28 +210,18 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
         return observation, reward, end not in (None, "timeout"), end == "timeout", info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw robot and bodies as they are now, from the right, shape ``(400, 640, 3)``; None without a mode.
-
-        Raises:
-            MissingExtraError: If Bullet or Pillow, which draw, are not installed.
-        """
+        """Draw robot and bodies as they are now, from the right, shape ``(400, 640, 3)``; None without a mode."""
         if self.render_mode is None:
             return None
-        from throwcollect.view.animation import Still
-
         world = self._simulator.world
         if self._picture is None:
-            require("PIL")
             self._picture = Still(self.config)
         # The last recorded sample is at most one period of the recording old.
-        picture: NDArray[np.uint8] = self._picture.draw(world.samples(world.recorded - 1))
-        return picture
+        return self._picture.draw(world.samples(world.recorded - 1))
 
     def close(self) -> None:
         """Free the physics engine."""
         self._simulator.close()
-        if self._picture is not None:
-            self._picture.close()
 
     def _predict_miss(self) -> float:
         """Compute how far from the target the object would land if it flew freely from now on [m]."""

@@ -116,7 +116,7 @@ def test_viewers_draw_a_body_in_its_own_frame(dataset: Path, pushed: int, tmp_pa
 
 
 def test_pictures_show_where_a_body_is(dataset: Path, pushed: int, tmp_path: Path) -> None:
-    render(dataset, tmp_path / "throw.webp", trial=pushed, slow=0.1)
+    render(dataset, tmp_path / "throw.webp", trials=[pushed], slow=0.1)
 
     def find_red(frame: int) -> np.ndarray:
         with Image.open(tmp_path / "throw.webp") as picture:

@@ -1,15 +1,12 @@
-"""With a decimal comma in the locale of the process, worlds, pictures and throws are the same."""
+"""With a decimal comma in the locale of the process, throws are the same."""
 
 import ctypes
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 
 from throwcollect import Simulator
-from throwcollect.engines.body import Vector
-from throwcollect.engines.bullet.renderer import Renderer
 from throwcollect.native_reading import reading_natively
 
 
@@ -27,18 +24,6 @@ def test_a_block_changes_how_c_reads_numbers_for_its_own_thread_alone(use_decima
         assert read_in_c(b"0.5") == 0.5
         assert pool.submit(read_in_c, b"0,5").result() == 0.5
     assert read_in_c(b"0,5") == 0.5
-
-
-def test_the_renderer_draws_the_same_robot_with_a_decimal_comma(use_decimal_comma: Callable[[], str]) -> None:
-    urdf = (Path(__file__).parents[1] / "plugins" / "planar_arm" / "planar_arm.urdf").read_text(encoding="utf-8")
-
-    def load() -> list[Vector]:
-        with Renderer(urdf, 1.0) as renderer:
-            return renderer.find_frames()
-
-    usual = load()
-    use_decimal_comma()
-    assert load() == usual
 
 
 @pytest.mark.parametrize("name", ["bullet", "mujoco"])

@@ -84,14 +84,6 @@ class DrawnRobot:
         """The mesh files, by their paths or URLs."""
         return {mesh: self.locate(mesh) for mesh in sorted({shape.mesh for shape in self.shapes if shape.mesh})}
 
-    @property
-    def urdf_with_files(self) -> str:
-        """The same URDF text with paths of files in place of URLs."""
-        robot = ElementTree.fromstring(self.urdf)  # noqa: S314 - it was written here
-        for mesh in robot.iter("mesh"):
-            mesh.set("filename", str(self.locate(mesh.attrib["filename"])))
-        return ElementTree.tostring(robot, encoding="unicode")
-
     def copy_package(self, directory: Path) -> None:
         """Put the meshes of packages into a directory, with a ``package.xml`` by which viewers find them."""
         meshes = {url.removeprefix(PACKAGE): file for url, file in self.meshes.items() if url.startswith(PACKAGE)}

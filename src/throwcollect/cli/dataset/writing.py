@@ -84,21 +84,39 @@ def read_trials(text: str) -> list[int]:
 
 
 def render(
-    directory: DatasetArgument, *, output: Path, trial: int | None = None, slow: float = 1.0, json: JsonOption = False
+    directory: DatasetArgument,
+    *,
+    output: Path,
+    trials: str | None = None,
+    camera: str | None = None,
+    size: str | None = None,
+    slow: float = 1.0,
+    strip: int = 1,
+    json: JsonOption = False,
 ) -> None:
-    """Draw a throw as an animated picture, from what was recorded.
+    """Draw throws as an animated picture, a video or a picture, from what was recorded.
 
     Options:
-        output (-o --output FILE): Picture to write: .webp or .gif.
-        trial (K): Number of the trial; the first recorded one if not given.
+        output (-o --output FILE): File to write: .webp, .gif, .mp4 or .png.
+        trials (3,5,7-9): Trials to show side by side; the first recorded one if not given.
+        camera (NAME): Camera of the configuration that sees them; a place to their right if not given.
+        size (WIDTHxHEIGHT): Size of the picture of a throw in pixels.
         slow (FACTOR 0.5..20): How many times slower than it was.
+        strip (COUNT 1..50): Pictures of a throw in a .png, from its start to its end.
     """
-    from throwcollect.view.animation import render as render_throw
+    from throwcollect.view.animation import render as render_throws
 
-    written = render_throw(directory, output, trial=trial, slow=slow)
+    pixels = None
+    if size is not None:
+        match = re.fullmatch(r"([0-9]{1,4})x([0-9]{1,4})", size)
+        pixels = (int(match[1]), int(match[2])) if match else (0, 0)
+        if min(pixels) < 8:
+            raise ConfigError(f"--size: got {size!r}", expected="pixels such as 640x400, each from 8 to 9999")
+    chosen = None if trials is None else read_trials(trials)
+    written = render_throws(directory, output, trials=chosen, camera=camera, size=pixels, slow=slow, strip=strip)
     text = (
-        f"{written.file}: trial {written.trial}, {written.pictures} pictures, {written.duration_s:.1f} s, "
-        f"{written.size_bytes / 1e6:.2f} MB"
+        f"{written.file}: {format_count(len(written.trials), 'throw')}, {format_count(written.pictures, 'picture')}, "
+        f"{written.duration_s:.1f} s, {written.size_bytes / 1e6:.2f} MB"
     )
     show(written, text, json=json)
 
