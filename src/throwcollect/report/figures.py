@@ -5,6 +5,7 @@ Text, sizes and colours of the theme are the page's own.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,6 +33,8 @@ MOST_KEYS = 8
 """Most swept keys in a matrix of pairs."""
 _MOST_MATRIX_POINTS = 8000
 """Most points in all panels of the matrix together; a browser redraws more points slowly."""
+_LEAST_ROOM_M = 0.15
+"""Least room around the points of a map, so that a bin around them can be seen."""
 _CELL_PX = 128
 _CELL_GAP = 0.012
 
@@ -244,7 +247,7 @@ class Points:
 
 
 def draw_map(points: Points, outcomes: Outcomes, bodies: Sequence[BodyLook] = (), *, speed: str | None) -> go.Figure:
-    """Draw places from above, coloured by the speed of this name, or by outcome."""
+    """Draw places from above, coloured by the speed of this name, or by outcome; there is at least one."""
     figure = draw_coloured(
         points,
         outcomes,
@@ -253,10 +256,19 @@ def draw_map(points: Points, outcomes: Outcomes, bodies: Sequence[BodyLook] = ()
         scale_title=None if speed is None else f"{speed} [m/s]",
     )
     draw_bodies(figure, bodies, "above_m")
-    robot = {"symbol": "star-triangle-up", "size": 13, "color": NEUTRAL, "line": {"width": 1, "color": "white"}}
-    figure.add_scatter(x=[0], y=[0], mode="markers", name="robot", marker=robot, hovertemplate="robot<extra></extra>")
-    figure.update_xaxes(title="x, forward [m]", constrain="domain")
-    figure.update_yaxes(title="y, left [m]", scaleanchor="x", constrain="domain")
+    places = np.column_stack([points.x_m, points.y_m])
+    room = max(0.08 * float(np.ptp(places, axis=0).max()), _LEAST_ROOM_M)
+    low, high = places.min(axis=0) - room, places.max(axis=0) + room
+    # If the robot is beyond the points, an arrow at their edge points to it.
+    x, y = np.clip(0.0, low, high).tolist()
+    name = f"robot, {math.hypot(x, y):.1f} m farther" if x or y else "robot"
+    symbol, angle = "arrow" if x or y else "star-triangle-up", math.degrees(math.atan2(-x, -y))
+    robot: dict[str, Any] = {"symbol": symbol, "angle": angle}
+    robot |= {"size": 15, "color": NEUTRAL, "line": {"width": 1, "color": "white"}}
+    hover = f"{name}<extra></extra>"
+    figure.add_scatter(x=[x], y=[y], mode="markers", name=name, marker=robot, hovertemplate=hover, cliponaxis=False)
+    figure.update_xaxes(title="x, forward [m]", range=[low[0], high[0]])
+    figure.update_yaxes(title="y, left [m]", scaleanchor="x", range=[low[1], high[1]])
     return figure.update_layout(height=460)
 
 

@@ -23,6 +23,7 @@ from throwcollect.extras import require
 from throwcollect.files import read_text, write_file
 from throwcollect.members import explain_failure, load_part
 from throwcollect.report import figures
+from throwcollect.report.cameras import show_cameras
 from throwcollect.report.contents import (
     Listing,
     Panel,
@@ -130,6 +131,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
             _show_outcomes(outcomes, parameters, tabulate_failures(reasons), noun),
             _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
             *task.episodes,
+            *show_cameras(dataset),
             _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
             _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
         ),
@@ -260,7 +262,7 @@ def _show_provenance(facts: dict[str, str], config: str) -> ReportSection:
 
 def write_report(directory: Path, page: Path, *, model: Path | None = None) -> None:
     """Write a report on a dataset, and on a model that was learned from it, into an HTML file that is new."""
-    require("jinja2", "plotly")
+    require("jinja2", "plotly", "PIL")
     if page.exists():
         raise ConfigError(
             f"{page}: exists", expected="a file that is new", hint="choose another --output, or remove it"
