@@ -20,6 +20,7 @@ from throwcollect.errors import ConfigError, ThrowcollectError
 
 EXTRA_OF = MappingProxyType(
     {
+        "av": "video",
         "cbor2": "serve",
         "cryptography": "collect",
         "pinocchio": "collect",

@@ -11,7 +11,7 @@ from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.directory import CARD, CONFIG, TRIALS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
-from throwcollect.export.throw_source import ExportSource
+from throwcollect.export.throw_source import NO_IMAGES, ExportSource
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, write_file
 from throwcollect.members import explain_failure, load_member, names_of
@@ -36,14 +36,21 @@ class Exported:
     digest: str
 
 
-def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None = None) -> Exported:
+def export(
+    directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None = None, images: str | None = None
+) -> Exported:
     """Write a dataset in another format, with a data card and its configuration, at the recorded rate or a lower one.
 
     The format is ``parquet``, ``npz``, ``lerobot``, ``hdf5``, ``mat``, or one of another package. The directory to
     write must be new or empty, and nothing is left there on failure.
 
+    What sensors saw is stored as `images` says: as ``av1``, ``h264`` or ``png`` in ``lerobot``, as ``arrays`` in
+    ``hdf5`` and ``npz``, or not at all (``none``, which is usual but in ``lerobot`` and ``hdf5``). Each sample then has
+    a frame of each sensor, so that the rate is that of the sensors.
+
     Raises:
-        ConfigError: If there is no such format, the rate is above the recorded one, or `output` exists.
+        ConfigError: If there is no such format, it has no such images, the rate is above the recorded one or not one
+            at which all sensors have frames, or `output` exists.
         MissingExtraError: If a library that the format needs is not installed.
         DatasetError: If the dataset is unfinished, damaged or without episodes, or `output` cannot be written.
         MemberError: If the format is of another package and fails.
@@ -54,7 +61,12 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
     chosen: Exporter = load_member("exporters", to)
     require(*chosen.packages, extra="export")
     directory, output = Path(directory), Path(output)
-    source = ExportSource.open(directory, rate_hz=rate_hz)
+    way = next(iter(chosen.images)) if images is None else images
+    if way not in chosen.images:
+        raise refuse_argument("images", f"{to} has no {way!r}", expected=" or ".join(chosen.images))
+    source = ExportSource.open(directory, rate_hz=rate_hz, images=way, streams=chosen.images[way])
+    if images not in (None, NO_IMAGES) and not source.streams:
+        raise refuse_argument("images", f"{directory} has no sensors that {to} has images of", expected=NO_IMAGES)
     with new_directory(output) as beside:
         with explain_failure("exporters", to, f"write {output}", passing=(OSError,)):
             chosen.write(source, beside)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import ExportSource, Signal, ThrowSeries, read_metadata
+from throwcollect.export.throw_source import NO_IMAGES, ExportSource, Signal, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
 from throwcollect.interruption import count_interruptions
@@ -26,6 +26,8 @@ _BESIDE = ("time_s", _COMMAND, "command_velocity_radps", "command_acceleration_r
 """Signals that are neither an observation nor an action, so they are stored next to both."""
 _LATER = " One sample later."
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+_CAMERAS = {"images": ("image", "1"), "depth_m": ("depth", "m")}
+"""What robomimic calls what a camera sees, and the unit of that."""
 _GYM = 2
 """robomimic's number for environments that are not of robosuite."""
 
@@ -143,6 +145,20 @@ def _add_throw(group: Any, throw: ThrowSeries, source: ExportSource) -> None:
             _add_signal(group, f"next_obs/{signal.name}", signal, np.concatenate([values[1:], values[-1:]]), _LATER)
         if signal.name == _COMMAND:
             _add_signal(group, "actions", signal, throw.find_actions(source.rate_hz), _LATER)
+    for name in source.streams:
+        for kind, frames in source.look(throw.throw, name).items():
+            ending, unit = _CAMERAS[kind]
+            _add_frames(group, f"{name}_{ending}", frames.reshape(*frames.shape[:3], -1), unit)
+
+
+def _add_frames(group: Any, name: str, frames: NDArray[Any], unit: str) -> None:
+    stored = group.create_dataset(f"obs/{name}", data=frames, chunks=(1, *frames.shape[1:]), **_COMPRESSION)
+    stored.attrs["unit"] = unit
+    # What is seen one sample later is a view of this, because it would double the size of the file.
+    seen = h5py.VirtualSource(".", stored.name, frames.shape, stored.dtype)
+    later = h5py.VirtualLayout(frames.shape, stored.dtype)
+    later[:-1], later[-1] = seen[1:], seen[-1]
+    group.create_virtual_dataset(f"next_obs/{name}", later)
 
 
 def _add_signal(group: Any, name: str, signal: Signal, values: NDArray[np.float64], when: str = "") -> None:
@@ -160,4 +176,4 @@ def _add_table(group: Any, table: pa.Table, text: Any) -> None:
         stored.attrs.update(read_metadata(field))
 
 
-HDF5 = Exporter(describe, write, packages=("h5py",))
+HDF5 = Exporter(describe, write, packages=("h5py",), images={"arrays": ("color", "depth"), NO_IMAGES: ()})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -15,21 +15,21 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from throwcollect.config.sensors import PictureConfig
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.throw import Throw
 from throwcollect.export.exporter import Exporter
+from throwcollect.export.images import CODECS, MEGABYTES_PER_VIDEO, QUANTILES, VIDEOS, ImageSeries, encode_pictures
 from throwcollect.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
-from throwcollect.export.throw_source import ExportSource, ThrowSeries, unit_of
+from throwcollect.export.throw_source import NO_IMAGES, ExportSource, ThrowSeries, unit_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sweep.parquet_file import encode_table
 
 _VERSION = "v3.0"
-_VIDEO_MEGABYTES = 200
 _EPISODES_PER_GROUP = 100
-QUANTILES: Mapping[str, float] = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 _BINS = 5000
 
 Frames = NDArray[np.float64]
@@ -141,10 +141,17 @@ def write(source: ExportSource, directory: Path) -> None:
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
     moments: dict[str, Moments] = {}
-    with (
-        closing(ParquetSeries(directory / "data")) as data,
-        closing(ParquetSeries(directory / "meta" / "episodes")) as meta,
-    ):
+    images = {
+        name: ImageSeries(name, camera, source.images, directory, source.rate_hz)
+        for name, camera in source.dataset.config.sensors.items()
+        if name in source.streams and isinstance(camera, PictureConfig)
+    }
+    with ExitStack() as stack:
+        data, meta = (
+            stack.enter_context(closing(ParquetSeries(directory / place))) for place in ("data", "meta/episodes")
+        )
+        for series in images.values():
+            stack.enter_context(closing(series))
         throws = source.read(source.throws)
         episodes = table.filter(table["episode_index"].is_valid())
         first = 0
@@ -156,15 +163,26 @@ def write(source: ExportSource, directory: Path) -> None:
                 frames = _compute_frames(throw, source, features, episode=number, first=first, task=index)
                 # This comes before the frames are appended, and says in which file they will be.
                 chunk, file = data.place()
-                data.append(_tabulate_frames(frames, features, source))
+                table_of_frames = _tabulate_frames(frames, features, source)
                 rows.append(_describe_episode(frames, task, number=number, first=first, chunk=chunk, file=file))
+                for name, series in images.items():
+                    pictures = source.look(throw.throw, name)["images"]
+                    rows[-1] |= series.append(pictures)
+                    if series.in_table:
+                        table_of_frames = table_of_frames.append_column(series.key, encode_pictures(pictures))
+                data.append(table_of_frames)
                 for name, values in frames.items():
                     more = Moments.of(values)
                     moments[name] = moments[name].with_more(more) if name in moments else more
                 first += len(throw)
             _append_episodes(meta, rows, episodes.slice(start, len(rows)))
-    _write_json(directory / "meta" / "info.json", _describe_dataset(source, features, frames=first, tasks=len(tasks)))
-    statistics = {name: summarise_all(moments[name], _read_feature(data.paths, name)) for name in features}
+    entries = {name: feature.as_dict() for name, feature in features.items()}
+    entries |= {series.key: series.as_feature() for series in images.values()}
+    _write_json(directory / "meta" / "info.json", _describe_dataset(source, entries, frames=first, tasks=len(tasks)))
+    statistics: dict[str, Mapping[str, Any]] = {
+        name: summarise_all(moments[name], _read_feature(data.paths, name)) for name in features
+    }
+    statistics |= {series.key: series.summarise() for series in images.values()}
     _write_json(directory / "meta" / "stats.json", statistics)
     pq.write_table(_tabulate_tasks(tasks), directory / "meta" / "tasks.parquet")
 
@@ -260,21 +278,21 @@ def _read_feature(paths: Sequence[Path], name: str) -> Iterator[Frames]:
 
 
 def _describe_dataset(
-    source: ExportSource, features: dict[str, Feature], *, frames: int, tasks: int
+    source: ExportSource, features: dict[str, dict[str, object]], *, frames: int, tasks: int
 ) -> dict[str, object]:
     episodes = len(source.throws)
     return {
         "codebase_version": _VERSION,
         "fps": source.rate_hz,
-        "features": {name: feature.as_dict() for name, feature in features.items()},
+        "features": features,
         "total_episodes": episodes,
         "total_frames": frames,
         "total_tasks": tasks,
         "chunks_size": FILES_PER_CHUNK,
         "data_files_size_in_mb": MEGABYTES_PER_FILE,
-        "video_files_size_in_mb": _VIDEO_MEGABYTES,
+        "video_files_size_in_mb": MEGABYTES_PER_VIDEO,
         "data_path": f"data/{PATH}",
-        "video_path": None,
+        "video_path": VIDEOS if source.streams and source.images in CODECS else None,
         "robot_type": source.dataset.config.robot.name,
         "splits": {"train": f"0:{episodes}"},
     }
@@ -348,4 +366,4 @@ def _write_json(path: Path, value: object) -> None:
     path.write_text(json.dumps(value, indent=4) + "\n", encoding="utf-8")
 
 
-LEROBOT = Exporter(describe, write)
+LEROBOT = Exporter(describe, write, images={**dict.fromkeys((*CODECS, "png"), ("color",)), NO_IMAGES: ()})

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import shutil
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throw import Throw
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import ExportSource
+from throwcollect.export.throw_source import FRAMES, NO_IMAGES, ExportSource
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """A fixed date for the members of archives, so that the same data give the same bytes."""
+_LARGEST = 2 * 2**30
+"""Size that an array of what a sensor saw may have, as NumPy reads a whole array into memory [bytes]."""
 
 
 def describe(source: ExportSource) -> Layout:
@@ -74,17 +78,19 @@ def _write_shard(source: ExportSource, throws: Dataset, path: Path) -> None:
         "moving_joints": np.array(source.dataset.moving_joints),
         "digest_of_dataset": np.array(source.dataset.digest),
     }
-    # A member of an archive has to be written in one go, so each signal is first written to a file of its own.
-    unpacked = {signal.name: path.with_name(f"{path.stem}.{signal.name}.npy") for signal in source.signals}
+    # A member of an archive has to be written in one go, so each array is first written to a file of its own.
+    unpacked: dict[str, Path] = {}
     with ExitStack() as stack:
-        files = {name: stack.enter_context(file.open("wb")) for name, file in unpacked.items()}
-        for signal in source.signals:
-            shape = (int(offsets[-1]), *signal.shape)
-            header = {"descr": "<f8", "fortran_order": False, "shape": shape}
-            np.lib.format.write_array_header_1_0(files[signal.name], header)
+        files: dict[str, IO[bytes]] = {}
         for throw in source.read(throws):
-            for name, file in files.items():
-                file.write(throw.signals[name].astype("<f8").tobytes())
+            for name, values in (*throw.signals.items(), *_look(source, throw.throw, int(offsets[-1]))):
+                if name not in files:
+                    unpacked[name] = path.with_name(f"{path.stem}.{name}.npy")
+                    files[name] = stack.enter_context(unpacked[name].open("wb"))
+                    kind, shape = np.lib.format.dtype_to_descr(values.dtype), (int(offsets[-1]), *values.shape[1:])
+                    header = {"descr": kind, "fortran_order": False, "shape": shape}
+                    np.lib.format.write_array_header_1_0(files[name], header)
+                files[name].write(values.tobytes())
     with zipfile.ZipFile(path, "w") as archive:
         for name, values in names.items():
             _add(archive, name, values)
@@ -93,6 +99,17 @@ def _write_shard(source: ExportSource, throws: Dataset, path: Path) -> None:
             with file_of_signal.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
                 shutil.copyfileobj(array, packed)
             file_of_signal.unlink()
+
+
+def _look(source: ExportSource, throw: Throw, samples: int) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Read what sensors saw in a throw of a recording with a number of samples: arrays by name."""
+    for sensor in source.streams:
+        for kind, frames in source.look(throw, sensor).items():
+            if (size := frames[:1].nbytes * samples) > _LARGEST:
+                problem = f"{sensor}_{kind} of one recording would have {size / 2**30:.1f} GiB"
+                expected = f"at most {_LARGEST // 2**30} GiB, a lower rate, or --images {NO_IMAGES}"
+                raise refuse_argument("images", problem, expected=expected)
+            yield f"{sensor}_{kind}", frames
 
 
 def _add(archive: zipfile.ZipFile, name: str, values: NDArray[Any]) -> None:
@@ -108,4 +125,4 @@ def _make_member(name: str) -> zipfile.ZipInfo:
     return member
 
 
-NPZ = Exporter(describe, write)
+NPZ = Exporter(describe, write, images={NO_IMAGES: (), "arrays": tuple(FRAMES)})

@@ -13,7 +13,7 @@ from throwcollect.config.task_config import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG, TRIALS
-from throwcollect.export.throw_source import ExportSource, read_metadata
+from throwcollect.export.throw_source import FRAMES, ExportSource, choose_streams, read_metadata
 from throwcollect.robots.description import robot_of
 from throwcollect.version import __version__
 
@@ -63,7 +63,11 @@ def render_card(source: ExportSource, layout: Layout) -> str:
         layout.loading,
         "```",
         "",
-        *(line for note in (*layout.notes, _explain_rate(source), *_explain_targets(source)) for line in (note, "")),
+        *(
+            line
+            for note in (*layout.notes, _explain_rate(source), *_explain_targets(source), *_explain_sensors(source))
+            for line in (note, "")
+        ),
         "The world frame has x forward, y left, z up; its origin is on the ground below the robot's base.",
         "",
         "## Over time",
@@ -114,6 +118,15 @@ def _explain_targets(source: ExportSource) -> list[str]:
         return [f"Not every {noun} has a target, so targets are in the table of all trials alone."]
     names = _quote([each.name for each in source.targets])
     return [f"Every {noun} has a target, {names}, which is the same in all its samples, for policies to condition on."]
+
+
+def _explain_sensors(source: ExportSource) -> list[str]:
+    """Say what of that which sensors saw is here, if the dataset has some."""
+    recorded, stored = (
+        "; ".join(f"`{name}` {', '.join(streams)}" for name, streams in each.items())
+        for each in (choose_streams(source.dataset.config, FRAMES), source.streams)
+    )
+    return [f"The sensors recorded: {recorded}. Of this, here is: {stored or 'nothing'}."] if recorded else []
 
 
 def tabulate_signals(source: ExportSource, *, columns: bool = False) -> list[str]:

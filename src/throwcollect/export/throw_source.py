@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import gcd
 from operator import index
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -19,6 +21,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import BODY_COMPONENTS
 from throwcollect.episode.record import Samples
+from throwcollect.episode.sensor_topics import sensor_topics
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.progress_log import ProgressLog
@@ -32,6 +35,10 @@ from throwcollect.units import NS_PER_S, ascii_unit, name_sliding, unit_of_name
 interpolate = lazily("scipy.interpolate", extra="export")
 
 
+NO_IMAGES = "none"
+"""The way of leaving out what sensors saw."""
+FRAMES = {"color": "images", "depth": "depth_m", "segmentation": "labels", "scan": "ranges", "points": "points"}
+"""What `throw.sensors` calls the frames of each stream."""
 _PLACES = ("shard", "chunk_offset")
 """Columns that say where a recording lies in the dataset, which means nothing in an export."""
 
@@ -164,6 +171,8 @@ class ExportSource:
         signals: Quantities of each throw over time.
         throws: The throws that have an episode, in order of trials.
         table: One row a trial, with ``description`` and ``unit`` in the metadata of each column.
+        images: The way in which what sensors saw is stored.
+        streams: The streams that are stored, for each sensor that has some of them.
         progress: Logs how many of its trials have been exported.
     """
 
@@ -173,11 +182,18 @@ class ExportSource:
     signals: tuple[Signal, ...]
     throws: Dataset
     table: pa.Table
+    images: str
+    streams: Mapping[str, tuple[str, ...]]
     progress: ProgressLog
 
     @classmethod
-    def open(cls, directory: Path, *, rate_hz: int | None = None) -> ExportSource:
-        """Open a dataset to export it, at a number of samples per second, or else at the recorded one."""
+    def open(
+        cls, directory: Path, *, rate_hz: int | None = None, images: str = NO_IMAGES, streams: Container[str] = ()
+    ) -> ExportSource:
+        """Open a dataset to export it, with some streams of sensors, at a number of samples per second.
+
+        Without a number it is the recorded one, or the largest at which each sample has a frame of each sensor.
+        """
         dataset = Dataset.open(directory)
         recorded_hz = dataset.config.record.rate_hz
         if rate_hz is not None and not 1 <= index(rate_hz) <= recorded_hz:
@@ -186,7 +202,13 @@ class ExportSource:
         throws = dataset.recorded
         if not len(throws):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
-        rate_hz = rate_hz or recorded_hz
+        stored = choose_streams(dataset.config, streams)
+        rates = {name: dataset.config.sensors[name].rate_hz for name in stored}
+        if rate_hz is not None and any(rate % rate_hz for rate in rates.values()):
+            seen = ", ".join(f"{name} at {rate} Hz" for name, rate in rates.items())
+            expected = f"a divisor of {gcd(*rates.values())}, or --images {NO_IMAGES}"
+            raise refuse_argument("rate_hz", f"{rate_hz} samples per second, and images of {seen}", expected=expected)
+        rate_hz = rate_hz or gcd(*rates.values()) or recorded_hz
         targets = _list_targets(throws)
         return cls(
             dataset,
@@ -195,6 +217,8 @@ class ExportSource:
             tuple(list_signals(dataset.config, targets)),
             throws,
             dataset.throws.drop_columns(list(_PLACES)),
+            images,
+            stored,
             ProgressLog(len(dataset.throws), "trial", "exported"),
         )
 
@@ -207,6 +231,15 @@ class ExportSource:
     def count_samples(self, throw: Throw) -> int:
         """Count the samples that a throw has in the export."""
         return count_resampled(throw["samples"], recorded_hz=self.dataset.config.record.rate_hz, rate_hz=self.rate_hz)
+
+    def look(self, throw: Throw, name: str) -> dict[str, NDArray[Any]]:
+        """Read what a sensor saw in a throw, one frame a sample, as its attributes in `throw.sensors` have it."""
+        with throw.locating_damage():
+            sensor = throw.sensors[name]
+            every = slice(None, None, sensor.config.rate_hz // self.rate_hz)
+            if len(sensor.stamps_ns[every]) != self.count_samples(throw):
+                raise DatasetError(f"{name} has {len(sensor)} frames, and there are more or fewer samples")
+            return {FRAMES[stream]: getattr(sensor, FRAMES[stream])[every] for stream in self.streams[name]}
 
     def read(self, throws: Iterable[Throw]) -> Iterator[ThrowSeries]:
         """Read the time series of throws, one throw at a time, as all of them may not fit into memory."""
@@ -224,6 +257,13 @@ class ExportSource:
             signals |= {each.name: np.full((len(samples), 1), throw[each.name]) for each in self.targets}
             yield ThrowSeries(throw, throw.outcome == config.task.success, signals, trajectory)
             self.progress.note(throw.trial + 1)
+
+
+def choose_streams(config: Config, streams: Container[str]) -> dict[str, tuple[str, ...]]:
+    """Choose, of some streams, those that sensors record, for each sensor that records some of them."""
+    topics = {name: [topic.stream for topic in topics.values()] for name, topics in sensor_topics(config).items()}
+    chosen = {name: tuple(each for each in recorded if each in streams) for name, recorded in topics.items()}
+    return {name: each for name, each in chosen.items() if each}
 
 
 def _list_targets(throws: Dataset) -> tuple[TargetColumn, ...]:

@@ -12,6 +12,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.conftest import make_collection as make_collection
 
+from throwcollect import runs
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.export.export import export
@@ -68,6 +69,35 @@ def exported(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Export:
         return made[to, rate_hz]
 
     return make
+
+
+SEEN = """\
+name: seen
+trials: 3
+seed: 4
+sim: {engine: ballistic}
+record: {trials_per_shard: 2, topics: [joint_states, ball/odometry]}
+run: {replay: 0}
+sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}
+sensors:
+  side: {kind: camera, width: 64, height: 48, rate_hz: 25, streams: [color, depth]}
+  head:
+    {kind: camera, link: head_2_link, position_m: [0.1, 0, 0], width: 32, height: 32, noise: {color_std: 3}}
+  front: {kind: depth, width: 16, height: 12, depth_encoding: 32FC1}
+  scan: {kind: lidar_2d, link: base_link, position_m: [0.4, 0, 0], rays: 36}
+"""
+
+
+@pytest.fixture(scope="session")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset with cameras, of 10 and 25 Hz, and a lidar."""
+    directory = tmp_path_factory.mktemp("seen")
+    (directory / "config.yaml").write_text(SEEN)
+    with runs.prepare(
+        directory / "config.yaml", overrides=["run.runtime=inprocess"], output=directory / "dataset"
+    ) as run:
+        run.collect()
+    return directory / "dataset"
 
 
 def throws_of(directory: Path, step: int = 1) -> Iterator[tuple[int, Arrays]]:

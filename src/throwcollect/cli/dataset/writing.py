@@ -13,17 +13,24 @@ from throwcollect.wording import format_count
 
 
 def export(
-    directory: DatasetArgument, output: OutputArgument, *, to: str, rate: int | None = None, json: JsonOption = False
+    directory: DatasetArgument,
+    output: OutputArgument,
+    *,
+    to: str,
+    rate: int | None = None,
+    images: str | None = None,
+    json: JsonOption = False,
 ) -> None:
     """Write a dataset in another format, with a data card.
 
     Options:
         to (FORMAT): parquet, npz, lerobot, hdf5, mat, or one of another package.
-        rate (HZ): Samples per second; as recorded if not given.
+        rate (HZ): Samples per second; as recorded, or as sensors have frames, if not given.
+        images (WAY): How to store what sensors saw: av1, h264 or png (lerobot), arrays (hdf5, npz), or none.
     """
     from throwcollect.export.export import export as export_dataset
 
-    exported = export_dataset(directory, output, to=to, rate_hz=rate)
+    exported = export_dataset(directory, output, to=to, rate_hz=rate, images=images)
     text = (
         f"{exported.directory}: {format_count(exported.episodes, 'throw')} "
         f"of {format_count(exported.trials, 'trial')}, "
