@@ -126,7 +126,7 @@ test-lerobot: $(LEROBOT_VENV)/.ready
 
 $(LEROBOT_VENV)/.ready: pyproject.toml | $(READY_DEV)
 	$(BIN)/uv venv --quiet --python 3.12 $(LEROBOT_VENV)
-	$(BIN)/uv pip install --quiet --python $(LEROBOT_VENV)/bin/python -e '.[collect,export]' 'lerobot[dataset]==0.6.1' pytest psutil
+	$(BIN)/uv pip install --quiet --python $(LEROBOT_VENV)/bin/python -e '.[collect,export]' 'lerobot[dataset]==0.6.1' pytest psutil hypothesis
 	touch $@
 
 # These tests of genuine ROS 2 need an engine, too.

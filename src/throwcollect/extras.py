@@ -36,7 +36,6 @@ EXTRA_OF = MappingProxyType(
         "mujoco": "mujoco",
         "onnx": "onnx",
         "orjson": "serve",
-        "av": "video",
         "pandas": "pandas",
         "plotly": "report",
         "PIL": "report",

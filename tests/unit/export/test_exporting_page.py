@@ -17,8 +17,10 @@ from throwcollect.dataset.inspect import info
 
 PAGE = (Path(__file__).parents[3] / "docs" / "exporting.md").read_text(encoding="utf-8")
 COMMANDS = [
-    shlex.split(line)[1:] for line in re.findall(r"^throwcollect dataset export datasets.*$", PAGE, re.MULTILINE)
+    shlex.split(line)[1:]
+    for line in re.findall(r"^throwcollect dataset export datasets/quickstart.*$", PAGE, re.MULTILINE)
 ]
+OF_IMAGES = re.findall(r"^throwcollect (dataset export datasets/seen.*)$", PAGE, re.MULTILINE)
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 IMPORTED = re.compile(r"^(?:import|from) (\w+)", re.MULTILINE)
 
@@ -67,6 +69,19 @@ def test_the_python_example_of_every_exported_card_runs(
     assert len(code) == (command[5] != "mat")
     for each in code:
         run(each, directory, monkeypatch)
+
+
+def test_the_commands_of_the_page_export_images(seen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("av")
+    shutil.copytree(seen, tmp_path / "datasets" / "seen")
+    monkeypatch.chdir(tmp_path)
+    assert len(OF_IMAGES) == 5
+    for command in OF_IMAGES:
+        result = CliRunner().invoke(assemble(), shlex.split(command.partition("#")[0]), catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+    videos = {path.parts[1] for path in Path("exports").rglob("*.mp4")}
+    assert videos == {"av1", "h264"}
+    assert json.loads(Path("exports/states/meta/info.json").read_text())["fps"] == 250
 
 
 def test_export_with_json_prints_a_summary_as_json(source: Path, tmp_path: Path) -> None:

@@ -13,7 +13,9 @@ import pytest
 
 import throwcollect
 from throwcollect.config.loader import load
+from throwcollect.dataset.sensors import SensorFrames
 from throwcollect.dataset.throw import Throw
+from throwcollect.derive.derivation import render_sensors
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export import images, npz
 from throwcollect.export.export import export
@@ -56,14 +58,12 @@ def test_videos_have_each_frame_at_its_time(way: str, seen: Path, tmp_path: Path
             assert row[f"videos/{key}/from_timestamp"] == first / 5
             first += len(expected)
             assert row[f"videos/{key}/to_timestamp"] == first / 5
-            for frame, picture in zip(decoded[first - len(expected) : first], expected, strict=True):
-                error = np.abs(frame.to_ndarray(format="rgb24").astype(float) - picture).mean()
-                # The noise of the head alone is 2.4.
-                assert error < (4 if name == "head" else 2.5)
-            pictures = [
-                frame.to_ndarray(format="rgb24").astype(float) for frame in decoded[first - len(expected) : first]
-            ]
-            assert np.abs(pictures - expected).mean() < 0.8 * np.abs(pictures[1:] - expected[:-1]).mean()
+            stored = [frame.to_ndarray(format="rgb24") for frame in decoded[first - len(expected) : first]]
+            errors = np.abs(np.array(stored, float) - expected)
+            # The noise of the head alone is 2.4, which is as much as a step of its motion.
+            assert errors.mean(axis=(1, 2, 3)).max() < (4 if name == "head" else 2.5)
+            if name == "side":
+                assert errors.mean() < 0.8 * np.abs(np.array(stored[1:], float) - expected[:-1]).mean()
     assert not any("front" in name for name in info["features"])
 
 
@@ -176,8 +176,6 @@ def test_images_that_cannot_be_exported_are_refused(
 
 def test_videos_need_even_numbers_of_pixels_and_images_a_sensor(seen: Path, source: Path, tmp_path: Path) -> None:
     sections = load(seen.parent / "config.yaml").sensors
-    from throwcollect.derive.derivation import render_sensors
-
     render_sensors(seen, tmp_path / "odd", {"head": sections["head"].model_copy(update={"width": 33})})
     with pytest.raises(ConfigError, match="av1 of the 33 x 32 pixels of head"):
         export(tmp_path / "odd", tmp_path / "out", to="lerobot")
@@ -187,9 +185,7 @@ def test_videos_need_even_numbers_of_pixels_and_images_a_sensor(seen: Path, sour
 
 
 def test_a_throw_that_lacks_frames_is_found(seen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from throwcollect.dataset.sensors import SensorFrames
-
     stamps = SensorFrames.stamps_ns.func
     monkeypatch.setattr(SensorFrames, "stamps_ns", property(lambda self: stamps(self)[:-5]))
-    with pytest.raises(DatasetError, match=r"trial 0: side has \d+ frames, and there are more or fewer samples"):
+    with pytest.raises(DatasetError, match=r"trial 0: front has \d+ frames, and there are more or fewer samples"):
         export(seen, tmp_path / "out", to="hdf5")

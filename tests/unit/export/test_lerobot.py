@@ -22,6 +22,7 @@ from tests.unit.export.conftest import (
     throws_of,
 )
 
+import throwcollect
 from throwcollect.dataset.inspect import info
 from throwcollect.export import parquet
 from throwcollect.export.export import export
@@ -261,3 +262,27 @@ def test_the_lerobot_library_reads_the_export(
     assert np.array_equal(batch["action"][2].numpy(), frames["action"][2:10])
     landed = library.LeRobotDataset("me/throws", root=root, episode_filter=lambda each: each["outcome"] == "landed")
     assert landed.num_episodes == 3
+
+
+@pytest.mark.parametrize(("way", "most"), [("av1", 4.0), ("h264", 4.0), ("png", 0.01)])
+def test_the_lerobot_library_reads_each_image_at_its_time(
+    way: str, most: float, seen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    library = pytest.importorskip("lerobot.datasets.lerobot_dataset")
+    export(seen, tmp_path / "out", to="lerobot", images=way)
+    dataset = library.LeRobotDataset("me/throws", root=tmp_path / "out")
+    assert set(dataset.meta.camera_keys) == {"observation.images.head", "observation.images.side"}
+    first = 0
+    for throw in throwcollect.load(seen):
+        for name, step in (("head", 2), ("side", 5)):
+            pictures = throw.sensors[name].images[::step]
+            for number, picture in enumerate(pictures):
+                item = dataset[first + number]
+                assert item["timestamp"].item() == np.float32(number / 5)
+                image = item[f"observation.images.{name}"].numpy().transpose(1, 2, 0) * 255
+                assert image.shape == picture.shape
+                assert np.abs(image - picture).mean() < most
+        first += len(pictures)
+    assert len(dataset) == first
+    assert dataset.meta.stats["observation.images.side"]["mean"].shape == (3, 1, 1)
