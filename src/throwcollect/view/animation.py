@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -24,7 +24,7 @@ from throwcollect.progress_log import log_progress
 from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.sensor import CameraSensor, make_sensor
-from throwcollect.view.throw_pictures import ENDED, FINE, FLOWN, HELD, SIZE, DrawnThrow, camera_for
+from throwcollect.view.throw_pictures import FINE, HELD, SIZE, DrawnThrow, Rgb, camera_for
 from throwcollect.view.viewer_directory import choose_throws
 
 images = lazily("PIL.Image")
@@ -123,7 +123,7 @@ def render(
         _arrange([draw(number, time_s) for number, time_s in sheet], columns)
         for sheet in log_progress(sheets, len(sheets), "picture", "drawn")
     ]
-    data = _ENCODERS[kind](pictures)
+    data = _ENCODERS[kind](pictures, {HELD, *(each.color for each in throws)})
     write_file(output, data)
     moves_s = (len(pictures) - 1) * _FRAME_MS / 1000
     return Rendering(output, tuple(each.throw.trial for each in throws), len(times), moves_s, len(data))
@@ -177,26 +177,26 @@ def _arrange(pictures: Sequence[Picture], columns: int) -> Picture:
     return sheet
 
 
-def _encode_animation(pictures: Sequence[Picture], kind: str) -> bytes:
+def _encode_animation(pictures: Sequence[Picture], lines: Collection[Rgb], kind: str) -> bytes:
     shown = [images.fromarray(picture) for picture in pictures]
     if kind == "GIF":
-        shown = _reduce_colors(shown)
+        shown = _reduce_colors(shown, lines)
     times = [_FRAME_MS] * (len(shown) - 1) + [_LAST_FRAME_MS]
     buffer = io.BytesIO()
     shown[0].save(buffer, kind, save_all=True, append_images=shown[1:], duration=times, loop=0, quality=80, method=4)
     return buffer.getvalue()
 
 
-def _reduce_colors(pictures: Sequence[Any]) -> list[Any]:
+def _reduce_colors(pictures: Sequence[Any], lines: Collection[Rgb]) -> list[Any]:
     """Give pictures the 256 colors that a GIF can have.
 
-    Thin lines have so few pixels that their colors would not be chosen, and the cross would be as orange as the path.
-    So the colors of lines, and of their smooth edges on the ground, are set here.
+    Thin lines have so few pixels that their colors would not be chosen. So the colors of lines, and of their smooth
+    edges on the ground, are set here.
     """
     ground = np.array(_GROUND)
     fixed = [
         tuple(np.round(ground + share * (np.array(color) - ground)).astype(int).tolist())
-        for color in (HELD, FLOWN, ENDED)
+        for color in sorted(lines)
         for share in (0.25, 0.5, 0.75, 1.0)
     ]
     others = pictures[-1].quantize(256 - len(fixed)).getpalette()
@@ -205,13 +205,13 @@ def _reduce_colors(pictures: Sequence[Any]) -> list[Any]:
     return [picture.quantize(palette=palette, dither=images.Dither.NONE) for picture in pictures]
 
 
-def _encode_still(pictures: Sequence[Picture]) -> bytes:
+def _encode_still(pictures: Sequence[Picture], _lines: Collection[Rgb]) -> bytes:
     buffer = io.BytesIO()
     images.fromarray(pictures[0]).save(buffer, "PNG", optimize=True)
     return buffer.getvalue()
 
 
-def _encode_video(pictures: Sequence[Picture]) -> bytes:
+def _encode_video(pictures: Sequence[Picture], _lines: Collection[Rgb]) -> bytes:
     """Encode H.264, which all browsers and players show; the last picture stays for a while."""
     # Colors have half the resolution, so that height and width must be even.
     height, width = (length - length % 2 for length in pictures[0].shape[:2])
@@ -226,7 +226,7 @@ def _encode_video(pictures: Sequence[Picture]) -> bytes:
     return buffer.getvalue()
 
 
-_ENCODERS: MappingProxyType[str, Callable[[Sequence[Picture]], bytes]] = MappingProxyType(
+_ENCODERS: MappingProxyType[str, Callable[[Sequence[Picture], Collection[Rgb]], bytes]] = MappingProxyType(
     {
         ".webp": partial(_encode_animation, kind="WEBP"),
         ".gif": partial(_encode_animation, kind="GIF"),

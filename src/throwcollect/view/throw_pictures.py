@@ -16,6 +16,7 @@ from throwcollect.robots.surroundings import looks_of
 from throwcollect.sensing.camera import Camera, Frame
 from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import PlacedScene, Scene
+from throwcollect.tasks.outcome_styles import style_of
 
 images = lazily("PIL.Image")
 drawing = lazily("PIL.ImageDraw")
@@ -24,8 +25,9 @@ FINE = 40_000
 """Triangles of all meshes of a scene: few enough to cost little, enough for faces and hands."""
 SIZE = (640, 400)
 """Width and height of pictures [pixels]."""
-HELD, FLOWN, ENDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
-"""Colours of the path while the tool has the object and afterwards, and of the cross at its end."""
+Rgb = tuple[int, int, int]
+HELD: Rgb = (150, 156, 164)
+"""Colour of the path while the tool has the object."""
 _OUTWARD = np.array([0.32, -1.0, 0.22])
 """Direction from a throw along x to the camera: a little in front of the robot, and a little above."""
 _FAR_FLIGHT_M = 0.3
@@ -49,10 +51,14 @@ class DrawnThrow:
         samples: What was recorded.
         times_s: Times of the samples since the start of the trial [s], shape ``(n,)``.
         flight: Path of the object's centre after it left the tool [m], shape ``(n, 3)``.
+        color: Color of the flight, and of the cross at its end: that of the outcome.
     """
 
     def __init__(self, throw: Throw, config: Config, scene: Scene) -> None:
         self.throw, self._config, self._scene = throw, config, scene
+        hexadecimal = style_of(throw.outcome, config.task.success).colour
+        red, green, blue = bytes.fromhex(hexadecimal.removeprefix("#"))
+        self.color: Rgb = (red, green, blue)
         self.samples = throw.read_samples()[1]
         self.times_s = self.samples.seconds_since(self.samples.stamps_ns[0])
         left = throw.events.left
@@ -92,11 +98,11 @@ class DrawnThrow:
         if not marks:
             return frame.color
         path = self.samples.object_position[: number + 1]
-        lines = [(path[: self._left + 1], HELD), (path[self._left :], FLOWN)]
+        lines = [(path[: self._left + 1], HELD), (path[self._left :], self.color)]
         if self.throw.events.end is not None and number == len(self.samples) - 1:
             along = np.linspace(-_CROSS_M, _CROSS_M, 25)[:, np.newaxis]
             end = self.throw.events.end.position
-            lines += [(end + along * np.array(way), ENDED) for way in ((1.0, 1.0, 0.0), (1.0, -1.0, 0.0))]
+            lines += [(end + along * np.array(way), self.color) for way in ((1.0, 1.0, 0.0), (1.0, -1.0, 0.0))]
         return _mark(frame, camera, camera.find_optical(placed), lines)
 
 

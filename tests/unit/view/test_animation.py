@@ -113,7 +113,7 @@ def test_throws_stand_side_by_side_and_begin_together(collected: Path, tmp_path:
     first, last = (picture(written.file, at) for at in (0, written.pictures - 1))
     assert first.shape == (200, 642, 3)
     for half in (slice(320), slice(322, None)):
-        assert count_orange(first[:, half]) < count_orange(last[:, half])
+        assert count_flight(first[:, half]) < count_flight(last[:, half])
 
 
 def test_a_strip_has_a_row_for_each_throw_and_a_column_for_each_time(collected: Path, tmp_path: Path) -> None:
@@ -121,7 +121,7 @@ def test_a_strip_has_a_row_for_each_throw_and_a_column_for_each_time(collected: 
     pixels = picture(written.file, 0)
     assert (written.pictures, pixels.shape) == (3, (402, 964, 3))
     for row in (pixels[:200], pixels[202:]):
-        counts = [count_orange(row[:, begin : begin + 320]) for begin in (0, 322, 644)]
+        counts = [count_flight(row[:, begin : begin + 320]) for begin in (0, 322, 644)]
         assert counts[0] < counts[2]
 
 
@@ -146,8 +146,8 @@ def test_nothing_is_drawn_through_what_stands_in_front(make_collection: Any, tmp
         )
         for name, bodies in (("open", {}), ("walled", {"wall": wall}))
     )
-    assert count_orange(picture(open_.file, 0)) > 10
-    assert count_orange(picture(walled.file, 0)) == 0
+    assert count_flight(picture(open_.file, 0)) > 10
+    assert count_flight(picture(walled.file, 0)) == 0
 
 
 def test_a_camera_of_the_configuration_draws_what_it_sees(make_collection: Any, tmp_path: Path) -> None:
