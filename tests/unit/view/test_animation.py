@@ -122,7 +122,7 @@ def test_a_strip_has_a_row_for_each_throw_and_a_column_for_each_time(collected: 
     assert (written.pictures, pixels.shape) == (3, (402, 964, 3))
     for row in (pixels[:200], pixels[202:]):
         counts = [count_flight(row[:, begin : begin + 320]) for begin in (0, 322, 644)]
-        assert counts[0] < counts[2]
+        assert counts[0] + 20 < counts[2]
 
 
 def test_a_video_has_the_pictures_of_the_throw(collected: Path, tmp_path: Path) -> None:
