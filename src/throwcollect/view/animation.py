@@ -94,6 +94,8 @@ def render(
     kind = output.suffix.lower()
     if kind not in _ENCODERS:
         raise ConfigError(f"{output}: no picture ends like this", expected=f"a name with {' or '.join(_ENCODERS)}")
+    if strip > 1 and kind != ".png":
+        raise ConfigError(f"{output}: a strip of {strip} pictures", expected="a name with .png")
     require("PIL", *(("av",) if kind == ".mp4" else ()))
     dataset = Dataset.open(directory)
     chosen = choose_throws(dataset, trials)

@@ -100,6 +100,8 @@ def test_an_unknown_trial_or_kind_of_picture_is_an_error(collected: Path, tmp_pa
         render(collected, tmp_path / "throw.webp", trials=[7])
     with pytest.raises(ConfigError, match=r"throw.avi: no picture ends like this\n.*\.webp or \.gif or \.mp4 or \.png"):
         render(collected, tmp_path / "throw.avi")
+    with pytest.raises(ConfigError, match="a strip of 3 pictures"):
+        render(collected, tmp_path / "throw.gif", strip=3)
     assert not list(tmp_path.glob("throw.*"))
 
 

@@ -110,29 +110,14 @@ def _load_model(
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         for name, content in model.encode_meshes().items():
             Path(directory, name).write_bytes(content)
-        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-        return load_urdf(client, model.write_urdf(), Path(directory), position, turn, flags=flags, moves=moves)
-
-
-def load_urdf(
-    client: int,
-    urdf: str,
-    directory: Path,
-    position: Vector,
-    turn: Quaternion = UPRIGHT,
-    *,
-    flags: int = 0,
-    moves: bool = False,
-) -> int:
-    """Load URDF text, whose paths are relative to a directory; return the number of the body."""
-    path = directory / "body.urdf"
-    path.write_text(urdf, encoding="utf-8")
-    with reading_natively():
-        try:
-            fixed = not moves
-            return int(pybullet.loadURDF(str(path), position, turn, 0, fixed, flags, physicsClientId=client))
-        except pybullet.error as error:
-            raise ConfigError(f"Bullet cannot load the description: {error}") from error
+        path = Path(directory, "body.urdf")
+        path.write_text(model.write_urdf(), encoding="utf-8")
+        flags, fixed = pybullet.URDF_USE_INERTIA_FROM_FILE, not moves
+        with reading_natively():
+            try:
+                return int(pybullet.loadURDF(str(path), position, turn, 0, fixed, flags, physicsClientId=client))
+            except pybullet.error as error:
+                raise ConfigError(f"Bullet cannot load the description: {error}") from error
 
 
 def describe_links(client: int, robot: int) -> list[LoadedLink]:
