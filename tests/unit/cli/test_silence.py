@@ -21,7 +21,6 @@ def call_without_and_with_json(*arguments: str | Path) -> tuple[str, CompletedPr
 
 def test_submit_and_resume_with_json_print_only_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slurm, "submit", lambda *_: "7")
-    monkeypatch.setattr(slurm, "check", lambda _: None)
     monkeypatch.setattr(slurm, "find_tasks", lambda: {})
     monkeypatch.setattr(slurm, "find_ended", lambda _: {})
     config = write_config(tmp_path, trials=2, text=SLICED, sim=FAST)
