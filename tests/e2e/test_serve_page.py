@@ -124,7 +124,7 @@ def over(tmp_path: Path) -> Iterator[tuple[str, str]]:
         record = RunRecord(run.id, "small", "local", place, f"{place}/logs", 0, now, 1, 1, ended=now, exit_code=0)
         run.write(record)
         run.close()
-    yield runs[0].run, runs[1].run
+    yield runs[0].id, runs[1].id
     for run in runs:
         run.forget()
 
@@ -185,6 +185,50 @@ def test_a_landing_of_a_run_that_has_ended_is_clicked_and_its_throw_is_replayed(
         assert tab.evaluate("document.querySelector('#time').value").endswith(
             "trial 3, landed; transparent: trial 2, landed"
         )
+        assert tab.evaluate("document.documentElement.scrollWidth") == 390
+        assert find_own_errors(tab) == []
+
+
+_SENSORS = """
+sensors:
+  head: {kind: camera, link: head_2_link, width: 32, height: 24, rate_hz: 2, streams: [color, depth, segmentation]}
+  scan: {kind: lidar_2d, link: base_link, position_m: [0.4, 0, 0], rpy_rad: [0, 0.3, 0], rays: 36, rate_hz: 2}
+"""
+_READ_HEAD = """
+[...document.querySelector('canvas[aria-label="color of head"]').getContext('2d').getImageData(0, 0, 32, 24).data]
+  .filter((_, i) => i % 4 !== 3)
+"""
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_the_page_shows_what_sensors_saw_and_what_another_camera_sees(
+    address: str, over: tuple[str, str], tmp_path: Path
+) -> None:
+    config = write_config(tmp_path, trials=2, sim=FAST)
+    config.write_text(config.read_text() + _SENSORS)
+    collect_here(config, tmp_path / "data")
+    seen = throwcollect.load(tmp_path / "data")[0].sensors["head"]
+    with browse(
+        f"{address}&run={over[1]}", width=390, height=800, features={"prefers-reduced-motion": "reduce"}
+    ) as tab:
+        load(tab)
+        station, sensors = "throwcollect.view.stations.get('replay')", "throwcollect.sensors"
+        tab.wait_for(
+            f"throwcollect.playback.at('replay') && {station}.robot?.isWhole && {sensors}.strands.length === 4"
+        )
+        tab.evaluate("throwcollect.playback.seek(0.6)")
+        tab.wait_for(f"{sensors}.strands.every(({{ shown }}) => shown === 1)")
+        assert tab.evaluate(_READ_HEAD) == seen.images[1].ravel().tolist()
+        lines, points = (f"{station}.sensors.object.children[{number}]" for number in (0, 3))
+        assert tab.evaluate(f"{points}.geometry.attributes.position.count") > 0
+        assert not tab.evaluate(f"{lines}.visible")
+        tab.evaluate("document.querySelector('#frustum').click(); document.querySelector('#add-camera').click()")
+        tab.wait_for(f"{lines}.visible && {sensors}.camera.summary")
+        # The camera of the frustum is at the head of the robot.
+        assert 1.3 < tab.evaluate(f"{lines}.matrix.elements[14]") < 2
+        assert tab.evaluate(f"{station}.sensors.object.children.length") == 6
+        tab.evaluate("document.querySelector('#add-camera').click()")
+        assert tab.evaluate(f"{station}.sensors.object.children.length") == 4
         assert tab.evaluate("document.documentElement.scrollWidth") == 390
         assert find_own_errors(tab) == []
 

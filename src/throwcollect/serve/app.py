@@ -20,6 +20,7 @@ from throwcollect.serve.live import keep_restoring_abandoned
 from throwcollect.serve.models import make_model_routes
 from throwcollect.serve.problem_responses import DESCRIPTION, HANDLERS
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
+from throwcollect.serve.sensor_routes import make_sensor_routes
 from throwcollect.serve.sockets import keep_telling
 from throwcollect.serve.state import STATES, ComponentState, WholeState
 from throwcollect.serve.states import States
@@ -49,6 +50,7 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
         make_log_routes(instances),
         make_dataset_routes(instances),
         make_throw_routes(instances),
+        make_sensor_routes(instances),
         make_view_routes(instances, bridges),
         make_model_routes(models),
     ):

@@ -89,16 +89,23 @@ def make_throw_routes(instances: Instances) -> APIRouter:
     @router.get("/{trial}", response_class=Response)
     def throw(instance: str, trial: int) -> Response:
         """A throw as the page replays it: as a message of the socket `shown`, without the name of a simulation."""
-        directory, plan = _find_plan(instances, instance)
-        episode = _read_finished_episode if is_finished(directory) else _read_growing_episode
-        found = episode(directory, plan, trial) if trial in plan.trials.numbers else None
-        if found is None:
-            why = plan.trials.refused.get(trial, "it has not ended, was lost, or is not planned")
-            raise NotFoundError(f"run {instance}: trial {trial} has no episode: {why}")
+        _, found = find_throw(instances, instance, trial)
+        directory = get_collection(instances, instance).context.directory
         message = encode_throw(found, "", *describe_trial(directory, trial))
         return Response(message, media_type="application/octet-stream")
 
     return router
+
+
+def find_throw(instances: Instances, instance: str, trial: int) -> tuple[Plan, Episode]:
+    """Find the plan of a run and the episode of a trial, with what its sensors saw."""
+    directory, plan = _find_plan(instances, instance)
+    episode = _read_finished_episode if is_finished(directory) else _read_growing_episode
+    found = episode(directory, plan, trial) if trial in plan.trials.numbers else None
+    if found is None:
+        why = plan.trials.refused.get(trial, "it has not ended, was lost, or is not planned")
+        raise NotFoundError(f"run {instance}: trial {trial} has no episode: {why}")
+    return plan, found
 
 
 def _find_plan(instances: Instances, instance: str) -> tuple[Path, Plan]:
@@ -145,7 +152,7 @@ def _read_finished_episode(directory: Path, plan: Plan, trial: int) -> Episode |
     start_ns = plan.config.trial_start_ns(trial - plan.first_of_part(trial))
     # The table may come from anybody, so it does not choose the file.
     place = EpisodePlace(directory / shard_of(plan, trial), row["chunk_offset"], start_ns, row["samples"])
-    return replace(place.read(), result=json.dumps(row))
+    return replace(place.read(sensors=True), result=json.dumps(row))
 
 
 def _read_growing_episode(directory: Path, plan: Plan, trial: int) -> Episode | None:

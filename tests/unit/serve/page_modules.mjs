@@ -17,7 +17,9 @@ const { describe, median, tabulate } = await load("model_words.js");
 const { Rosbridge } = await load("rosbridge.js");
 const { Bodies } = await load("bodies.js");
 const { addSuccess, colorOf } = await load("outcomes.js");
-const { BoxGeometry, SphereGeometry, Vector3 } = await load("vendor/three/build/three.module.js");
+const { frameAt, linesOf, paint, pointsOf, toYaml } = await load("sensor_frames.js");
+const { SensorMarks } = await load("sensor_marks.js");
+const { BoxGeometry, Matrix4, SphereGeometry, Vector3 } = await load("vendor/three/build/three.module.js");
 
 const bytes = readFileSync(process.env.THROW);
 const thrown = () => decodeThrow(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
@@ -254,4 +256,60 @@ test("each outcome has a colour of its own, and every success the same", () => {
   assert.equal(new Set(names.map(colorOf)).size, names.length);
   addSuccess("in_bin");
   assert.equal(colorOf("in_bin"), colorOf("landed"));
+});
+
+test("the frame of a time is the newest one, and none before there is one", () => {
+  assert.deepEqual([-1, 0, 0.09, 0.1 - 1e-9, 0.15, 9].map((time) => frameAt([0, 0.1, 0.2], time)), [0, 0, 0, 1, 1, 2]);
+  assert.equal(frameAt([], 1), -1);
+});
+
+test("pictures are painted: colors as they are, depths as grey, labels in colors that differ", () => {
+  assert.deepEqual([...paint("color", Uint8Array.from([1, 2, 3, 4, 5, 6]).buffer, 2)], [1, 2, 3, 255, 4, 5, 6, 255]);
+  assert.deepEqual([...paint("depth", Float32Array.from([1, 3, Infinity]).buffer, 3)].filter((_, i) => i % 4 === 0), [255, 55, 0]);
+  assert.deepEqual([...paint("depth", Float32Array.from([2]).buffer, 1)], [255, 255, 255, 255]);
+  const painted = paint("segmentation", Uint16Array.from([0, 1, 2, 1]).buffer, 4);
+  const [nothing, one, two, again] = [0, 4, 8, 12].map((at) => painted.slice(at, at + 3).join());
+  assert.equal(nothing, "0,0,0");
+  assert.equal(one, again);
+  assert.equal(new Set([nothing, one, two]).size, 3);
+});
+
+test("points are where rays ended, in the frame of the sensor", () => {
+  const scan = { streams: ["scan"], section: { from_rad: -Math.PI, to_rad: Math.PI } };
+  [-1, 0, 0, 0, 2, 0].forEach((value, i) => near(pointsOf(scan, Float32Array.from([1, Infinity, Infinity, 2]).buffer)[i], value));
+  const part = { streams: ["scan"], section: { from_rad: 0, to_rad: Math.PI / 2 } };
+  [3, 0, 0, 0, 4, 0].forEach((value, i) => near(pointsOf(part, Float32Array.from([3, 4]).buffer)[i], value));
+  const cloud = { streams: ["points"], section: {} };
+  assert.deepEqual([...pointsOf(cloud, Float32Array.from([1, 2, 3, 7, NaN, NaN, NaN, 0, 4, 5, 6, 7]).buffer)], [1, 2, 3, 4, 5, 6]);
+});
+
+test("lines of a view go from the eye to the corners of its pictures", () => {
+  const lines = linesOf({ section: { width: 20, height: 10, vertical_fov_rad: Math.PI / 2 } });
+  assert.deepEqual([...lines.slice(0, 3)], [0, 0, 0]);
+  // Twice as wide as high: 45 degrees up, and y twice as far as x.
+  [0.25, 0.5, 0.25].forEach((value, i) => near(lines[3 + i], value));
+});
+
+test("lines follow the link of a sensor, and points stay where they were seen", () => {
+  const marks = new SensorMarks();
+  const sensor = { name: "head", position_m: [0, 0, 1], rotation_xyzw: [0, 0, 0, 1], section: { link: "head_link", width: 8, height: 8, vertical_fov_rad: 1 } };
+  const robotAt = (x) => ({ poseOf: (link) => (link === "head_link" ? new Matrix4().makeTranslation(x, 0, 0) : null) });
+  marks.put([sensor]);
+  const [lines, points] = marks.object.children;
+  marks.setPoints("head", Float32Array.from([1, 2, 3]), robotAt(5));
+  marks.follow(robotAt(7));
+  const placeOf = ({ matrix }) => new Vector3().setFromMatrixPosition(matrix).toArray();
+  assert.deepEqual([placeOf(lines), placeOf(points)], [[7, 0, 1], [5, 0, 1]]);
+  assert.deepEqual([...points.geometry.attributes.position.array], [1, 2, 3]);
+  // A sensor that stands in the world does not follow the robot.
+  marks.put([{ ...sensor, section: { ...sensor.section, link: "world" } }]);
+  marks.follow(robotAt(7));
+  assert.deepEqual(placeOf(marks.object.children[0]), [0, 0, 1]);
+  marks.clear();
+  assert.equal(marks.object.children.length, 0);
+});
+
+test("a section is written as YAML that reads as the same", () => {
+  const section = { kind: "camera", link: "no", rpy_rad: null, position_m: [0.1, -0.30000000000000004, 2], noise: { recorded: false } };
+  assert.equal(toYaml("head", section), 'sensors:\n  head: {kind: camera, link: "no", position_m: [0.1, -0.3, 2], noise: {recorded: false}}\n');
 });

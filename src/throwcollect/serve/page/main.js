@@ -15,6 +15,7 @@ import { REPLAY, Replay } from "./replay.js";
 import { Meshes } from "./robot.js";
 import { Room } from "./room.js";
 import { View } from "./scene.js";
+import { Sensors } from "./sensors.js";
 import { inOrder, lives, steps, watchable } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
@@ -92,6 +93,7 @@ class Page {
     this.watching = new Watching({ connection, view, playback, map, meshes, tell });
     this.replay = new Replay({ connection, view, playback, map, tell, changed: () => this.#show() });
     this.watching.replay = this.replay;
+    this.sensors = new Sensors({ connection, view, playback, replay: this.replay });
     this.watching.stored.came = () => this.#offerThrows();
     this.live = new Live({ connection, view, watching: this.watching, tell, choose: () => this.#chooseOne() });
     this.plots = new Plots({ view, playback, live: this.live });
@@ -353,6 +355,7 @@ class Page {
   #advance(seconds) {
     this.playback.step(seconds);
     this.watching.pose(this.live.simulations);
+    this.sensors.follow();
     this.plots.draw();
     this.#showTransport();
   }

@@ -137,6 +137,15 @@ export class Replay {
     return new URLSearchParams(parts).toString();
   }
 
+  /** @returns {string} path of this throw below the interface */
+  get path() {
+    return this.#pathOf(this.shown.trial);
+  }
+
+  #pathOf(trial) {
+    return `/collections/${encodeURIComponent(this.#run)}/throws/${trial}`;
+  }
+
   #putCompared(other) {
     this.compared = other;
     if (this.isOn) {
@@ -153,8 +162,7 @@ export class Replay {
   }
 
   async #fetch(trial) {
-    const path = `/collections/${encodeURIComponent(this.#run)}/throws/${trial}`;
-    const found = decodeThrow(await (await this.connection.ask("GET", path)).arrayBuffer());
+    const found = decodeThrow(await (await this.connection.ask("GET", this.#pathOf(trial))).arrayBuffer());
     return { ...found, simulation: REPLAY };
   }
 

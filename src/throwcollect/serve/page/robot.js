@@ -195,6 +195,17 @@ export class Robot {
     return Boolean(found);
   }
 
+  /**
+   * @param {string} link
+   * @returns {import("./vendor/three/build/three.module.js").Matrix4 | null} its pose, frame world; null if there is no such link
+   */
+  poseOf(link) {
+    const found = this.#robot.links[link];
+    if (!found) return null;
+    found.updateWorldMatrix(true, false);
+    return this.object.parent.matrixWorld.clone().invert().multiply(found.matrixWorld);
+  }
+
   /** @param {boolean} coarse whether to draw meshes with fewer triangles */
   setCoarse(coarse) {
     if (coarse === this.#coarse) return;

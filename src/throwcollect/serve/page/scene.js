@@ -9,6 +9,7 @@ import { Bodies } from "./bodies.js";
 import { makeMarker } from "./marker.js";
 import { colorOf } from "./outcomes.js";
 import { saveFile } from "./saving.js";
+import { SensorMarks } from "./sensor_marks.js";
 import { posesAt } from "./throws.js";
 import { Trails } from "./trails.js";
 
@@ -37,13 +38,14 @@ export class Station {
   group = new Group();
   trails = new Trails();
   bodies = new Bodies();
+  sensors = new SensorMarks();
   /** @type {import("./robot.js").Robot | null} */
   robot = null;
 
   constructor() {
     this.target = makeMarker();
     this.target.visible = false;
-    this.group.add(this.trails.object, this.bodies.object, this.target);
+    this.group.add(this.trails.object, this.bodies.object, this.sensors.object, this.target);
   }
 
   /** @param {import("./robot.js").Robot} robot takes the place of the one before, in its posture */
@@ -85,6 +87,7 @@ export class Station {
     this.setGhost(null);
     this.trails.clear();
     this.bodies.clear();
+    this.sensors.clear();
     this.robot?.dispose();
     this.group.removeFromParent();
   }

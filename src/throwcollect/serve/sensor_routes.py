@@ -1,0 +1,116 @@
+"""REST on what sensors saw of a stored throw, and on what another camera would have seen."""
+
+from __future__ import annotations
+
+import json
+import time
+from functools import lru_cache
+from threading import Lock
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Response
+from pydantic import BaseModel
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import with_sensors
+from throwcollect.dataset.sensors import SensorFrames
+from throwcollect.episode.record import Samples
+from throwcollect.episode.sensor_topics import frame_of, sensor_topics
+from throwcollect.errors import NotFoundError
+from throwcollect.robots.description import robot_of
+from throwcollect.sensing.scene import Scene
+from throwcollect.sensing.sensor import make_sensor
+from throwcollect.serve.instances import Instances
+from throwcollect.serve.throw_routes import find_throw
+
+_STEP_S = 0.1
+"""Time that each picture waits before it is rendered: all clients together get at most ten a second."""
+_STREAMS = {"color": "images", "depth": "depth_m", "segmentation": "labels", "scan": "ranges", "points": "points"}
+
+
+class SensorSummary(BaseModel):
+    """A sensor of a throw.
+
+    Attributes:
+        position_m: Its place in its link [m]; it looks along x, with y to its left and z upwards.
+        rotation_xyzw: Its rotation in the link, as a quaternion.
+        streams: What it has: ``color``, ``depth``, ``segmentation``, ``scan`` or ``points``.
+        time_s: Time of each frame since the start of the throw [s].
+        section: What is below its name in a configuration, with the values of this throw.
+    """
+
+    name: str
+    position_m: tuple[float, float, float]
+    rotation_xyzw: tuple[float, float, float, float]
+    streams: list[str]
+    time_s: list[float]
+    section: dict[str, Any]
+
+
+def make_sensor_routes(instances: Instances) -> APIRouter:
+    """Make the routes on the sensors of stored throws."""
+    router = APIRouter(prefix="/collections/{instance}/throws/{trial}")
+    # The frames keep the chunk that was decompressed last, so only one request at a time reads them.
+    lock, pace = Lock(), Lock()
+
+    # Clients ask for one frame of a throw after the other.
+    @lru_cache(maxsize=1)
+    def open_throw(instance: str, trial: int) -> tuple[Config, Samples, dict[str, SensorFrames]]:
+        plan, episode = find_throw(instances, instance, trial)
+        config = plan.config_of(plan.trial(trial))
+        frames = {name: SensorFrames(name, config, episode.header, episode.sensors) for name in config.sensors}
+        return config, episode.samples(robot_of(config).joints), frames
+
+    @lru_cache(maxsize=1)
+    def make_scene(instance: str, trial: int) -> Scene:
+        return Scene.of(open_throw(instance, trial)[0])
+
+    @router.get("/sensors")
+    def sensors(instance: str, trial: int) -> list[SensorSummary]:
+        """The sensors of a throw, in the order of the configuration; none if it has none."""
+        with lock:
+            config, _, frames = open_throw(instance, trial)
+            return [_describe(name, config, each.time_s.tolist()) for name, each in frames.items()]
+
+    @router.get("/sensors/{name}/{stream}/{frame}", response_class=Response)
+    def frame(instance: str, trial: int, name: str, stream: str, frame: int) -> Response:
+        """A frame by rows: colors uint8, labels uint16, depths and ranges float32, points 4 float32 (label last)."""
+        with lock:
+            config, _, frames = open_throw(instance, trial)
+            streams = _describe(name, config, []).streams if name in frames else []
+            if stream not in streams or frame not in range(len(frames[name])):
+                raise NotFoundError(f"trial {trial} of run {instance} has no frame {frame} of {name}/{stream}")
+            content = getattr(frames[name], _STREAMS[stream])[frame].tobytes()
+        return Response(content, media_type="application/octet-stream")
+
+    @router.post("/picture", response_class=Response)
+    def picture(
+        instance: str, trial: int, camera: Annotated[dict[str, Any], Body()], time_s: Annotated[float, Body(ge=0)]
+    ) -> Response:
+        """Colors that a camera which is not recorded sees; the field `Sensor` of the head describes it as JSON."""
+        with pace:
+            time.sleep(_STEP_S)
+        with lock:
+            config, samples, _ = open_throw(instance, trial)
+            scene = make_scene(instance, trial)
+            config = with_sensors(config, {"camera": {**camera, "kind": "camera", "streams": ["color"]}})
+            number = min(round(time_s * config.record.rate_hz), len(samples) - 1)
+            seen = make_sensor("camera", config, scene, trial).look(scene.place_sample(samples, number), number)
+        about = json.dumps(_describe("camera", config, [number / config.record.rate_hz]).model_dump())
+        content = seen["color"]["data"].tobytes()
+        return Response(content, media_type="application/octet-stream", headers={"Sensor": about})
+
+    return router
+
+
+def _describe(name: str, config: Config, time_s: list[float]) -> SensorSummary:
+    section = config.sensors[name]
+    frame = frame_of(name, section)
+    return SensorSummary(
+        name=name,
+        position_m=frame.translation,
+        rotation_xyzw=frame.rotation_xyzw,
+        streams=[topic.stream for topic in sensor_topics(config)[name].values() if topic.stream in _STREAMS],
+        time_s=time_s,
+        section=section.model_dump(),
+    )
