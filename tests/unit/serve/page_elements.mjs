@@ -110,6 +110,7 @@ const { showProblem } = await load("dom.js");
 const { LandingMap } = await load("landing_map.js");
 const { StoredThrows } = await load("stored_throws.js");
 const { PlotPanel } = await load("plot_panel.js");
+const { LiveSensors } = await load("live_sensors.js");
 const { REPLAY, Replay } = await load("replay.js");
 const { RunRecords } = await load("run_records.js");
 
@@ -479,4 +480,30 @@ test("a throw that comes late does not replace one that was chosen since, and a 
   await settle();
   assert.deepEqual([shown, notes], [[], ["trial 7 has no episode"]]);
   replay.leave();
+});
+
+test("pictures are subscribed to only while the strip of a simulation is open", async () => {
+  const topics = new Set();
+  const live = {
+    simulations: new Set(),
+    call: async () => ({ topics: ["/sim_0/head/image_raw", "/sim_1/head/image_raw"] }),
+    subscribe: (topic) => topics.add(topic),
+    unsubscribe: (topic) => topics.delete(topic),
+  };
+  const strip = new LiveSensors(live);
+  const button = document.getElementById("show-sensors");
+  const follow = async (...names) => {
+    live.simulations = new Set(names);
+    strip.follow();
+    await settle();
+  };
+  await follow("sim_0");
+  assert.deepEqual([button.hidden, topics.size], [false, 0]);
+  button.click();
+  assert.deepEqual([...topics], ["/sim_0/head/image_raw"]);
+  button.click();
+  assert.equal(topics.size, 0);
+  button.click();
+  await follow("sim_0", "sim_1");
+  assert.deepEqual([topics.size, button.hidden], [0, true]);
 });

@@ -18,6 +18,7 @@ const { Rosbridge } = await load("rosbridge.js");
 const { Bodies } = await load("bodies.js");
 const { addSuccess, colorOf } = await load("outcomes.js");
 const { frameAt, linesOf, paint, pointsOf, toYaml } = await load("sensor_frames.js");
+const { nest, paintImage } = await load("live_sensors.js");
 const { SensorMarks } = await load("sensor_marks.js");
 const { BoxGeometry, Matrix4, SphereGeometry, Vector3 } = await load("vendor/three/build/three.module.js");
 
@@ -312,4 +313,18 @@ test("lines follow the link of a sensor, and points stay where they were seen", 
 test("a section is written as YAML that reads as the same", () => {
   const section = { kind: "camera", link: "no", rpy_rad: null, position_m: [0.1, -0.30000000000000004, 2], noise: { recorded: false } };
   assert.equal(toYaml("head", section), 'sensors:\n  head: {kind: camera, link: "no", position_m: [0.1, -0.3, 2], noise: {recorded: false}}\n');
+});
+
+test("messages of cameras are painted as frames of the same encoding", () => {
+  const image = (encoding, numbers) => ({ encoding, width: numbers.length, height: 1, data: Buffer.from(numbers.buffer).toString("base64") });
+  const greys = (pixels) => [...pixels].filter((_, i) => i % 4 === 0);
+  assert.deepEqual(greys(paintImage(image("16UC1", Uint16Array.from([1000, 3000, 0])))), [255, 55, 0]);
+  assert.deepEqual(greys(paintImage(image("32FC1", Float32Array.from([1, 3, Infinity])))), [255, 55, 0]);
+  assert.deepEqual([...paintImage({ ...image("rgb8", Uint8Array.from([7, 8, 9])), width: 1 })], [7, 8, 9, 255]);
+  assert.equal(paintImage(image("bayer", Uint8Array.from([0]))), null);
+});
+
+test("parameters of sensors become sections", () => {
+  const values = [["sensors.head.kind", "camera"], ["sensors.head.rpy_rad.0", 1], ["sensors.head.rpy_rad.1", 2], ["sensors.head.noise.recorded", false], ["sensors.scan.rays", 3]];
+  assert.deepEqual(nest(values), { head: { kind: "camera", rpy_rad: [1, 2], noise: { recorded: false } }, scan: { rays: 3 } });
 });

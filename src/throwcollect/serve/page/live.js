@@ -101,6 +101,22 @@ export class Live {
     this.#bridge.publish(topic, type, message);
   }
 
+  /** Subscribe to a topic of the run that is watched, as `Rosbridge` does. */
+  subscribe(topic, type, hear, period) {
+    this.#bridge?.subscribe(topic, type, hear, period);
+  }
+
+  /** @param {string} topic to unsubscribe from */
+  unsubscribe(topic) {
+    this.#bridge?.unsubscribe(topic);
+  }
+
+  /** Call a service of the run that is watched, as `Rosbridge` does. */
+  async call(service, type, args) {
+    if (this.#bridge === null) throw new Error("no simulation runs that could answer");
+    return this.#bridge.call(service, type, args);
+  }
+
   #follow() {
     const instance = this.#instance;
     const isKnown = Boolean(instance) && instance.robots.length > 0 && this.watching.moving.length > 0;

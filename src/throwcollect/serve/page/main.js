@@ -8,6 +8,7 @@ import { listenForKeys } from "./keys.js";
 import { LandingMap } from "./landing_map.js";
 import { keepLayout, readLayout } from "./layout.js";
 import { Live } from "./live.js";
+import { LiveSensors } from "./live_sensors.js";
 import { Models } from "./model.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
@@ -96,6 +97,7 @@ class Page {
     this.sensors = new Sensors({ connection, view, playback, replay: this.replay });
     this.watching.stored.came = () => this.#offerThrows();
     this.live = new Live({ connection, view, watching: this.watching, tell, choose: () => this.#chooseOne() });
+    this.liveSensors = new LiveSensors(this.live);
     this.plots = new Plots({ view, playback, live: this.live });
     this.watching.described = (simulation, urdf) => this.plots.bind(simulation, urdf);
     const watch = (id) => this.#watch(id);
@@ -356,6 +358,7 @@ class Page {
     this.playback.step(seconds);
     this.watching.pose(this.live.simulations);
     this.sensors.follow();
+    this.liveSensors.follow();
     this.plots.draw();
     this.#showTransport();
   }

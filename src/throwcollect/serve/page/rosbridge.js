@@ -23,7 +23,7 @@ export class Rosbridge {
     this.#socket = connection.openRosbridge(run, {
       opened: () => {
         this.#open = true;
-        for (const [topic, { type }] of this.#topics) this.#ask(topic, type);
+        for (const [topic, { type, period }] of this.#topics) this.#ask(topic, type, period);
         for (const [topic, type] of this.#advertised) this.#announce(topic, type);
         events.opened?.();
       },
@@ -38,14 +38,15 @@ export class Rosbridge {
   }
 
   /**
-   * Subscribe to a topic, again after the connection was lost; at most 30 messages a second.
+   * Subscribe to a topic, again after the connection was lost.
    * @param {string} topic
    * @param {string} type such as std_msgs/msg/String
    * @param {(message: any) => void} hear
+   * @param {number} [period] least time between two messages [ms]
    */
-  subscribe(topic, type, hear) {
-    this.#topics.set(topic, { type, hear });
-    if (this.#open) this.#ask(topic, type);
+  subscribe(topic, type, hear, period = PERIOD_MS) {
+    this.#topics.set(topic, { type, hear, period });
+    if (this.#open) this.#ask(topic, type, period);
   }
 
   /** @param {string} topic to unsubscribe from */
@@ -94,8 +95,8 @@ export class Rosbridge {
     this.#send({ op: "advertise", id: `publish-${topic}`, topic, type, latch: true, queue_size: 1 });
   }
 
-  #ask(topic, type) {
-    this.#send({ op: "subscribe", topic, type, throttle_rate: PERIOD_MS, queue_length: 1 });
+  #ask(topic, type, period) {
+    this.#send({ op: "subscribe", topic, type, throttle_rate: period, queue_length: 1 });
   }
 
   #send(message) {
