@@ -97,8 +97,8 @@ def make_sensor_routes(instances: Instances) -> APIRouter:
             number = min(round(time_s * config.record.rate_hz), len(samples) - 1)
             seen = make_sensor("camera", config, scene, trial).look(scene.place_sample(samples, number), number)
         about = json.dumps(_describe("camera", config, [number / config.record.rate_hz]).model_dump())
-        content = seen["color"]["data"].tobytes()
-        return Response(content, media_type="application/octet-stream", headers={"Sensor": about})
+        colors = seen["color"]["data"].tobytes()
+        return Response(colors, media_type="application/octet-stream", headers={"Sensor": about})
 
     return router
 
