@@ -342,14 +342,11 @@ def test_an_unusable_address_or_certificate_gives_one_message(place: Place, tmp_
     assert said.returncode == 2
     assert "--host 0.0.0.0: anybody on that network could read the token" in said.stderr
     (tmp_path / "no.pem").write_text("no certificate\n")
-    for file, reason in (
-        ("none.pem", "none.pem' does not exist"),
-        ("no.pem", f"--tls-key {tmp_path / 'no.pem'}: cannot be used: "),
-    ):
+    for file in ("none.pem", "no.pem"):
         cert = ("--tls-cert", tmp_path / "no.pem")
         said = call_here("serve", "--port", "0", *cert, "--tls-key", tmp_path / file)
         assert said.returncode == 2
-        assert reason in said.stderr
+        assert f"--tls-key {tmp_path / file}: cannot be used: " in said.stderr
 
 
 def test_a_server_speaks_ipv6_and_tls(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,8 @@ else:
     RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
-ListenAddress = Annotated[str, Field(pattern=r"^tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):[1-9][0-9]{0,4}$")]
+_PORT = "[1-9][0-9]{0,3}|[1-5][0-9]{4}|6([0-4][0-9]{3}|5([0-4][0-9]{2}|5([0-2][0-9]|3[0-5])))"
+ListenAddress = Annotated[str, Field(pattern=rf"^tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):({_PORT})$")]
 
 
 class RunConfig(Section):

@@ -125,7 +125,7 @@ class SensorFrames:
 
     @property
     def label_names(self) -> tuple[str, ...]:
-        """Links and bodies by their numbers in `labels`, as in ``label_info``."""
+        """Links and bodies by their numbers in `labels`, as ``/<name>/segmentation/labels`` has them."""
         base_height_m = self._whole.robot.base_height_m
         tree = frames.read_frames(full_description(self._whole), base_height=base_height_m)
         return label_names(self._whole, tree.links)

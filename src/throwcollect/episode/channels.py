@@ -14,7 +14,7 @@ from throwcollect.episode.sensor_topics import (
     SensorTopic,
     label_channels,
     label_names,
-    make_label_info,
+    make_labels,
     optical_frames,
     sensor_topics,
 )
@@ -126,7 +126,7 @@ class Channels:
             Channel(ROBOT_DESCRIPTION_ID, "/robot_description", "std_msgs/msg/String", _LATCHED),
             Channel(TF_STATIC_ID, "/tf_static", "tf2_msgs/msg/TFMessage", _LATCHED),
             *(
-                Channel(number, topic, "vision_msgs/msg/LabelInfo", _LATCHED)
+                Channel(number, topic, "std_msgs/msg/String", _LATCHED)
                 for number, topic in label_channels(config).items()
             ),
         )
@@ -158,7 +158,7 @@ class Channels:
         return {
             description: serialize(get_message(description.type_name)(data=self.robot)),
             static: serialize(make_fixed_transforms(fixed, stamp_ns)),
-            **{channel: serialize(make_label_info(labels)) for channel in labelled},
+            **{channel: serialize(make_labels(labels)) for channel in labelled},
         }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -70,7 +71,7 @@ def sensor_topics(config: Config) -> dict[str, dict[int, SensorTopic]]:
 def label_channels(config: Config) -> dict[int, str]:
     """Name the topics that say what the numbers of segmentations mean, by number of the channel."""
     return {
-        FIRST_SENSOR_ID + _IDS_OF_SENSOR * index + _LABELS_ID: f"/{name}/segmentation/label_info"
+        FIRST_SENSOR_ID + _IDS_OF_SENSOR * index + _LABELS_ID: f"/{name}/segmentation/labels"
         for index, (name, sensor) in enumerate(sorted(config.sensors.items()))
         if isinstance(sensor, PictureConfig) and "segmentation" in sensor.recorded
     }
@@ -175,12 +176,12 @@ def label_names(config: Config, links: Sequence[str]) -> tuple[str, ...]:
     return ("background", *links, config.acted_on, "ground", *others)
 
 
-def make_label_info(names: Sequence[str]) -> Any:
-    """Make the vision_msgs/LabelInfo that says what the numbers in pictures of the segmentation mean."""
-    kind = get_message("vision_msgs/msg/VisionClass")
-    return get_message("vision_msgs/msg/LabelInfo")(
-        class_map=[kind(class_id=number, class_name=name) for number, name in enumerate(names)], threshold=1.0
-    )
+def make_labels(names: Sequence[str]) -> Any:
+    """Make the std_msgs/String, in JSON, that says what the numbers in pictures of the segmentation mean.
+
+    The messages for this in vision_msgs do not come with ROS 2, and Isaac Sim publishes such strings, too.
+    """
+    return get_message("std_msgs/msg/String")(data=json.dumps(dict(enumerate(names))))
 
 
 def intrinsics_of(camera: PictureConfig) -> Mapping[str, NDArray[np.float64]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -225,8 +226,8 @@ def test_files_are_bags_and_messages_have_the_frames_of_ros(seen: Path) -> None:
                 read = reader.deserialize(message, connection.msgtype)
                 frames[connection.topic] = read.header.frame_id, getattr(read, "encoding", "")
                 assert stamp >= read.header.stamp.sec * 10**9 + read.header.stamp.nanosec
-            if connection.topic == "/side/segmentation/label_info":
-                labels = [each.class_name for each in reader.deserialize(message, connection.msgtype).class_map]
+            if connection.topic == "/side/segmentation/labels":
+                labels = list(json.loads(reader.deserialize(message, connection.msgtype).data).values())
             if connection.topic == "/tf_static":
                 for each in reader.deserialize(message, connection.msgtype).transforms:
                     fixed[each.child_frame_id] = each.header.frame_id

@@ -81,7 +81,7 @@ def in_record(opcode: Opcode, place: int) -> Change:
 
 def in_index(directory: Path) -> None:
     run = find_stored(directory / SHARD, 5).run
-    flip(directory / SHARD, run.offset + run.chunk_index.chunk_length + 200)
+    flip(directory / SHARD, run.offset + run.chunk_indexes[0].chunk_length + 200)
 
 
 def in_chunk(directory: Path) -> None:

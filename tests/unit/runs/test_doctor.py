@@ -49,7 +49,7 @@ def test_doctor_lists_installed_and_missing_extras(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda package: package != "onnx")
     monkeypatch.setattr("throwcollect.runs.doctor.has_wheel", lambda _: True)
     (finding,) = (check.finding for check in examine(tmp_path) if check.name == "extras")
-    there = "collect, docker, export, gym, mujoco, pandas, report, serve"
+    there = "collect, docker, export, gym, mujoco, pandas, report, serve, video"
     assert finding == f"{there}, without onnx (try: pip install 'throwcollect[onnx]')"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,7 @@ def run(engine: Engine, tmp_path: Path) -> Run:
         (tmp_path / name).mkdir()
     run = Records().new("throws")
     record = RunRecord.begin(run.id, "throws", tmp_path / "data", logs=tmp_path / "logs", runtime="docker")
-    run.write(record)
+    run.write(replace(record, simulations=1))
     return run
 
 

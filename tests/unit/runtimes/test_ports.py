@@ -46,7 +46,7 @@ def test_reserving_a_busy_port_is_refused_with_its_key() -> None:
 
 @pytest.mark.parametrize("address", ["0.0.0.0:7447", "tcp/0.0.0.0", "tcp/0.0.0.0:0", "tcp/0.0.0.0:70000", "udp/a:1"])
 def test_a_malformed_address_to_listen_at_is_refused(address: str) -> None:
-    with pytest.raises(ValueError, match="should be tcp/ADDRESS:PORT"):
+    with pytest.raises(ValueError, match="should match pattern"):
         RunConfig(listen=address)
 
 

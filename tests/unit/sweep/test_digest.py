@@ -31,7 +31,7 @@ def digests(config: Config, points: Points = POINTS, seeds: tuple[int, ...] = (5
 def test_digests_are_sha_256_over_the_effective_keys_in_order():
     kept = values_by_key(with_values(Config(), {"ball.mass_kg": 0.1, "task.duration_s": 1.0})) | {"seed": 5}
     for key in list(kept):
-        outside = key.startswith(("sweep", "run.", "containers.", "cluster."))
+        outside = key.startswith(("sweep", "run.", "containers.", "cluster.", "sensors"))
         if outside or key in WITHOUT_EFFECT:
             del kept[key]
     text = "\n".join(["throwcollect trial 1", *(f"{key}={json.dumps(kept[key])}" for key in sorted(kept))])
