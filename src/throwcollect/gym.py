@@ -24,7 +24,7 @@ from throwcollect.members import names_of
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.surroundings import object_of
-from throwcollect.sim.policy import Observation, PolicyLoop, shape_observation
+from throwcollect.sim.policy import Observation, PolicyLoop, shape_observation, shape_pictures
 from throwcollect.sim.simulator import Simulator
 from throwcollect.simulator import find_refusal, with_policy
 from throwcollect.view.throw_pictures import Still
@@ -127,8 +127,13 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
         loop = self._loop
         low, high = (loop.lower, loop.upper) if command == "position" else (-loop.speed, loop.speed)
         self.action_space = spaces.Box(low, high, dtype=np.float64)
-        sizes = shape_observation(self.config)
-        self.observation_space = spaces.Dict({name: self._bound(name, sizes[name]) for name in observation})
+        sizes, pictures = shape_observation(self.config), shape_pictures(self.config)
+        self.observation_space = spaces.Dict(
+            {
+                name: self._bound(name, sizes[name]) if name in sizes else _bound_picture(pictures[name])
+                for name in observation
+            }
+        )
 
     @property
     def _loop(self) -> PolicyLoop:
@@ -244,6 +249,11 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
                 result["miss_m"] = math.hypot(x - self._target[_PLACE[0]], y - self._target[_PLACE[1]])
             success = success and result.get("miss_m", math.inf) <= self._hit_m
         return {name: value for name, value in result.items() if value is not None} | {"is_success": success}
+
+
+def _bound_picture(shape: tuple[int, int, int]) -> spaces.Box:
+    """Bound a picture of colors, or one of depths [m], which has one channel."""
+    return spaces.Box(0, 255, shape, np.uint8) if shape[2] > 1 else spaces.Box(0, np.inf, shape, np.float32)
 
 
 def _register() -> None:

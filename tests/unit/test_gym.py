@@ -22,6 +22,7 @@ import throwcollect.gym  # noqa: E402
 
 CONFIG = Path(__file__).parents[2] / "configs" / "quickstart.yaml"
 OVERRIDES = ("sim.engine=mujoco", "sim.max_trial_s=1.5")
+EYE = "sensors.eye={kind: camera, streams: [color, depth], width: 16, height: 16}"
 TARGETS = {"target_x_m": (1.2, 1.8), "target_y_m": (-0.4, 0.0)}
 
 
@@ -53,6 +54,7 @@ def play(env: Any, actions: Any) -> list[Any]:
         ("Throw", {"targets": TARGETS, "reward": "shaped"}),
         ("Throw", {"command": "velocity", "render_mode": "rgb_array"}),
         ("ThrowInto", {"config": None, "observation": ["ball_position_m", "task_bin_x_m"]}),
+        ("Throw", {"overrides": (*OVERRIDES, EYE), "observation": ["joint_position_rad", "eye_image", "eye_depth"]}),
         ("Slide", {"config": CONFIG.with_name("slide.yaml"), "targets": {"target_x_m": (1, 2), "target_y_m": (-1, 0)}}),
     ],
 )

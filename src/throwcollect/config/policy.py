@@ -21,7 +21,7 @@ class PolicyConfig(Section):
     rate_hz: Annotated[int, Field(ge=1, le=10000)] = 50
     """Commands per simulated second; must divide `sim.physics_hz`."""
     observation: list[str] = []
-    """Arrays that the policy gets; empty for all that there are."""
+    """Arrays that the policy gets; empty for all that there are but pictures."""
     command: Literal["position", "velocity"] = "position"
     """What the policy commands for each joint of `task.end`: the position at the next command [rad], or the velocity
     until then [rad/s]."""

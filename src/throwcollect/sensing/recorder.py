@@ -14,9 +14,7 @@ from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message_table import MOST_FRAMES_BYTES, MessageTable, make_row
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import put_stamps
-from throwcollect.robots.description import full_description
-from throwcollect.sensing.drawn_robot import draw_bodies_of
-from throwcollect.sensing.scene import Scene
+from throwcollect.sensing.scene import Scenes
 from throwcollect.sensing.sensor import make_sensor
 from throwcollect.units import NS_PER_S
 
@@ -35,8 +33,7 @@ class SensorRecorder:
     def __init__(self, channels: Channels, on_frame: Callable[[], None] = lambda: None) -> None:
         self._on_frame = on_frame
         self._topics = channels.sensors
-        self._scene: Scene | None = None
-        self._drawn: object = None
+        self._scenes = Scenes()
         self._compressor = zstandard.ZstdCompressor(level=_LEVEL)
 
     def record(self, config: Config, trial: int, samples: Samples) -> tuple[Chunk, ...]:
@@ -50,7 +47,7 @@ class SensorRecorder:
         """
         if not self._topics:
             return ()
-        scene, chunks = self._find_scene(config), []
+        scene, chunks = self._scenes.of(config), []
         for name, topics in self._topics.items():
             sensor = make_sensor(name, config, scene, trial)
             numbers = np.arange(0, len(samples), config.record.rate_hz // sensor.rate_hz)
@@ -77,10 +74,3 @@ class SensorRecorder:
                 chunk = Chunk.of(table.contents, data, start_ns=int(arrived[0]), end_ns=int(arrived[-1]))
                 chunks.append(replace(chunk, indexes=table.message_indexes))
         return tuple(chunks)
-
-    def _find_scene(self, config: Config) -> Scene:
-        """Make the scene of a trial, or take that of the trial before if nothing differs in it but what moves."""
-        drawn = full_description(config), draw_bodies_of(config)
-        if self._scene is None or self._drawn != drawn:
-            self._drawn, self._scene = drawn, Scene.of(config)
-        return self._scene

@@ -17,7 +17,7 @@ from throwcollect.episode.frames import WORLD, Frame, FrameTree, MovingFrame, re
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import cos, sin
-from throwcollect.robots.description import robot_of
+from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.decimation import Points, cross, dot
 from throwcollect.sensing.drawn_robot import DrawnRobot, DrawnShape, draw_bodies_of, draw_robot_of
@@ -182,6 +182,20 @@ class Scene:
         """Put robot and bodies where they are in a recorded sample."""
         parts = [samples[number : number + 1].parts_of(body) for body in range(self.n_moving)]
         return self.place(samples.position[number], [Pose.of(place[0], turn[0]) for place, turn, *_ in parts])
+
+
+class Scenes:
+    """Makes the scenes of trials; a scene is kept as long as nothing differs in it but what moves."""
+
+    def __init__(self) -> None:
+        self._kept: tuple[object, Scene] | None = None
+
+    def of(self, config: Config) -> Scene:
+        """Make the scene of a trial; see `Scene.of`."""
+        drawn = full_description(config), draw_bodies_of(config)
+        if self._kept is None or self._kept[0] != drawn:
+            self._kept = drawn, Scene.of(config)
+        return self._kept[1]
 
 
 # Scenes in one state are keys of a cache.

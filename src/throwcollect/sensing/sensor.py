@@ -99,13 +99,15 @@ class CameraSensor(Sensor):
         """Render its picture of a scene in one state, without noise."""
         return self.camera.render(placed, color="color" in self._section.recorded)
 
+    def see_noisily(self, placed: PlacedScene, number: int) -> Frame:
+        """Render its picture of a scene in one state, with the noise of the frame of this number."""
+        seen, noise = self.see(placed), self._section.noise
+        depth = self._depth.distance(seen.depth, number, noise.depth_std_m, noise.depth_std_share)
+        return replace(seen, depth=depth, color=None if seen.color is None else self._color.color(seen.color, number))
+
     def look(self, placed: PlacedScene, number: int) -> Mapping[str, Fields]:
         """See `Sensor.look`."""
-        seen, noise = self.see(placed), self._section.noise
-        if noise.recorded:
-            depth = self._depth.distance(seen.depth, number, noise.depth_std_m, noise.depth_std_share)
-            color = None if seen.color is None else self._color.color(seen.color, number)
-            seen = replace(seen, depth=depth, color=color)
+        seen = self.see_noisily(placed, number) if self._section.noise.recorded else self.see(placed)
         depth = seen.depth.astype("<f4")
         if self._section.depth_encoding == "16UC1":
             # Beyond 65 m there is no number of millimetres.

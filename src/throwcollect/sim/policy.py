@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.policy import SESSION
 from throwcollect.config.schema import Config
+from throwcollect.config.sensors import PictureConfig
 from throwcollect.config.values import column_of
 from throwcollect.engines.engine import BODY_NUMBERS
 from throwcollect.errors import ConfigError, Problem
@@ -20,15 +21,20 @@ from throwcollect.members import explain_failure, load_member, load_part, names_
 from throwcollect.robots.description import joint_offsets, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.surroundings import moving_bodies_of
+from throwcollect.sensing.pose import Pose
+from throwcollect.sensing.scene import Scenes
+from throwcollect.sensing.sensor import CameraSensor, make_sensor
 from throwcollect.sim.world import World
 from throwcollect.wording import join_names, suggest
 
 Array = NDArray[np.float64]
-Observation = Mapping[str, Array]
+Observation = Mapping[str, NDArray[Any]]
 """Arrays by name, with the names, units and frames of an export (`throwcollect.export`): of all joints in the order of
-`Robot.joints`, of each body that moves in world, the keys that belong to a target, the target, the last command."""
+`Robot.joints`, of each body that moves in world, the keys that belong to a target, the target, the last command, and
+the pictures of cameras that `task.policy.observation` names."""
 
 _JOINTS = ("joint_position_rad", "joint_velocity_radps", "joint_effort_nm")
+_PICTURES = {"color": ("image", 3), "depth": ("depth", 1)}
 _BODY = {"position_m": 3, "orientation_xyzw": 4, "velocity_mps": 3, "angular_velocity_radps": 3}
 
 
@@ -87,7 +93,7 @@ def find_policy(config: Config) -> Callable[[Config], Policy]:
 
 def check_observation(config: Config) -> None:
     """Check the names of what the policy of a configuration observes."""
-    known = shape_observation(config)
+    known = [*shape_observation(config), *shape_pictures(config)]
     for name in config.task.policy.observation if config.task.policy else ():
         if name not in known:
             sentence = f"there is no {name}{suggest(name, known)}; there are {', '.join(known)}"
@@ -101,6 +107,17 @@ def shape_observation(config: Config) -> dict[str, int]:
     shapes |= {f"{body}_{part}": count for body in moving_bodies_of(config) for part, count in _BODY.items()}
     targets = (each.name for each in config.task.target_columns)
     return shapes | dict.fromkeys((*map(column_of, config.task.given), *targets), 1)
+
+
+def shape_pictures(config: Config) -> dict[str, tuple[int, int, int]]:
+    """List the shapes of the pictures that a policy may observe, by name: height, width, and number of channels."""
+    shapes = {}
+    for name, section in config.sensors.items():
+        if isinstance(section, PictureConfig):
+            for stream, (part, channels) in _PICTURES.items():
+                if stream in section.recorded:
+                    shapes[f"{name}_{part}"] = section.height, section.width, channels
+    return shapes
 
 
 class PolicyLoop:
@@ -133,6 +150,9 @@ class PolicyLoop:
         self._shown = [robot.joints.index(joint) for joint in world.moving]
         self._bodies = moving_bodies_of(config)
         self._robot = robot
+        parts = [part for part, _ in _PICTURES.values()]
+        self._seen_by = [name for name in config.sensors if any(f"{name}_{part}" in self._names for part in parts)]
+        self._scenes = Scenes()
 
     def begin(self, config: Config, number: int, seed: int, target: Mapping[str, float]) -> None:
         """Begin a trial, in the start state of its configuration."""
@@ -145,6 +165,11 @@ class PolicyLoop:
         self._moved = self._speed = np.zeros(len(self.joints))
         self._log: list[tuple[Array, Array]] = []
         self._observed: tuple[int, Observation] = (-1, {})
+        self._cameras: dict[str, CameraSensor] = {}
+        if self._seen_by:
+            self._scene = self._scenes.of(config)
+            made = {name: make_sensor(name, config, self._scene, number) for name in self._seen_by}
+            self._cameras = {name: sensor for name, sensor in made.items() if isinstance(sensor, CameraSensor)}
         if missing := [name for name in self._section.observation if name not in self.observe()]:
             sentence = f"trial {number} has no {missing[0]}: its plan has no targets"
             raise ConfigError([Problem(sentence, "task.policy.observation")])
@@ -160,7 +185,7 @@ class PolicyLoop:
         position, velocity, effort = self._still.copy(), *np.zeros((2, len(self._still)))
         position[self._shown] = sample[:count] - self._offsets
         velocity[self._shown], effort[self._shown] = sample[count : 2 * count], sample[2 * count : 3 * count]
-        found = dict(zip(_JOINTS, (position, velocity, effort), strict=True))
+        found: dict[str, NDArray[Any]] = dict(zip(_JOINTS, (position, velocity, effort), strict=True))
         found |= {"time_s": np.array([steps / world.physics_hz]), "command_position_rad": self.sent.copy()}
         # The object comes last in a sample, and first in the names.
         bodies = sample[3 * count :].reshape(-1, BODY_NUMBERS)
@@ -171,6 +196,14 @@ class PolicyLoop:
                 first += size
         found |= {name: value.copy() for name, value in self._given.items()}
         self.object = bodies[-1]
+        if self._cameras:
+            poses = [Pose.of(numbers[:3], numbers[3:7]) for numbers in (bodies[-1], *bodies[:-1])]
+            placed = self._scene.place(position, poses)
+            for name, camera in self._cameras.items():
+                seen = camera.see_noisily(placed, steps)
+                found[f"{name}_depth"] = seen.depth[:, :, np.newaxis].astype(np.float32)
+                if seen.color is not None:
+                    found[f"{name}_image"] = seen.color
         self._observed = steps, {name: found[name] for name in self._names if name in found}
         return self._observed[1]
 

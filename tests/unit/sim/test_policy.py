@@ -133,6 +133,35 @@ def test_observations_have_the_names_and_shapes_of_exports(simulator: Simulator)
     assert_same_samples(few, simulator.roll_out(policy))
 
 
+def test_pictures_of_cameras_are_observed_by_name() -> None:
+    sensors = """sensors={
+      side: {kind: camera, streams: [color, depth], depth_encoding: 32FC1, rate_hz: 50},
+      wrist: {kind: depth, link: arm_right_7_link, width: 32, height: 24, depth_encoding: 32FC1, rate_hz: 50},
+      scan: {kind: lidar_2d}}"""
+    seen: list[Observation] = []
+    policy = Acts(lambda observation: seen.append(observation) or hold(observation) + 0.005)
+    names = ["side_image", "side_depth", "wrist_depth"]
+    with Simulator(CONFIG, overrides=(*OVERRIDES, "record.rate_hz=250", sensors)) as simulator:
+        rolled = simulator.roll_out(policy, observation=["command_position_rad", *names])
+        assert not any(name in seen[0] for name in shape_observation(simulator.config) if name.endswith("_position_m"))
+        for frame in (0, 10, len(seen) - 1):
+            side, wrist = rolled.sensors["side"], rolled.sensors["wrist"]
+            assert np.array_equal(seen[frame]["side_image"], side.images[frame])
+            assert np.array_equal(seen[frame]["side_depth"][..., 0], side.depth_m[frame])
+            assert np.array_equal(seen[frame]["wrist_depth"][..., 0], wrist.depth_m[frame])
+        assert {name: (seen[0][name].shape, seen[0][name].dtype) for name in names} == {
+            "side_image": ((96, 96, 3), np.uint8),
+            "side_depth": ((96, 96, 1), np.float32),
+            "wrist_depth": ((24, 32, 1), np.float32),
+        }
+        assert not np.array_equal(seen[0]["side_image"], seen[-1]["side_image"])
+        # What costs time is observed only by name.
+        simulator.roll_out(policy)
+        assert not {*names} & {*seen[-1]}
+        with pytest.raises(ConfigError, match=r"there is no wrist_image.*side_image, side_depth, wrist_depth"):
+            simulator.roll_out(policy, observation=["wrist_image"])
+
+
 def test_commands_beyond_limits_are_clipped_counted_and_recorded(simulator: Simulator) -> None:
     rolled = simulator.roll_out(Acts(lambda observation: hold(observation) + 10))
     assert rolled["clipped_share"] == 1
