@@ -24,6 +24,9 @@ from throwcollect.robots.description import full_description
 from throwcollect.sensing.noise import Noise
 from throwcollect.units import NS_PER_S
 
+FRAMES = {"color": "images", "depth": "depth_m", "segmentation": "labels", "scan": "ranges", "points": "points"}
+"""What `SensorFrames` calls the frames of each stream."""
+
 
 class Frames:
     """Frames of one stream, such as ``frames[3]``; ``frames[:]`` is one array of all, with the frame as first axis.

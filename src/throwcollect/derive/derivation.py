@@ -95,12 +95,15 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     """Write the dataset; returns the number of its trials, and its digest."""
     began = time.monotonic()
     plan, firsts = join_plans([source.plan for source in sources])
+    # Files of robot and bodies are named as in the plan, but read where they are now.
+    placed = sources[0].config
     if sensors is not None:
         plan = replace(plan, config=with_sensors(plan.config, sensors))
         for key in plan.keys:
             if key.startswith("sensors.") and (reason := reason_not_sweepable(plan.config, key)):
-                raise ConfigError([Problem(f"the dataset varies it: {reason}", key)])
-        check_sensors(plan.config)
+                raise ConfigError([Problem(f"the dataset sweeps it, so the sensors should have it: {reason}", key)])
+        placed = placed.model_copy(update={"sensors": plan.config.sensors})
+        check_sensors(placed)
     elif any(source.config.sensors != plan.config.sensors for source in sources):
         raise ConfigError(
             "the datasets have different sensors", hint=f"{command('dataset', 'render-sensors')} makes them alike"
@@ -113,18 +116,18 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     _check_copies(copies, plan)
     channels = _read_channels(sources, plan.config)
     create(directory, plan, listed=plan.trials.points if plan.config.sweep.file else None)
-    carry_robot(sources[0].config, directory)
+    carry_robot(placed, directory)
     table = ThrowsTable.of(plan)
     tables, recordings = [], []
     progress = log_progress(copies, len(copies), "trial", "written")
-    throws_of = [sources[copy.source].throw(copy.trial) for copy in copies]
-    processes = 1 if sensors is None else limit_processes(count_cores(), len(copies))
+    throws_of = (sources[copy.source].throw(copy.trial) for copy in copies)
+    configs = map(replace(plan, config=placed).config_of, (plan.trial(copy.number) for copy in copies))
     # Episodes are read in order, one after the other, as they are written; pictures are rendered by all cores.
     episodes = work_side_by_side(
-        [*zip(throws_of, map(plan.config_of, (plan.trial(copy.number) for copy in copies)), strict=True)],
+        [*zip(throws_of, configs, strict=True)],
         _begin_reading,
         (None if sensors is None else channels,),
-        processes=processes,
+        processes=1 if sensors is None else limit_processes(count_cores(), len(copies)),
         doing="renders",
     )
     for name, members in groupby(progress, key=lambda copy: shard_of(plan, copy.number)):

@@ -50,13 +50,14 @@ import h5py
 file = h5py.File("throws.hdf5")
 {position} = file["data/demo_{source.throws[0].trial}/obs/{position}"][:]
 {measure} = file["throws/{measure}"][:]""",
+        frames="`obs/<sensor>_image` [0 to 255] and `obs/<sensor>_depth` [m], each with the next ones in `next_obs/`",
         notes=(
             f"The layout is that of robomimic. Each group of a {noun} has `obs/` with what is measured, `next_obs/`, "
             "the same one sample later (in the last sample, that of the sample itself), `actions`, the commanded "
             "positions of the moving joints one sample later, `rewards`, 1 in the last sample of a "
-            f"{noun} that succeeded, and `dones`, 1 in the last sample; and beside them `time_s` and what is commanded "
-            "in the samples themselves. Every dataset has the attributes `unit` and `description`, and `components` "
-            "where it has several columns.",
+            f"{noun} that succeeded, and `dones`, 1 in the last sample; `time_s` and what is commanded "
+            "in the samples themselves are there, too. Every dataset has the attributes `unit` and `description`, and "
+            "`components` where it has several columns.",
             "Actions are in radians, and robomimic's policies put out numbers between -1 and 1, so set "
             '`train.action_config.actions.normalization` to "min_max" there (version 0.5.0). '
             "`env_args` names no environment that robomimic could make.",
@@ -153,12 +154,14 @@ def _add_throw(group: Any, throw: ThrowSeries, source: ExportSource) -> None:
 
 def _add_frames(group: Any, name: str, frames: NDArray[Any], unit: str) -> None:
     stored = group.create_dataset(f"obs/{name}", data=frames, chunks=(1, *frames.shape[1:]), **_COMPRESSION)
-    stored.attrs["unit"] = unit
+    described = {"unit": unit, "description": f"What the camera sees, of shape {frames.shape[1:]} in each sample."}
+    stored.attrs.update(described)
     # What is seen one sample later is a view of this, because it would double the size of the file.
     seen = h5py.VirtualSource(".", stored.name, frames.shape, stored.dtype)
     later = h5py.VirtualLayout(frames.shape, stored.dtype)
     later[:-1], later[-1] = seen[1:], seen[-1]
-    group.create_virtual_dataset(f"next_obs/{name}", later)
+    following = group.create_virtual_dataset(f"next_obs/{name}", later)
+    following.attrs.update({**described, "description": described["description"] + _LATER})
 
 
 def _add_signal(group: Any, name: str, signal: Signal, values: NDArray[np.float64], when: str = "") -> None:

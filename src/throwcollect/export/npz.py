@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import FRAMES, NO_IMAGES, ExportSource
+from throwcollect.export.throw_source import NO_IMAGES, ExportSource
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """A fixed date for the members of archives, so that the same data give the same bytes."""
@@ -44,6 +45,7 @@ archive = np.load("trajectories/{shard}.npz")
 k = list(archive["trial"]).index({trial})
 rows = slice(*archive["offsets"][k : k + 2])
 time_s, {position} = archive["time_s"][rows], archive["{position}"][rows]""",
+        frames=", ".join(f"`<sensor>_{name}`" for name in FRAMES.values()),
         notes=("`joints` and `moving_joints` name the joints; no array needs `allow_pickle`.",),
         over_time=tabulate_signals(source),
     )

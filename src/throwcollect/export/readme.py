@@ -13,7 +13,8 @@ from throwcollect.config.task_config import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG, TRIALS
-from throwcollect.export.throw_source import FRAMES, ExportSource, choose_streams, read_metadata
+from throwcollect.dataset.sensors import FRAMES
+from throwcollect.export.throw_source import ExportSource, choose_streams, read_metadata
 from throwcollect.robots.description import robot_of
 from throwcollect.version import __version__
 
@@ -26,6 +27,7 @@ class Layout:
         files: Contents of each file or directory.
         loading: Code that loads it.
         over_time: Lines of the section on time series.
+        frames: How what a sensor saw is named.
         notes: Further remarks for users, one paragraph each.
         hub: Tags and configurations of a dataset on a hub; None if the format is not one that hubs show.
         language: Language of `loading`.
@@ -34,6 +36,7 @@ class Layout:
     files: Mapping[str, str]
     loading: str
     over_time: Sequence[str]
+    frames: str = ""
     notes: Sequence[str] = ()
     hub: Mapping[str, Any] | None = None
     language: str = "python"
@@ -65,7 +68,12 @@ def render_card(source: ExportSource, layout: Layout) -> str:
         "",
         *(
             line
-            for note in (*layout.notes, _explain_rate(source), *_explain_targets(source), *_explain_sensors(source))
+            for note in (
+                *layout.notes,
+                _explain_rate(source),
+                *_explain_targets(source),
+                *_explain_sensors(source, layout),
+            )
             for line in (note, "")
         ),
         "The world frame has x forward, y left, z up; its origin is on the ground below the robot's base.",
@@ -120,13 +128,14 @@ def _explain_targets(source: ExportSource) -> list[str]:
     return [f"Every {noun} has a target, {names}, which is the same in all its samples, for policies to condition on."]
 
 
-def _explain_sensors(source: ExportSource) -> list[str]:
+def _explain_sensors(source: ExportSource, layout: Layout) -> list[str]:
     """Say what of that which sensors saw is here, if the dataset has some."""
     recorded, stored = (
         "; ".join(f"`{name}` {', '.join(streams)}" for name, streams in each.items())
         for each in (choose_streams(source.dataset.config, FRAMES), source.streams)
     )
-    return [f"The sensors recorded: {recorded}. Of this, here is: {stored or 'nothing'}."] if recorded else []
+    named = f"{stored}; named {layout.frames}" if stored else "nothing"
+    return [f"The sensors recorded: {recorded}. Of this, here is: {named}."] if recorded else []
 
 
 def tabulate_signals(source: ExportSource, *, columns: bool = False) -> list[str]:

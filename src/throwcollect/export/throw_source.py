@@ -18,6 +18,7 @@ from throwcollect.arguments import refuse_argument
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import BODY_COMPONENTS
 from throwcollect.episode.record import Samples
@@ -37,8 +38,6 @@ interpolate = lazily("scipy.interpolate", extra="export")
 
 NO_IMAGES = "none"
 """The way of leaving out what sensors saw."""
-FRAMES = {"color": "images", "depth": "depth_m", "segmentation": "labels", "scan": "ranges", "points": "points"}
-"""What `throw.sensors` calls the frames of each stream."""
 _PLACES = ("shard", "chunk_offset")
 """Columns that say where a recording lies in the dataset, which means nothing in an export."""
 

@@ -66,4 +66,4 @@ def _shade(picture: NDArray[np.generic]) -> NDArray[np.uint8]:
         return picture.astype(np.uint8)
     depth = picture.astype(np.float64)
     farthest = np.max(depth, initial=0.1, where=np.isfinite(depth))
-    return (255 * (1 - np.minimum(depth / farthest, 1))).astype(np.uint8)
+    return (255 * (1 - np.where(np.isfinite(depth), depth, farthest) / farthest)).astype(np.uint8)

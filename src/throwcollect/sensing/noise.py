@@ -41,10 +41,11 @@ class Noise:
     def distance(
         self, distance_m: NDArray[np.float32], frame: int, std_m: float, std_share: float = 0.0
     ) -> NDArray[np.float32]:
-        """Disturb depths or ranges of any shape; where one is dropped, it is NaN."""
+        """Disturb depths or ranges of any shape; none gets below zero, and where one is dropped, it is NaN."""
         if std_m or std_share:
             spread = np.float32(std_m) + np.float32(std_share) * np.where(np.isfinite(distance_m), distance_m, 0)
-            distance_m = distance_m + spread * self._draw_normal(frame, distance_m.shape)
+            disturbed = distance_m + spread * self._draw_normal(frame, distance_m.shape)
+            distance_m = np.where(np.isfinite(distance_m), np.maximum(disturbed, np.float32(0)), distance_m)
         if self._noise.dropout:
             dropped = self._draw(f"{frame}/dropout", distance_m.shape) < round(self._noise.dropout * 2**16)
             distance_m = np.where(dropped, np.float32(np.nan), distance_m)

@@ -70,7 +70,7 @@ def make_throw_routes(instances: Instances) -> APIRouter:
     @router.get("")
     def throws(instance: str, first: Annotated[int, Query(ge=0)] = 0) -> ThrowColumns:
         """How throws ended, where, and with which swept values, of a finished dataset or of one that grows."""
-        directory, plan = _find_plan(instances, instance)
+        directory, plan = find_plan(instances, instance)
         task = plan.config.task
         end = next(reversed(task.events), "landing")
         names = ("trial", "outcome", f"{end}_x_m", f"{end}_y_m")
@@ -99,7 +99,7 @@ def make_throw_routes(instances: Instances) -> APIRouter:
 
 def find_throw(instances: Instances, instance: str, trial: int) -> tuple[Plan, Episode]:
     """Find the plan of a run and the episode of a trial, with what its sensors saw."""
-    directory, plan = _find_plan(instances, instance)
+    directory, plan = find_plan(instances, instance)
     episode = _read_finished_episode if is_finished(directory) else _read_growing_episode
     found = episode(directory, plan, trial) if trial in plan.trials.numbers else None
     if found is None:
@@ -108,7 +108,7 @@ def find_throw(instances: Instances, instance: str, trial: int) -> tuple[Plan, E
     return plan, found
 
 
-def _find_plan(instances: Instances, instance: str) -> tuple[Path, Plan]:
+def find_plan(instances: Instances, instance: str) -> tuple[Path, Plan]:
     """Directory of the dataset of a run, and its plan."""
     directory = get_collection(instances, instance).context.directory
     try:

@@ -13,10 +13,11 @@ from tests.unit.robots.test_body_files import write_box, write_l_shape
 from throwcollect import verify_dataset
 from throwcollect.config.loader import load
 from throwcollect.config.scene import FileBodyConfig, MeshConfig
+from throwcollect.config.values import with_sensors
 from throwcollect.dataset.carried_robot import copy_carried, list_carried, pack_robot, unpack_robot
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import filter_trials, merge
+from throwcollect.derive.derivation import filter_trials, merge, render_sensors
 from throwcollect.export.export import export
 from throwcollect.robots.body_files import files_of
 
@@ -72,6 +73,19 @@ def test_the_same_shapes_from_elsewhere_are_the_same_collection(carrying: Path, 
     write_box(tmp_path / "elsewhere" / "table.obj", (0, 0, 0), (600, 1200, 51))
     done = call_here("up", tmp_path / "elsewhere" / "small.yaml", "--resume", carrying, *INPROCESS)
     assert (done.returncode, "scene.bodies.table.sha256" in done.stderr) == (2, True), done.stderr
+
+
+def test_sensors_see_robots_and_shapes_where_their_files_are_now(
+    carrying: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    camera = {"kind": "camera", "position_m": [1.2, -0.9, 3.0], "look_at_m": [1.2, -0.9, 0.2]}
+    sections = {"top": {**camera, "streams": ["segmentation"]}}
+    sensors = with_sensors(load(carrying / "config.yaml"), sections).sensors
+    render_sensors(carrying, tmp_path / "seen", sensors)
+    top = Dataset.open(tmp_path / "seen")[0].sensors["top"]
+    assert (top.labels[0] == top.label_names.index("thing")).mean() > 0.005
+    assert verify_dataset(tmp_path / "seen", replay=1) == []
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_pictures_in_tables_are_exact_and_say_what_is_left_out(seen: Path, tmp_p
         assert np.array_equal(stored, expected)
     card = (tmp_path / "out" / "README.md").read_text()
     assert "recorded: `front` depth; `head` color; `scan` scan; `side` color, depth. " in card
-    assert "here is: `head` color; `side` color." in card
+    assert "here is: `head` color; `side` color; named `observation.images.<sensor>`." in card
 
 
 def test_statistics_of_images_are_those_of_all_pixels(seen: Path, tmp_path: Path) -> None:
@@ -138,6 +138,8 @@ def test_hdf5_has_images_and_depths_as_robomimic_reads_them(seen: Path, tmp_path
                     assert stored.dtype == (np.uint8 if kind == "images" else np.float32)
                     assert stored.shape[3] == (3 if kind == "images" else 1)
                     assert np.array_equal(stored[:].reshape(len(stored), 1, -1), frames)
+                    assert stored.attrs["unit"] == ("1" if kind == "images" else "m")
+                    assert ("One sample later" in stored.attrs["description"]) == (group == "next_obs")
                 assert demo[f"obs/{name}_{ending}"].chunks[0] == 1
         assert "head_depth" not in demo["obs"]
 

@@ -15,7 +15,11 @@ from throwcollect.report.contents import Table
 from throwcollect.report.figures import Points, draw_map
 from throwcollect.report.outcomes import Outcomes
 
-SENSORS = {"side": {"kind": "camera"}, "deep": {"kind": "depth"}, "scan": {"kind": "lidar_2d"}}
+SENSORS = {
+    "side": {"kind": "camera"},
+    "deep": {"kind": "depth", "noise": {"dropout": 0.05}},
+    "scan": {"kind": "lidar_2d"},
+}
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +32,8 @@ def read(cell: str) -> np.ndarray:
     return np.array(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"), int)
 
 
+# A depth that is missing has no shade to be cast to.
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_each_camera_has_a_row_of_pictures_for_each_of_a_few_trials(seen: Dataset) -> None:
     (section,) = show_cameras(seen)
     side, side_pictures, deep, deep_pictures = section.blocks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -93,6 +94,17 @@ def test_another_camera_renders_the_picture_that_it_would_have_recorded(
     only_looks = served.client(served.keys.read_only)
     assert only_looks.get(f"{URL}/0/sensors").status_code == 200
     assert only_looks.post(f"{URL}/0/picture", json={"camera": camera, "time_s": 0}).status_code == 403
+
+
+def test_a_dataset_that_is_collected_anew_is_not_shown_as_it_was(
+    client: TestClient, dataset: Dataset, tmp_path: Path
+) -> None:
+    assert client.get(f"{URL}/0/sensors").json()[0]["section"]["rate_hz"] == 2
+    config = tmp_path / "small.yaml"
+    config.write_text(config.read_text().replace("rate_hz: 2", "rate_hz: 5"))
+    shutil.rmtree(dataset.directory)
+    collect_here(config, dataset.directory)
+    assert client.get(f"{URL}/0/sensors").json()[0]["section"]["rate_hz"] == 5
 
 
 def test_a_throw_without_sensors_has_none(client: TestClient, collected: Path, remember: Remember) -> None:
