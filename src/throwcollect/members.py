@@ -78,7 +78,10 @@ _KINDS = MappingProxyType(
         "policies": "collections.abc:Callable",
     }
 )
-"""The class of each family: its members are values of this class, or classes derived from it."""
+"""The class of each family: its members are values of this class (see `_VALUES`), or else classes derived from it."""
+
+_VALUES = frozenset({"robots", "exporters", "policies"})
+"""The families whose members are values; members of all other families are classes."""
 
 _DEBUG = "THROWCOLLECT_DEBUG"
 _WAY_OUT = f"mend or uninstall the package that it belongs to; {_DEBUG}=1 shows where it fails"
@@ -107,8 +110,13 @@ def load_member(family: str, name: str) -> Any:
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
     found, kind = _import(entry.value, what), _load(_KINDS[family])
-    if not (isinstance(found, kind) or (isinstance(found, type) and issubclass(found, kind))):
+    if not (isinstance(found, kind) if family in _VALUES else isinstance(found, type) and issubclass(found, kind)):
         raise ConfigError(f"{what}: {entry.value} should be of {kind.__module__}.{kind.__name__}, is {found!r}")
+    # A section of a configuration has its name as the default of a key; engines, runtimes and exporters have none.
+    key = getattr(found, "model_fields", {}).get("name")
+    if (given := getattr(found, "name", name) if key is None else key.default) != name:
+        sentence = f"{what}: {entry.value} should have the name of its entry point, {name!r}, has {given!r}"
+        raise ConfigError(sentence)
     return found
 
 

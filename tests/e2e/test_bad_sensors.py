@@ -43,6 +43,12 @@ SENSOR, LINE = "  eye: {{kind: camera, {}}}", "bad.yaml:5: sensors.eye."
             "",
             f"{LINE}look_at_m: should be another place than position_m",
         ),
+        # A camera in the world looks there by default.
+        (
+            SENSOR.format("position_m: [1, 0, 0.9]"),
+            "",
+            f"{LINE}look_at_m: should be another place than position_m, got [1.0, 0.0, 0.9]",
+        ),
         ("  eye: {kind: lidar_2d, streams: [color]}", "", f"{LINE}streams: unknown key"),
         ("  eye: {kind: lidar}", "", f"{LINE}kind: should be 'camera', 'depth', 'lidar_2d' or 'lidar_3d', got 'lidar'"),
         ("  ball: {kind: camera}", "", "bad.yaml:5: sensors.ball: should have another name, as ball is a frame or a"),

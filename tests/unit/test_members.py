@@ -18,6 +18,8 @@ from throwcollect.members import explain_failure, load_member, load_part, names_
 
 Say = Callable[..., subprocess.CompletedProcess[str]]
 BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
+ROBOT = "throwcollect.robots.robot:Robot"
+SPOON = "throwcollect.tools.spoon.spoon_config:SpoonConfig"
 ARM = """\
 robot: {name: planar_arm}
 task:
@@ -126,6 +128,12 @@ def find_what_is_said(text: str, family: str, value: str, directory: Path, monke
         ("engines", "broken:UNLICENSED", " cannot be loaded: SystemExit: 0"),
         ("robots", "broken:NUMBER", ": broken:NUMBER should be of throwcollect.robots.robot.Robot, is 3"),
         ("engines", "broken:NUMBER", ": broken:NUMBER should be of throwcollect.engines.engine.Engine, is 3"),
+        (
+            "robots",
+            ROBOT,
+            f": {ROBOT} should be of throwcollect.robots.robot.Robot, is <class '{ROBOT.replace(':', '.')}'>",
+        ),
+        ("tools", SPOON, f": {SPOON} should have the name of its entry point, 'mine', has 'spoon'"),
         ("tasks", "broken:Aimless", " cannot be loaded: TypeError: Aimless lacks until"),
     ],
 )

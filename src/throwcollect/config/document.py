@@ -162,7 +162,10 @@ def _copy(value: Any, left: list[int]) -> Any:
     if left[0] < 0:
         raise ValueError(f"there are more than {_MOST_VALUES} values")
     if isinstance(value, dict):
-        return {str(key): _copy(each, left) for key, each in value.items()}
+        copied = {str(key): _copy(each, left) for key, each in value.items()}
+        if len(copied) < len(value):
+            raise ValueError(f"a key is here twice, as a number and as a string: {', '.join(map(repr, value))}")
+        return copied
     return [_copy(each, left) for each in value] if isinstance(value, list) else value
 
 

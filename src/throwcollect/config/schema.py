@@ -276,7 +276,9 @@ class Config(Section):
             for joint in joints:
                 if joint in unknown:
                     yield f"{section}.{joint}", unknown_joint(joint, robot)
-                elif section == "task.end" and joint not in self.task.start:
+                elif (
+                    section == "task.end" and joint not in self.task.start and self.task.start.keys() <= {*robot.joints}
+                ):
                     yield f"{section}.{joint}", "start should name this joint, too"
 
     def without_run(self) -> Config:

@@ -60,7 +60,8 @@ class SensorConfig(Section):
     """Rotations about the axes x, y, z of the link, in this order, of a sensor that looks along x, with y to its left
     and z upwards. Null: zeros, or what follows from `look_at_m`."""
     look_at_m: Annotated[_Triple | None, Key(swept=True)] = None
-    """Point in the frame of the link at which the sensor looks, with the link's z upwards; in place of `rpy_rad`."""
+    """Point in the frame of the link at which the sensor looks, with the link's z upwards; in place of `rpy_rad`.
+    Null: the direction of `rpy_rad`; for a camera in the world without it, [1.0, 0.0, 0.9]."""
     rate_hz: Annotated[int, Field(ge=1, le=1000)] = 10
     """Frames per simulated second; must divide `record.rate_hz`."""
     latency_s: Annotated[float, Field(ge=0, le=5), Key(swept=True)] = 0.0
@@ -68,15 +69,15 @@ class SensorConfig(Section):
 
     @property
     def place(self) -> tuple[list[float], list[float] | None]:
-        """Its position in the link [m], and the point at which it looks; None if `rpy_rad` says where it looks."""
+        """Its position in the link [m], and the point at which it looks; None if `rpy_rad` gives its direction."""
         return self.position_m or [0.0, 0.0, 0.0], self.look_at_m
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
-        if self.look_at_m is not None:
-            if self.rpy_rad is not None:
-                yield "rpy_rad", "should be left out, as look_at_m says where the sensor looks"
-            if all(abs(at - here) < 1e-9 for at, here in zip(self.look_at_m, self.place[0], strict=True)):
-                yield "look_at_m", "should be another place than position_m"
+        position, look_at = self.place
+        if self.look_at_m is not None and self.rpy_rad is not None:
+            yield "rpy_rad", "should be left out, because look_at_m gives the direction"
+        if look_at is not None and all(abs(at - here) < 1e-9 for at, here in zip(look_at, position, strict=True)):
+            yield "look_at_m", f"should be another place than position_m, got {look_at}"
 
 
 class PictureConfig(SensorConfig):
@@ -99,7 +100,7 @@ class PictureConfig(SensorConfig):
 
     @property
     def place(self) -> tuple[list[float], list[float] | None]:
-        """Its position in the link [m], and the point at which it looks; None if `rpy_rad` says where it looks."""
+        """Its position in the link [m], and the point at which it looks; None if `rpy_rad` gives its direction."""
         if self.link != "world":
             return super().place
         position = self.position_m or [1.0, -3.2, 1.5]

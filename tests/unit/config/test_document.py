@@ -113,6 +113,7 @@ def test_a_pipe_as_configuration_is_refused_without_waiting(tmp_path):
     [
         ("a: 1\nb: c: d\n", "run.yaml:2: not valid YAML: mapping values are not allowed here"),
         ("a: 1\nb: !units 3\n", "run.yaml:2: not valid YAML: could not determine a constructor for the tag '!units'"),
+        ('{1: a, "1": b}', "run.yaml: not valid YAML: a key is here twice, as a number and as a string: 1, '1'"),
         ("a: 1\nb: {c: 1, c: 2}\n", 'run.yaml:2: not valid YAML: found duplicate key "c"'),
         ("a: &a\n  b: *a\n", "run.yaml: not valid YAML: values are nested too deeply"),
         ("a: " + 2_000 * "[", "run.yaml: not valid YAML: values are nested too deeply"),

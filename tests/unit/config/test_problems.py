@@ -38,6 +38,10 @@ from throwcollect.errors import ConfigError, PlanError, Problem
             ["task.end.arm_rihgt_4_joint: Talos has no joint 'arm_rihgt_4_joint'; did you mean 'arm_right_4_joint'?"],
         ),
         (
+            "task: {start: {torso_1_jont: 0}, end: {torso_1_joint: 1}}",
+            ["task.start.torso_1_jont: Talos has no joint 'torso_1_jont'; did you mean 'torso_1_joint'?"],
+        ),
+        (
             "trials: 1\nsweep: {parameters: {task.durations_s: {values: [1]}}}",
             ["sweep.parameters.task.durations_s: unknown key; did you mean 'task.duration_s'?"],
         ),

@@ -97,7 +97,7 @@ def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint:
 
 
 def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None:
-    """Print the summary of a collection, and how to look into its dataset, unless that is in a volume."""
+    """Print the summary of a collection, and how to look into its dataset, if its directory is known."""
     show(found, describe(found), json=as_json)
     look = command("dataset", "info", directory) if directory is not None else None
     if look is not None and not as_json:

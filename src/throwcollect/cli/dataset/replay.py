@@ -64,8 +64,8 @@ def _compare_engines(directory: Path, engine: str, trials: Sequence[int], *, jso
     deviations = list(simulate_with(directory, engine, trials))
     found = distributions(deviations)
     differ = sum(each.stored != each.again for each in deviations)
-    columns = ("throws", "mean", "rms", "median", "largest")
-    rows = [(each.column, *(f"{getattr(each, name):.3g}" for name in columns)) for each in found]
+    columns = ("mean", "rms", "median", "largest")
+    rows = [(each.column, f"{each.throws}", *(f"{getattr(each, name):.3g}" for name in columns)) for each in found]
     counts = f"{directory}: {format_count(len(deviations), 'throw')} by {engine}; {differ} with another outcome"
-    lines = [*align([(f"by {engine}, above stored", *columns), *rows], numbers=True), counts]
+    lines = [*align([(f"by {engine}, above stored", "throws", *columns), *rows], numbers=True), counts]
     show({"throws": deviations, "columns": found}, *lines, json=json)

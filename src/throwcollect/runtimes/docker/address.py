@@ -54,7 +54,7 @@ def check_socket() -> None:
 
 
 def no_answer(reason: str) -> WorkerError:
-    """The error that no engine answers; `reason` says why in a few words."""
+    """The error that no engine answers; `reason` is the cause in a few words."""
     return WorkerError(
         f"no Docker engine answers at {engine_address()}: {reason}",
         hint="start it, let DOCKER_HOST name another one, or use processes: --runtime local",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from docker.client import DockerClient
 from docker.errors import ImageNotFound
@@ -16,6 +16,7 @@ from throwcollect.runtimes.docker.address import engine_address
 from throwcollect.runtimes.docker.container_options import (
     image,
     mount_source,
+    mount_target,
 )
 from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors
 from throwcollect.runtimes.docker.host_paths import DEVICES, is_allowed_device, refusal
@@ -61,7 +62,8 @@ def _problems(
     key: str, section: NodeContainerConfig, networks: set[str], root: str, *, mounts: str
 ) -> Iterator[Problem]:
     for index, mount in enumerate(section.mounts):
-        if (wrong := _wrong_mount(mount_source(mount), root)) is not None:
+        wrong = _wrong_mount(mount_source(mount), root) or _wrong_target(mount_target(mount))
+        if wrong is not None:
             yield Problem(wrong, f"{key}.{mounts}.{index}")
     for index, device in enumerate(section.options.get("devices", [])):
         if (wrong := _wrong_device(Path(device.partition(":")[0]))) is not None:
@@ -70,6 +72,13 @@ def _problems(
         if network not in networks:
             wrong = f"the Docker engine has no network {network}; create it first"
             yield Problem(wrong, f"{key}.networks.{index}")
+
+
+def _wrong_target(target: PurePosixPath) -> str | None:
+    """Why nothing must be mounted at a path in a container; None if it may."""
+    first = target.parts[1:2]
+    taken = not first or first[0] in ("data", "key")
+    return f"{target} is refused, as the dataset, the key or the image is there in the container" if taken else None
 
 
 def _wrong_mount(source: Path, root: str) -> str | None:

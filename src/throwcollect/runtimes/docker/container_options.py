@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import posixpath
 import socket
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from docker.types import DeviceRequest, EndpointConfig, LogConfig, Mount, Ulimit
@@ -166,6 +167,11 @@ def container_options(
 def mount_source(mount: str) -> Path:
     """Path on this machine that a mount of the configuration names."""
     return Path(mount.partition(":")[0])
+
+
+def mount_target(mount: str) -> PurePosixPath:
+    """Path in the container that a mount of the configuration names."""
+    return PurePosixPath(posixpath.normpath(mount.split(":")[1]))
 
 
 def _bind(mount: str) -> Mount:

@@ -91,7 +91,7 @@ class Containers:
         self._run = run
         self._logs = logs
         self._warn = warn
-        self._warned = False
+        self._warned = self._unwritable = False
         self._containers: dict[str, _Container] = {}
         self._pool = ThreadPoolExecutor(_AT_ONCE)
         self._copying = threading.Lock()
@@ -161,7 +161,7 @@ class Containers:
         if not self.given_up:
             self.remove([node for node in self._containers if node != ROUTER], grace_s=_GRACE_S)
             self.remove([ROUTER], grace_s=_GRACE_S)
-            # The network cannot be removed while somebody else's container is in it.
+            # The network cannot be removed while a foreign container is in it.
             with suppress(WorkerError):
                 remove(self._client, self._run)
             with suppress(*ENGINE_ERRORS):
@@ -250,8 +250,15 @@ class Containers:
                 if len(new) < _TAIL_LINES:
                     break
             if new:
-                with open(open_log(self._logs.path(container.node)), "ab") as log:
-                    log.write(b"".join(text + b"\n" for _, text in new))
+                try:
+                    with open(open_log(self._logs.path(container.node)), "ab") as log:
+                        log.write(b"".join(text + b"\n" for _, text in new))
+                except OSError as error:
+                    # A full disk is no silence of the engine.
+                    if not self._unwritable:
+                        self._warn(f"logs of nodes cannot be written: {describe_error(error)}")
+                    self._unwritable = True
+                    return
                 container.printed = new[-1][0]
 
 

@@ -48,6 +48,14 @@ def test_a_data_directory_may_be_mounted(problems: Check, tmp_path: Path) -> Non
     assert problems(mounts=[f"{tmp_path}/models:/models:ro"]) == []
 
 
+@pytest.mark.parametrize("target", ["/data/episodes", "/key", "/", "/a/../data", "//data"])
+def test_nothing_is_mounted_over_the_dataset_the_key_or_the_image(problems: Check, tmp_path: Path, target: str) -> None:
+    (tmp_path / "models").mkdir()
+    (found,) = problems(mounts=[f"{tmp_path}/models:/other", f"{tmp_path}/models:{target}"])
+    assert found.startswith("mounts.1: /")
+    assert found.endswith("is refused, as the dataset, the key or the image is there in the container")
+
+
 @pytest.mark.parametrize("place", ["/etc", "/var/run", "/usr/share", "/"])
 def test_mounting_a_link_to_a_part_of_the_system_is_refused(problems: Check, tmp_path: Path, place: str) -> None:
     (tmp_path / "link").symlink_to(place)

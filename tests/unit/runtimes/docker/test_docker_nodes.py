@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -146,6 +147,23 @@ def test_the_output_of_a_container_is_in_the_log_once_and_before_its_end_is_know
     (end,) = until(lambda: not runtime.running(), runtime=runtime)
     assert (end.code, end.log) == (3, log.read_text().strip())
     assert log.read_text().splitlines() == engine.printed[name]
+
+
+def test_a_log_that_cannot_be_written_is_no_silence_of_the_engine(
+    engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch, warnings: list[str]
+) -> None:
+    def is_full(_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(containers, "open_log", is_full)
+    runtime = make()
+    runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
+    engine.printed[name := "throwcollect-run-1a2b-sim_0"] = ["one"]
+    until(lambda: runtime.handle("sim_0"), runtime=runtime)
+    engine.end(name, 3)
+    (end,) = until(lambda: not runtime.running(), runtime=runtime)
+    assert end.code == 3
+    assert ["logs of nodes cannot be written" in each for each in warnings] == [True]
 
 
 @pytest.mark.parametrize(
