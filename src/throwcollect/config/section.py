@@ -21,7 +21,7 @@ from throwcollect.config.kinds import ContradictionError
 class Section(BaseModel):
     """Base of all sections: unknown keys are errors, values never change, and keys must not contradict each other."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         """Return the section itself, as its values never change; Pydantic copies defaults of keys that are left out."""

@@ -37,7 +37,6 @@ from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
-from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
@@ -286,6 +285,9 @@ class Throw:
 
     def _render(self, config: Config) -> tuple[Chunk, ...]:
         header, samples = self._recording
+        # Commands that only read would be slower to begin.
+        from throwcollect.sensing.recorder import SensorRecorder
+
         return SensorRecorder(Channels(config, full_description(config))).record(config, header.trial, samples)
 
     def _open_sensors(self, config: Config, chunks: Sequence[Chunk]) -> dict[str, SensorFrames]:

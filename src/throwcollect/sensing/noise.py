@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 from statistics import NormalDist
 
 import numpy as np
@@ -11,11 +12,6 @@ from numpy.typing import NDArray
 from throwcollect.config.sensors import CameraNoise, SensorNoise
 
 _BITS = 12
-# Rounded, so that the last bits of a logarithm do not matter.
-_NORMAL = np.array(
-    [round(NormalDist().inv_cdf((number + 0.5) / 2**_BITS), 6) for number in range(2**_BITS)], np.float32
-)
-"""Values of a standard normal distribution that are all equally likely."""
 
 
 class Noise:
@@ -52,7 +48,7 @@ class Noise:
         return distance_m
 
     def _draw_normal(self, frame: int, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        normal: NDArray[np.float32] = _NORMAL[self._draw(str(frame), shape) >> (16 - _BITS)]
+        normal: NDArray[np.float32] = _list_normal()[self._draw(str(frame), shape) >> (16 - _BITS)]
         return normal
 
     def _draw(self, name: str, shape: tuple[int, ...]) -> NDArray[np.uint16]:
@@ -62,3 +58,10 @@ class Noise:
         # The raw output of Philox is fixed; what NumPy's generators make of it may change with their version.
         raw = np.random.Philox(key=key).random_raw(-(-count // 4)).astype("<u8")
         return raw.view("<u2")[:count].reshape(shape)
+
+
+@cache
+def _list_normal() -> NDArray[np.float32]:
+    """List values of a standard normal distribution that are all equally likely."""
+    # Rounded, so that the last bits of a logarithm do not matter.
+    return np.array([round(NormalDist().inv_cdf((step + 0.5) / 2**_BITS), 6) for step in range(2**_BITS)], np.float32)

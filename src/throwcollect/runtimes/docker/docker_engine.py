@@ -37,7 +37,7 @@ def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
     """Connect to the engine at `engine_address`; each request waits for `timeout_s` [s] at most.
 
     An engine of another machine is refused: its containers have no directories of this one, and processes of this one
-    do not reach them. One with a socket in the file system is here; one that is reached by TCP or SSH gives its address.
+    do not reach them. One with a socket in the file system is here; one that is reached by TCP or SSH gives an address.
     """
     # Not all versions of the client look at the context.
     address = engine_address()
