@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeGuard, get_args
 
 from throwcollect.dataset.directory import JOURNAL
 from throwcollect.dataset.lock import lock
@@ -31,6 +31,8 @@ Event = Literal["opened", "exposed", "recovered", "lease", "commit", "fail", "lo
 - ``shard``: a file was finished: `name`.
 - ``finished``: the dataset was finished: `wall_s`, the real time that it took in all [s], as the data card has it.
 """
+_END_OF_TIME_S = 1e11
+"""The year 5138; larger numbers are no times, and not every integer of a JSON text fits a float."""
 
 
 class Journal:
@@ -94,8 +96,18 @@ def read_journal(path: Path) -> Iterator[JournalLine]:
     """Read the events of a journal, in order; a missing file has none, and damaged lines are left out."""
     for entry in _read_lines(path):
         time_s, wall_s, outcome = (entry.get(name) for name in ("time", "wall_s", "outcome"))
-        if entry.get("event") in get_args(Event) and isinstance(time_s, int | float):
+        if (
+            entry.get("event") in get_args(Event)
+            and _is_time(time_s)
+            and (wall_s is None or _is_time(wall_s))
+            and isinstance(outcome, str | None)
+        ):
             yield JournalLine(entry["event"], time_s, wall_s, outcome)
+
+
+def _is_time(value: object) -> TypeGuard[float]:
+    """Whether a value is a time [s], and not NaN or a number beyond all times."""
+    return isinstance(value, int | float) and 0 <= value < _END_OF_TIME_S
 
 
 def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:
@@ -144,7 +156,7 @@ def read_commits(
 
 def _parse(line: bytes) -> dict[str, Any]:
     """Read the fields of a line; none if it was cut off or damaged."""
-    with suppress(ValueError):
+    with suppress(ValueError, RecursionError):
         entry = json.loads(line)
         if isinstance(entry, dict):
             return entry

@@ -62,6 +62,11 @@ def test_an_incomplete_line_in_the_journal_does_not_spoil_the_next(tmp_path: Pat
 DAMAGED = {
     "another event": '{"event": "nonsense", "time": 1}',
     "no time": '{"event": "commit"}',
+    "a time beyond all numbers": f'{{"event": "commit", "time": {"9" * 400}}}',
+    "a time that is NaN": '{"event": "commit", "time": NaN}',
+    "a duration that is NaN": '{"event": "finished", "time": 2, "wall_s": NaN}',
+    "an outcome that is a list": '{"event": "commit", "time": 2, "outcome": ["landed"]}',
+    "a list without end": f'["lost", "exposed", {"[" * 100_000}',
 }
 
 
