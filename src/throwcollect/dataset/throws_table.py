@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
@@ -18,7 +19,7 @@ from throwcollect.dataset.misses import Misses
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.members import explain_failure
-from throwcollect.sweep.arrow_column import find_trial, make_table
+from throwcollect.sweep.arrow_column import find_trial, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
@@ -33,12 +34,14 @@ Row = dict[str, Any]
 
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
+_PLACE_COLUMNS = ("shard", "chunk_offset", "samples", "digest")
+"""Columns that are null together, where a trial has no episode."""
 
 
 def place_columns(shard: str, chunk_offset: int, episode: Episode) -> Row:
     """Make the columns that say where an episode lies, with the offset of its chunk [bytes], and which one it is."""
-    samples, digest = episode.header.samples, episode.digest
-    return {"shard": shard, "chunk_offset": chunk_offset, "samples": samples, "digest": digest}
+    values = (shard, chunk_offset, episode.header.samples, episode.digest)
+    return dict(zip(_PLACE_COLUMNS, values, strict=True))
 
 
 def make_field(name: str, kind: pa.DataType, description: str, *, unit: str | None = None) -> pa.Field:
@@ -176,4 +179,7 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
     # Names of recordings become paths.
     if unknown := set(table["shard"].to_pylist()) - {None, *list_shards(plan)}:
         raise DatasetError(f"shard is {min(unknown)!r} in some row, which no row of this plan can have", path=path)
+    there = np.array([read_validity(table[name].combine_chunks()) for name in _PLACE_COLUMNS])
+    if (wrong := np.flatnonzero(there.any(axis=0) & ~there.all(axis=0))).size:
+        raise DatasetError("has only a part of the place of an episode", path=path, place=f"row {wrong[0] + 1}")
     return table
