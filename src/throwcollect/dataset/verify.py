@@ -35,7 +35,7 @@ from throwcollect.dataset.manifest import Finding, find_changed_files, list_prom
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.provenance import find_changes
 from throwcollect.dataset.summary_files import combine_digests, metadata_text
-from throwcollect.dataset.throws_table import read_throws
+from throwcollect.dataset.throws_table import ThrowsTable, read_throws
 from throwcollect.dataset.verify_recording import RecordingReport, check_recording
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import read_text
@@ -150,6 +150,11 @@ def _read_tables(directory: Path) -> _Tables:
             tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
         file = THROWS
         tables.throws = read_throws(directory, plan)
+        # Exports take units over, while descriptions are for people alone.
+        for column, expected in zip(tables.throws.schema, ThrowsTable.of(plan).schema, strict=True):
+            stated, unit = ((each.metadata or {}).get(b"unit") for each in (column, expected))
+            if stated != unit:
+                tables.findings.append(Finding(THROWS, column.name, f"has the unit {stated!r}, should be {unit!r}"))
     except ForeignPlanError:
         problem = f"is not the configuration that {PLAN} was made for; one of the two was changed"
         tables.findings.append(Finding(CONFIG, "", problem))

@@ -71,6 +71,14 @@ def lose_row(directory: Path) -> None:
     change_table(directory / THROWS, "digest", 4, None)
 
 
+def change_unit(directory: Path) -> None:
+    table = pq.read_table(directory / THROWS)
+    index = table.schema.get_field_index("task_duration_s")
+    field = table.schema.field(index)
+    other = field.with_metadata({**field.metadata, b"unit": b"ms"})
+    pq.write_table(table.set_column(index, other, table.column(index)), directory / THROWS)
+
+
 def text(name: str, old: str, new: str) -> Change:
     return lambda directory: replace_text(directory / name, old, new)
 
@@ -114,6 +122,7 @@ CHANGES: dict[str, tuple[Change, str, str, str]] = {
     "landing": (change("landing_x_m", 2, 1.25), "quick_00000.mcap", "trial 2", r"landing_x_m = 1\.25 instead of"),
     "outcome": (change("outcome", 4, "timeout"), SHARD, "trial 4", "outcome = 'timeout' instead of 'landed'"),
     "lost row": (lose_row, SHARD, "byte", "does not place here: trial 4"),
+    "unit": (change_unit, THROWS, "task_duration_s", "has the unit b'ms'"),
     "removed row": (take_rows(0, 1, 2, 3, 4, 5), THROWS, "", "not the 7 trials of the plan"),
     "planned value": (change("task.duration_s", 5, 1.0, table=PLAN), PLAN, "trial 5", "its values and seed give"),
     "seed": (text("config.yaml", "seed: 0", "seed: 1"), "config.yaml", "", "one of the two was changed"),
