@@ -27,7 +27,7 @@ from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import ThrowsTable, find_row, read_throws, read_throws_table
-from throwcollect.dataset.verify import find_damage, read_list
+from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
@@ -201,7 +201,7 @@ def _read_stored_config(directory: Path) -> Config | None:
 def _read_stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan | None:
     """Read the plan; None if it is missing or damaged, and the configuration is there, from which it is drawn again."""
     try:
-        return Plan.read(directory / PLAN, stored or config)
+        plan = Plan.read(directory / PLAN, stored or config)
     except ForeignPlanError:
         raise
     except DatasetError:
@@ -209,6 +209,7 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
         if stored is None:
             raise
         return None
+    return None if find_wrong_trials(plan) else plan
 
 
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.unit.dataset.damage import change_table
 from tests.unit.dataset.kills import KilledAt
 
 from throwcollect.config.loader import load
@@ -103,6 +104,15 @@ def test_a_missing_or_damaged_plan_is_made_again(
 ) -> None:
     plan = directory / "plan.parquet"
     plan.unlink() if length is None else plan.write_bytes(prepared["plan.parquet"][:length])
+    resume(config_with(), directory, sweep_directory=directory)
+    assert contents(directory) == prepared
+
+
+@pytest.mark.parametrize(("column", "value"), [("task.duration_s", 1.1), ("seed", 42)])
+def test_a_plan_whose_digests_do_not_fit_its_trials_is_made_again(
+    directory: Path, prepared: dict[str, bytes], column: str, value: float
+) -> None:
+    change_table(directory / "plan.parquet", column, 2, value)
     resume(config_with(), directory, sweep_directory=directory)
     assert contents(directory) == prepared
 
