@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 
 from throwcollect.config.loader import load, load_locating_errors
@@ -32,23 +32,25 @@ def reading_config(directory: Path, file: Path | None = None, overrides: Sequenc
             f"{directory}: {describe_other(directory)}", expected="a directory that throwcollect up has made"
         )
     refuse_pointers(directory)
-    with (
-        nullcontext() if file else _explaining_damage(directory),
-        load_locating_errors(file or config_path(directory), overrides) as config,
-    ):
+    with ExitStack() as places:
+        with nullcontext() if file else _explaining_damage(directory):
+            config = places.enter_context(load_locating_errors(file or config_path(directory), overrides))
         yield config
 
 
 @contextmanager
 def _explaining_damage(directory: Path) -> Iterator[None]:
-    """Turn an error of the file of a configuration itself, and not of a key, into one of its dataset."""
+    """Add to errors of a dataset's own configuration how to restore it; those of the whole file are of the dataset."""
     try:
         yield
     except ConfigError as error:
         first = error.problems[0]
-        if first.key or first.path != directory / CONFIG:
+        # Overrides are in no file.
+        if first.path != directory / CONFIG:
             raise
         # Nothing else in the directory holds the configuration.
         hint = f"{command('up', 'CONFIG', '--resume', directory)}, with the configuration that it was collected with"
+        if first.key:
+            raise ConfigError(error.problems, expected=error.expected, hint=error.hint or hint) from error
         place = f"line {first.line}" if first.line else ""
         raise DatasetError(first.message, path=first.path, place=place, hint=hint) from error

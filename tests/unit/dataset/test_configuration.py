@@ -51,6 +51,16 @@ def test_a_missing_or_damaged_configuration_is_an_error_of_the_dataset(
         look(dataset)
 
 
+@pytest.mark.parametrize("look", [throwcollect.load, info, prepare_to_resume])
+def test_a_wrong_key_in_the_configuration_of_a_dataset_has_the_hint_that_restores_it(
+    dataset: Path, look: Callable[[Path], object]
+) -> None:
+    path = dataset / "config.yaml"
+    path.write_text(path.read_text().replace("trials: ", "trails: "))
+    with pytest.raises(ConfigError, match=r"config\.yaml:\d+: trails: unknown key.*\n  try: .* up CONFIG --resume "):
+        look(dataset)
+
+
 def test_resuming_with_the_original_file_restores_a_missing_configuration(dataset: Path, tmp_path: Path) -> None:
     config = load(dataset / "config.yaml")
     (dataset / "config.yaml").unlink()
