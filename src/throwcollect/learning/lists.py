@@ -12,7 +12,7 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.learning.aiming import Aim
-from throwcollect.sweep.point_file import read_numbers, read_table
+from throwcollect.sweep.point_file import problem_of_row, read_numbers, read_table
 from throwcollect.wording import join_names
 
 
@@ -37,8 +37,8 @@ def read_rows(
         raise ConfigError([Problem("the column is here twice", twice[0], path)])
     numbers = read_numbers(table, columns, path)
     for row, column in np.argwhere(~np.isfinite(numbers)).tolist():
-        sentence = f"row {row + 1}: should be a finite number, got {numbers[row, column]}"
-        raise ConfigError([Problem(sentence, columns[column], path)])
+        sentence = f"should be a finite number, got {numbers[row, column]}"
+        raise ConfigError([problem_of_row(sentence, columns[column], path, row)])
     rows: list[list[float]] = numbers.tolist()
     return rows
 

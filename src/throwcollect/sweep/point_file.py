@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
 """Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
+_BLANKS = re.compile(r"^[ \t]+$", re.MULTILINE)
+"""Lines that hold nothing but blanks."""
 
 MOST_PROBLEMS = 20
 
@@ -58,22 +62,24 @@ def read_table(path: Path, key: str) -> pa.Table:
     import pyarrow.csv
     import pyarrow.parquet as pq
 
-    if path.suffix not in (".csv", ".parquet"):
+    if path.suffix.lower() not in (".csv", ".parquet"):
         raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", key)])
     try:
         if path.is_dir():
             raise ConfigError([Problem(f"should be a file, got the directory {path}", key)])
         if not path.is_file():
             raise ConfigError([Problem(f"there is no file {path}{suggest_path(path)}", key)])
-        if path.suffix == ".parquet":
+        if not _is_csv(path):
             table = pq.ParquetFile(path).read()
             table = table.drop_columns([name for name in table.column_names if _UNNAMED_INDEX.fullmatch(name)])
         else:
-            # In one block, as the types of columns follow from the first block.
-            whole = pa.csv.ReadOptions(block_size=path.stat().st_size + 1)
+            # Arrow skips empty lines, but not lines of blanks.
+            data = _BLANKS.sub("", path.read_text(encoding="utf-8")).encode()
+            # In one block, as the types of columns follow from the first block; errors of one thread have the row.
+            whole = pa.csv.ReadOptions(block_size=len(data) + 1, use_threads=False)
             empty = pa.csv.ConvertOptions(null_values=["", " "])
-            table = pa.csv.read_csv(path, read_options=whole, convert_options=empty)
-            table = table.rename_columns([name.strip() for name in table.column_names])
+            table = pa.csv.read_csv(io.BytesIO(data), read_options=whole, convert_options=empty)
+            table = table.rename_columns([_strip(name) for name in table.column_names])
     except (ValueError, OSError) as error:
         raise ConfigError([Problem(f"cannot be read: {error}", key, path)]) from error
     if not len(table):
@@ -85,11 +91,30 @@ def read_numbers(table: pa.Table, names: Sequence[str], path: Path) -> NDArray[n
     """Read columns of a table of `read_table`, NaN where a cell is empty, shape ``(n_rows, n_names)``."""
     import pyarrow as pa
 
+    is_number = (pa.types.is_floating, pa.types.is_integer, pa.types.is_null)
     types = {name: table.schema.field(name).type for name in names}
-    numbers = (pa.types.is_floating, pa.types.is_integer, pa.types.is_null)
-    if wrong := [name for name, kind in types.items() if not any(is_kind(kind) for is_kind in numbers)]:
+    texts = {name for name, kind in types.items() if not any(is_kind(kind) for is_kind in is_number)}
+    if wrong := [name for name in names if name in texts and not _is_csv(path)]:
         raise ConfigError([Problem(f"should be a column of numbers, got {types[each]}", each, path) for each in wrong])
-    return np.column_stack([table[name].cast(pa.float64()).to_numpy() for name in names])
+    # Integers beyond 2^53 are rounded, as other numbers are.
+    return np.column_stack(
+        [
+            _parse(table[name], name, path) if name in texts else table[name].cast(pa.float64(), safe=False).to_numpy()
+            for name in names
+        ]
+    )
+
+
+def _parse(column: pa.ChunkedArray, name: str, path: Path) -> NDArray[np.float64]:
+    """Read the numbers of a column that Arrow takes for text, as quotes are around one or some cell is no number."""
+    numbers = []
+    for row, cell in enumerate(column.cast("string").to_pylist()):
+        text = _strip(cell or "")
+        try:
+            numbers.append(float(text or "nan"))
+        except ValueError as error:
+            raise ConfigError([problem_of_row(f"should be a number, got {text!r}", name, path, row)]) from error
+    return np.array(numbers)
 
 
 def encode_points(points: Points) -> bytes:
@@ -124,7 +149,7 @@ def _find_target_problems(points: Points, path: Path, config: Config) -> Iterato
     far = np.argwhere(np.abs(points.targets) > LARGEST_TARGET)
     for row, column in far[:MOST_PROBLEMS].tolist():
         sentence = f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}"
-        yield _of_row(f"{sentence}, got {points.targets[row, column]}", points.target_names[column], path, row)
+        yield problem_of_row(f"{sentence}, got {points.targets[row, column]}", points.target_names[column], path, row)
     there = ~np.isnan(points.targets)
     # Few combinations of targets occur, so each combination is checked once, however many rows have it.
     for pattern in np.unique(there, axis=0):
@@ -132,11 +157,25 @@ def _find_target_problems(points: Points, path: Path, config: Config) -> Iterato
         wrong = config.task.find_wrong_targets(names)
         for row in np.flatnonzero((there == pattern).all(axis=1))[:MOST_PROBLEMS] if wrong else ():
             for name, sentence in wrong.items():
-                yield _of_row(sentence, name, path, row)
+                yield problem_of_row(sentence, name, path, row)
 
 
-def _of_row(sentence: str, key: str, path: Path, row: int) -> Problem:
-    return Problem(f"row {row + 1}: {sentence}", key, path)
+def problem_of_row(sentence: str, key: str, path: Path, row: int) -> Problem:
+    """Make a problem of a row, which is counted from 0 here, in CSV files by lines, and in Parquet files from 1."""
+    if not _is_csv(path):
+        return Problem(f"row {row + 1}: {sentence}", key, path)
+    with path.open(encoding="utf-8") as file:
+        filled = (number for number, line in enumerate(file, start=1) if line.strip())
+        return Problem(sentence, key, path, next(islice(filled, row + 1, None)))
+
+
+def _is_csv(path: Path) -> bool:
+    return path.suffix.lower() == ".csv"
+
+
+def _strip(cell: str) -> str:
+    """Take off blanks, and quotes behind blanks, which Arrow takes for a part of the text."""
+    return cell.strip().strip('"').strip()
 
 
 def _find_value_problems(points: Points, path: Path, config: Config) -> Iterator[Problem]:
@@ -145,7 +184,7 @@ def _find_value_problems(points: Points, path: Path, config: Config) -> Iterator
         if not _find_refusals(config, key, np.array([column.min(), column.max()])):
             continue
         for row, sentence in _find_refusals(config, key, column):
-            yield _of_row(sentence, key, path, row)
+            yield problem_of_row(sentence, key, path, row)
 
 
 def _find_refusals(config: Config, key: str, column: NDArray[np.float64]) -> list[tuple[int, str]]:

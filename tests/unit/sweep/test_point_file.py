@@ -44,6 +44,19 @@ def test_rows_of_a_csv_file_are_trials_and_columns_are_keys(csv):
     assert points.values.tolist() == [[0.1, 1.0], [0.2, 1.5]]
 
 
+def test_blanks_quotes_and_lines_of_blanks_do_not_count(csv, tmp_path):
+    path = csv('  \n"ball.mass_kg", "task.duration_s" \r\n0.1, "1"\n \t\n').rename(tmp_path / "LIST.CSV")
+    points = read_points(path, Config())
+    assert points.keys == ("ball.mass_kg", "task.duration_s")
+    assert points.values.tolist() == [[0.1, 1.0]]
+
+
+@pytest.mark.parametrize("number", [2**53 + 1, 2**63 - 1])
+def test_an_integer_that_no_float_holds_is_a_problem_of_its_row(csv, parquet, number):
+    assert problems(csv(f"ball.mass_kg\n{number}\n"))[0].startswith("list.csv:2: ball.mass_kg: should be less")
+    assert problems(parquet({"ball.mass_kg": [number]}))[0].startswith("list.parquet: ball.mass_kg: row 1: should be")
+
+
 def test_rows_of_a_parquet_file_are_trials_and_columns_are_keys(parquet):
     path = parquet({"ball.mass_kg": pa.array([0.1, 0.2]), "task.duration_s": pa.array([1, 2], pa.int16())})
     points = read_points(path, Config())
@@ -72,18 +85,19 @@ def test_the_row_numbers_of_pandas_are_not_taken_for_a_key(tmp_path):
             "seed,ball.mass_kg,ball.mass_kg\n1,1,1\n",
             ["list.csv: seed: cannot vary from trial to trial", "list.csv: ball.mass_kg: the column is here twice"],
         ),
-        (HEADER + "0.1,1\nheavy,1\n", ["list.csv: ball.mass_kg: should be a column of numbers, got string"]),
-        (HEADER + "0.1,1\n0.1,\n", ["list.csv: task.duration_s: row 2: should be a finite number, got nan"]),
+        (HEADER + "0.1,1\n\n \nheavy,1\n", ["list.csv:5: ball.mass_kg: should be a number, got 'heavy'"]),
+        (HEADER + "true,1\n", ["list.csv:2: ball.mass_kg: should be a number, got 'true'"]),
+        (HEADER + "0.1,1\n0.1,\n", ["list.csv:3: task.duration_s: should be a finite number, got nan"]),
         (
             HEADER + "0.1,1\n\n3,1\n0.1,0\n",
             [
-                "list.csv: ball.mass_kg: row 2: should be less than or equal to 2, got 3.0",
-                "list.csv: task.duration_s: row 3: should be greater than or equal to 0.1, got 0.0",
+                "list.csv:4: ball.mass_kg: should be less than or equal to 2, got 3.0",
+                "list.csv:5: task.duration_s: should be greater than or equal to 0.1, got 0.0",
             ],
         ),
     ],
 )
-def test_problems_of_a_csv_file_name_their_rows(csv, content, messages):
+def test_problems_of_a_csv_file_name_their_lines(csv, content, messages):
     assert problems(csv(content)) == messages
 
 
@@ -112,6 +126,8 @@ def test_a_file_that_is_no_table_is_a_problem(tmp_path):
     assert "File name too long" in problems(tmp_path / f"{300 * 'x'}.csv")[0]
     broken = tmp_path / "broken.parquet"
     broken.write_bytes(b"no Parquet at all")
+    (tmp_path / "latin.csv").write_bytes(b"ball.mass_kg\n\xff\n")
+    assert "latin.csv: sweep.file: cannot be read: 'utf-8' codec" in problems(tmp_path / "latin.csv")[0]
     assert problems(broken)[0].startswith("broken.parquet: sweep.file: cannot be read: ")
     (tmp_path / "points.csv").touch()
     near = "there is no file point.csv; did you mean 'points.csv'?"
@@ -150,14 +166,14 @@ def test_targets_survive_the_way_through_a_parquet_file(csv, tmp_path):
         (
             TARGETED + "1,-0.2,1.4\n1,-0.2,\n1,,1.4\n1,nan,1.4\n",
             [
-                "list.csv: target_x_m: row 2: is missing beside target_y_m",
-                "list.csv: target_y_m: row 3: is missing beside target_x_m",
-                "list.csv: target_y_m: row 4: is missing beside target_x_m",
+                "list.csv:3: target_x_m: is missing beside target_y_m",
+                "list.csv:4: target_y_m: is missing beside target_x_m",
+                "list.csv:5: target_y_m: is missing beside target_x_m",
             ],
         ),
     ],
 )
-def test_problems_of_targets_in_a_csv_file_name_their_rows(csv, content, messages):
+def test_problems_of_targets_in_a_csv_file_name_their_lines(csv, content, messages):
     assert problems(csv(content)) == messages
 
 
