@@ -130,16 +130,16 @@ def _convert(kind: str, value: Any, path: str, current: Any = None) -> Any:
         message = get_message(f"{package}/msg/{short}")()
         fill(message, value, f"{path}.")
         return message
+    if isinstance(value, bool) != (kind == "boolean"):
+        raise TypeError
     if kind == "boolean":
-        if not isinstance(value, bool):
-            raise TypeError
         return value
     if kind in _FLOATS and isinstance(value, int | float | None):
         return math.nan if value is None else float(value)
     if kind in _CODES:
         (number,) = array.array(_CODES[kind], [value])
         return bytes([number]) if isinstance(current, bytes) else number
-    if isinstance(value, bool | dict | list) or value is None:
+    if isinstance(value, dict | list) or value is None:
         raise TypeError
     return str(value)
 
@@ -153,6 +153,11 @@ def _numbers(element: str, value: Any, current: Any) -> Any:
     is_octets = element in _OCTETS and isinstance(value, bytes | bytearray)
     if not is_octets and not isinstance(value, list | np.ndarray):
         raise TypeError
+    if not is_octets:
+        # For Python, truth values are integers, and 0 and 1 are truth values.
+        kinds = {value.dtype.type} if isinstance(value, np.ndarray) else set(map(type, value))
+        if any((kind in (bool, np.bool_)) != (element == "boolean") for kind in kinds):
+            raise TypeError
     # Fields with numbers are `array.array` or lists on rclpy, and on the embedded backend NumPy arrays, which check.
     if isinstance(current, array.array):
         return array.array(current.typecode, value.tolist() if isinstance(value, np.ndarray) else value)

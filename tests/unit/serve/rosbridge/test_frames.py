@@ -84,6 +84,20 @@ def test_octets_and_numbers_are_written_as_in_rosbridge() -> None:
         assert found == in_cbor or (found != found and in_cbor != in_cbor)
 
 
+@pytest.mark.parametrize("kind", ["Int32", "Float64", "UInt8"])
+@pytest.mark.parametrize("value", [True, [True], [1, False], np.array([True])])
+def test_truth_values_are_no_numbers(kind: str, value: Any) -> None:
+    message = message_class(f"std_msgs/msg/{kind}" + ("" if value is True else "MultiArray"))()
+    with pytest.raises(ConfigError, match=r"data: should be .*, got "):
+        fill(message, {"data": value})
+
+
+@pytest.mark.parametrize("value", [[1, 0], [1.0], np.array([1, 0])])
+def test_numbers_are_no_truth_values(value: Any) -> None:
+    with pytest.raises(ConfigError, match="bool_array_value: should be sequence<boolean>, got "):
+        fill(message_class("rcl_interfaces/msg/ParameterValue")(), {"bool_array_value": value})
+
+
 @pytest.mark.parametrize(
     ("frame", "said"),
     [
