@@ -60,7 +60,7 @@ def test_descriptions_of_parameters_come_from_the_configuration(robot: Robot) ->
         "trial.number": (-1, 9_999_999),
         "sim.real_time_factor": (0.0, 1000.0),
         "sim.physics_hz": (100, 10000),
-        "record.trials_per_shard": (0, 2**63 - 1),
+        "record.trials_per_shard": (1, 2**63 - 1),
         "robot.name": None,
         "controllers.topic_aborts_goal": None,
     }
@@ -83,6 +83,8 @@ def test_parameters_of_controllers_are_described(robot: Robot) -> None:
     described = robot.parameters("describe_parameters", node=ARM, names=names).descriptors
     assert [each.name for each in described if not each.description] == []
     doubles = {each.name: range_of(each) for each in described if each.type == DOUBLE}
+    # As ros2_controllers has it.
+    assert doubles.pop("action_monitor_rate") == (0.1, sys.float_info.max)
     assert set(doubles.values()) == {(0.0, sys.float_info.max)}
     assert "constraints.arm_right_1_joint.goal" in doubles
 

@@ -42,7 +42,10 @@ def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDesc
         node = option.node
         if node.get("type") not in ("number", "integer"):
             continue
-        low, high = node.get("minimum", node.get("exclusiveMinimum")), node.get("maximum", node.get("exclusiveMaximum"))
+        # An integer stays one away from a bound that is itself not allowed.
+        step = 0 if isinstance(value, float) else 1
+        low = node["exclusiveMinimum"] + step if "exclusiveMinimum" in node else node.get("minimum")
+        high = node["exclusiveMaximum"] - step if "exclusiveMaximum" in node else node.get("maximum")
         if isinstance(value, float):
             descriptor.floating_point_range = [floating_range(low, high)]
         else:

@@ -39,7 +39,8 @@ class ControllerParameterServer:
         for name, value, description, read_only in _list_declared(limb.controller.parameters):
             descriptor = ParameterDescriptor(description=description, read_only=read_only)
             if isinstance(value, float):
-                descriptor.floating_point_range = [floating_range(0.0, None)]
+                least = 0.1 if name == "action_monitor_rate" else 0.0
+                descriptor.floating_point_range = [floating_range(least, None)]
             node.declare_parameter(name, value, descriptor)
             if not read_only:
                 self._configured[name] = value
