@@ -48,7 +48,7 @@ def sim(
 def sensors(config: ConfigArgument = DEFAULT_CONFIG, *, namespace: str = "/sim_0") -> None:
     """Publish what the sensors of a configuration see of a running simulation.
 
-    Simulations start this themselves when somebody subscribes to such a topic.
+    Simulations start this themselves once such a topic has a subscriber.
 
     Options:
         namespace: Namespace of the simulation.

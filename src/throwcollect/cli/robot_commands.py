@@ -32,7 +32,7 @@ KeysOption = Annotated[
 def import_(
     robot: RobotArgument, *, flange: FlangeOption = None, output: Path | None = None, settings: KeysOption = None
 ) -> None:
-    """Write a directory with a cleaned URDF, an SRDF, meshes, and a robot.yaml that says where each value came from.
+    """Write a directory with a cleaned URDF, an SRDF, meshes, and a robot.yaml with the source of each value.
 
     Options:
         output (-o --output DIR): Directory to write; robots/NAME by default.
@@ -90,7 +90,7 @@ def read_robot(robot: str, flange: str | None = None, settings: list[str] | None
     if not flange:
         known = suggest(robot, names_of("robots"))
         raise ConfigError(
-            f"{robot}: no such robot is installed{known}", hint="docs/robots.md says how a robot is described"
+            f"{robot}: no such robot is installed{known}", hint="docs/robots.md explains how to describe a robot"
         )
     given = {"urdf": robot, "flange": flange}
     return read_robot_section(None, [*(f"robot.{key}={value_as_yaml(each)}" for key, each in given.items()), *keys])

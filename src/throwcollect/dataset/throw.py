@@ -258,7 +258,7 @@ class Throw:
         """
         with self.locating_damage():
             seen = self.read_episode(sensors=True).sensors
-            # A throw in memory is not rendered before somebody looks.
+            # A throw in memory is not rendered before its frames are asked for.
             return self._open_sensors(self.config, seen or self._render(self.config))
 
     @property

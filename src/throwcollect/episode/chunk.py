@@ -33,7 +33,7 @@ CHUNK_MARK = struct.pack("<I4s", len(_COMPRESSION), _COMPRESSION)
 """Bytes that the record of every chunk has at `CHUNK_MARK_OFFSET`: the length and the name of the compression."""
 MOST_RATIO, HARMLESS_BYTES = 4096, 64 * 2**20
 """Most uncompressed bytes per compressed byte of a chunk with more than so many bytes. Recorded samples stay far below
-this; zstd by itself reaches 30,000, with which a small file could fill all memory."""
+this; zstd alone reaches 30,000, with which a small file could fill all memory."""
 RECORD_PREFIX_BYTES = 9
 """Size of opcode and length of a record; the length does not count them."""
 MESSAGE_HEADER = struct.Struct("<BQHIQQ")

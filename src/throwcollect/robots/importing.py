@@ -69,7 +69,7 @@ def find_urdf(urdf: str) -> Path:
         wrong = "is a directory" if path.is_dir() else "no such file"
         near = "" if path.is_dir() or ":" in urdf else suggest_path(path)
         where = path if path.is_absolute() else urdf
-        raise make_error("urdf", f"{where}: {wrong}{near}", hint="docs/robots.md says how a robot is described")
+        raise make_error("urdf", f"{where}: {wrong}{near}", hint="docs/robots.md explains how to describe a robot")
     return path
 
 

@@ -129,7 +129,7 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
     try:
         responses = call_nodes(connection, nodes, SetParameters, "set_parameters", request, patience_s=_ANSWER_S)
     except UnreachableError as error:
-        hint = "throwcollect events tells what became of its nodes"
+        hint = "throwcollect events shows what became of its nodes"
         raise WorkerError(f"run {run.id}: {error.message}", hint=hint) from error
     return [response.results[0] for response in responses]
 

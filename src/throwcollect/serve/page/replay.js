@@ -169,7 +169,7 @@ export class Replay {
   async #copy() {
     try {
       await navigator.clipboard.writeText(location.href);
-      this.tell("the link is copied; whoever opens it needs the token of this server");
+      this.tell("the link is copied; to open it, one needs the token of this server");
     } catch {
       this.tell("the address of this page is the link");
     }

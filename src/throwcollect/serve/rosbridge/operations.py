@@ -1,4 +1,4 @@
-"""Operations that clients of rosbridge send, as models that are told apart by `op`."""
+"""Operations that clients of rosbridge send, as models, one for each value of `op`."""
 
 from __future__ import annotations
 
