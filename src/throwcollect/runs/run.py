@@ -132,7 +132,7 @@ class Run:
         from throwcollect.runs.token import JoinToken
 
         if self.config.run.listen is None:
-            raise ConfigError("other machines cannot join the run", hint="set run.listen to the address at which they join")
+            raise ConfigError("other machines cannot join the run", hint="set run.listen to an address of this machine")
         host, port = split_address(self.config.run.listen)
         endpoint = format_endpoint("tls", reach_from_elsewhere(host), port)
         return JoinToken.of(self.id, endpoint, self.key, self.config).encode()
