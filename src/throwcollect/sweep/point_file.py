@@ -28,6 +28,8 @@ _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
 """Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
 _BLANKS = re.compile(r"^[ \t]+$", re.MULTILINE)
 """Lines that hold nothing but blanks."""
+_AROUND = ' \t"'
+"""What may stand around names and numbers; quotes behind blanks are a part of the text for Arrow."""
 
 MOST_PROBLEMS = 20
 
@@ -79,7 +81,7 @@ def read_table(path: Path, key: str) -> pa.Table:
             whole = pa.csv.ReadOptions(block_size=len(data) + 1, use_threads=False)
             empty = pa.csv.ConvertOptions(null_values=["", " "])
             table = pa.csv.read_csv(io.BytesIO(data), read_options=whole, convert_options=empty)
-            table = table.rename_columns([_strip(name) for name in table.column_names])
+            table = table.rename_columns([name.strip(_AROUND) for name in table.column_names])
     except (ValueError, OSError) as error:
         raise ConfigError([Problem(f"cannot be read: {error}", key, path)]) from error
     if not len(table):
@@ -91,30 +93,29 @@ def read_numbers(table: pa.Table, names: Sequence[str], path: Path) -> NDArray[n
     """Read columns of a table of `read_table`, NaN where a cell is empty, shape ``(n_rows, n_names)``."""
     import pyarrow as pa
 
-    is_number = (pa.types.is_floating, pa.types.is_integer, pa.types.is_null)
-    types = {name: table.schema.field(name).type for name in names}
-    texts = {name for name, kind in types.items() if not any(is_kind(kind) for is_kind in is_number)}
-    if wrong := [name for name in names if name in texts and not _is_csv(path)]:
-        raise ConfigError([Problem(f"should be a column of numbers, got {types[each]}", each, path) for each in wrong])
-    # Integers beyond 2^53 are rounded, as other numbers are.
-    return np.column_stack(
-        [
-            _parse(table[name], name, path) if name in texts else table[name].cast(pa.float64(), safe=False).to_numpy()
-            for name in names
-        ]
-    )
-
-
-def _parse(column: pa.ChunkedArray, name: str, path: Path) -> NDArray[np.float64]:
-    """Read the numbers of a column that Arrow takes for text, as quotes are around one or some cell is no number."""
     numbers = []
-    for row, cell in enumerate(column.cast("string").to_pylist()):
-        text = _strip(cell or "")
+    for name in names:
+        column, kind = table[name], table.schema.field(name).type
+        if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind):
+            # Integers beyond 2^53 are rounded, as other numbers are.
+            numbers.append(column.cast(pa.float64(), safe=False).to_numpy())
+        elif _is_csv(path):
+            numbers.append(_parse(column.cast(pa.string()).to_pylist(), name, path))
+        else:
+            raise ConfigError([Problem(f"should be a column of numbers, got {kind}", name, path)])
+    return np.column_stack(numbers)
+
+
+def _parse(cells: Sequence[str | None], name: str, path: Path) -> list[float]:
+    """Read the numbers of a column that Arrow takes for text, as one has quotes behind blanks, or a cell is wrong."""
+    numbers = []
+    for row, cell in enumerate(cells):
+        text = (cell or "").strip(_AROUND)
         try:
             numbers.append(float(text or "nan"))
         except ValueError as error:
             raise ConfigError([problem_of_row(f"should be a number, got {text!r}", name, path, row)]) from error
-    return np.array(numbers)
+    return numbers
 
 
 def encode_points(points: Points) -> bytes:
@@ -171,11 +172,6 @@ def problem_of_row(sentence: str, key: str, path: Path, row: int) -> Problem:
 
 def _is_csv(path: Path) -> bool:
     return path.suffix.lower() == ".csv"
-
-
-def _strip(cell: str) -> str:
-    """Take off blanks, and quotes behind blanks, which Arrow takes for a part of the text."""
-    return cell.strip().strip('"').strip()
 
 
 def _find_value_problems(points: Points, path: Path, config: Config) -> Iterator[Problem]:
