@@ -31,8 +31,6 @@ Event = Literal["opened", "exposed", "recovered", "lease", "commit", "fail", "lo
 - ``shard``: a file was finished: `name`.
 - ``finished``: the dataset was finished: `wall_s`, the real time that it took in all [s], as the data card has it.
 """
-_END_OF_TIME_S = 1e11
-"""The year 5138; larger numbers are no times, and not every integer of a JSON text fits a float."""
 
 
 class Journal:
@@ -96,18 +94,14 @@ def read_journal(path: Path) -> Iterator[JournalLine]:
     """Read the events of a journal, in order; a missing file has none, and damaged lines are left out."""
     for entry in _read_lines(path):
         time_s, wall_s, outcome = (entry.get(name) for name in ("time", "wall_s", "outcome"))
-        if (
-            entry.get("event") in get_args(Event)
-            and _is_time(time_s)
-            and (wall_s is None or _is_time(wall_s))
-            and isinstance(outcome, str | None)
-        ):
+        known = entry.get("event") in get_args(Event) and isinstance(outcome, str | None)
+        if known and _is_time(time_s) and (wall_s is None or _is_time(wall_s)):
             yield JournalLine(entry["event"], time_s, wall_s, outcome)
 
 
 def _is_time(value: object) -> TypeGuard[float]:
-    """Whether a value is a time [s], and not NaN or a number beyond all times."""
-    return isinstance(value, int | float) and 0 <= value < _END_OF_TIME_S
+    """Whether a value is a time [s] before the year 5138, and not NaN or an integer that no float holds."""
+    return isinstance(value, int | float) and 0 <= value < 1e11
 
 
 def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:

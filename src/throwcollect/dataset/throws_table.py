@@ -34,14 +34,12 @@ Row = dict[str, Any]
 
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
-_PLACE_COLUMNS = ("shard", "chunk_offset", "samples", "digest")
-"""Columns that are null together, where a trial has no episode."""
 
 
 def place_columns(shard: str, chunk_offset: int, episode: Episode) -> Row:
     """Make the columns that say where an episode lies, with the offset of its chunk [bytes], and which one it is."""
-    values = (shard, chunk_offset, episode.header.samples, episode.digest)
-    return dict(zip(_PLACE_COLUMNS, values, strict=True))
+    samples, digest = episode.header.samples, episode.digest
+    return {"shard": shard, "chunk_offset": chunk_offset, "samples": samples, "digest": digest}
 
 
 def make_field(name: str, kind: pa.DataType, description: str, *, unit: str | None = None) -> pa.Field:
@@ -179,7 +177,9 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
     # Names of recordings become paths.
     if unknown := set(table["shard"].to_pylist()) - {None, *list_shards(plan)}:
         raise DatasetError(f"shard is {min(unknown)!r} in some row, which no row of this plan can have", path=path)
-    there = np.array([read_validity(table[name].combine_chunks()) for name in _PLACE_COLUMNS])
+    # Where a trial has no episode, all columns of its place are null.
+    places = table.select(["shard", "chunk_offset", "samples", "digest"])
+    there = np.array([read_validity(column.combine_chunks()) for column in places.columns])
     if (wrong := np.flatnonzero(there.any(axis=0) & ~there.all(axis=0))).size:
         raise DatasetError("has only a part of the place of an episode", path=path, place=f"row {wrong[0] + 1}")
     return table
