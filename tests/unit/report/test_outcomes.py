@@ -8,7 +8,7 @@ import pytest
 from throwcollect.report.contents import format_duration, format_share, format_size
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.sections import tabulate_failures
-from throwcollect.report.throw.flights import Residuals, show_physics
+from throwcollect.report.throw.flights import MOST_RESIDUALS, show_physics
 from throwcollect.tasks.outcome_styles import style_of
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
@@ -72,5 +72,9 @@ def test_a_size_is_shown_in_decimal_units(count: int, text: str) -> None:
 
 def test_the_page_says_where_exact_flights_are_drawn():
     """A logarithmic axis has no place for 0, so the page says which bar has the flights that agree to the last bit."""
-    section = show_physics(Residuals(episodes=3, checked=3, distance_m=np.array([0.0, 0.0, 3e-15])))
+    distance_m = np.array([0.0, 0.0, 3e-15])
+    section = show_physics(distance_m, 3)
+    assert str(section.text).startswith("All episodes were compared")
     assert "2 agree to the last bit (drawn at 1e-17 m)" in str(section.text)
+    some = show_physics(distance_m, MOST_RESIDUALS + 1)
+    assert str(some.text).startswith("2,000 of 2,001 episodes, chosen at random, were compared")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
@@ -170,24 +169,12 @@ def _choose_span(positions: NDArray[np.float64]) -> list[float]:
     return [low - room, high + room]
 
 
-@dataclass(frozen=True)
-class Residuals:
-    """How far recorded flights depart from ballistic motion.
+def measure_residuals(dataset: Dataset) -> NDArray[np.float64]:
+    """Measure how far flights depart from ballistic motion, at most `MOST_RESIDUALS` of them.
 
-    Attributes:
-        episodes: Number of episodes in the dataset.
-        checked: Number of episodes that were compared; if not all, they were chosen at random.
-        distance_m: Largest distance of each flight that could be compared [m], shape ``(n,)``; nan if a sample is not a
-            number.
+    Returns:
+        Largest distance of each flight that could be compared [m], shape ``(n,)``; nan if a sample is not a number.
     """
-
-    episodes: int
-    checked: int
-    distance_m: NDArray[np.float64]
-
-
-def measure_residuals(dataset: Dataset) -> Residuals:
-    """Compare flights with ballistic motion, at most `MOST_RESIDUALS` of them."""
     trials = dataset.recorded.throws["trial"].to_numpy()
     # Episodes are chosen at random, as every n-th point of a Sobol sequence or a grid would lie on a lattice.
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
@@ -198,28 +185,28 @@ def measure_residuals(dataset: Dataset) -> Residuals:
         distance = flight_residual(samples, header, config=dataset.config_of(throw))
         if distance is not None:
             distances.append(distance)
-    return Residuals(len(trials), len(chosen), np.array(distances))
+    return np.array(distances)
 
 
-def show_physics(residuals: Residuals) -> ReportSection:
-    """Show how far flights depart from ballistic motion."""
+def show_physics(distance_m: NDArray[np.float64], episodes: int) -> ReportSection:
+    """Show how far flights depart from ballistic motion, as `measure_residuals` found it for that many episodes."""
     title = "Whether flights obey physics"
-    finite_m = residuals.distance_m[np.isfinite(residuals.distance_m)]
+    finite_m = distance_m[np.isfinite(distance_m)]
     if not len(finite_m):
         return ReportSection(
             "physics", "Physics", title, "No flight was long enough to compare it with ballistic motion."
         )
     compared = "All episodes"
-    if residuals.checked < residuals.episodes:
-        compared = f"{residuals.checked:,} of {residuals.episodes:,} episodes, chosen at random,"
-    exact = int((residuals.distance_m == 0).sum())
+    if episodes > MOST_RESIDUALS:
+        compared = f"{MOST_RESIDUALS:,} of {episodes:,} episodes, chosen at random,"
+    exact = int((distance_m == 0).sum())
     exactly = f", {exact:,} agree to the last bit (drawn at {FLOOR_M:g} m)" if exact else ""
     text = (
         f"{compared} were compared, sample by sample, with ballistic motion in steps of the physics, from shortly "
         f"after their release on: the largest distance is {finite_m.max():.1e} m{exactly}. "
     )
     # NaN counts as a departure, too.
-    above = int((~(residuals.distance_m <= BALLISTIC_TOLERANCE_M)).sum())
+    above = int((~(distance_m <= BALLISTIC_TOLERANCE_M)).sum())
     if above:
         text += Markup("<b>{:,} depart by more than the tolerance</b>; ").format(above)
         text += Markup("<code>throwcollect dataset verify</code> names them.")

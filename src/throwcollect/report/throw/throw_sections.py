@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import cast
 
@@ -47,7 +46,8 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     examples = list(dataset.select(choose_examples(dataset, planned, outcomes)))
     configs = [dataset.config_of(throw) for throw in examples] or [dataset.config]
     bodies = tuple(dict.fromkeys(body for config in configs for body in looks_of(config)[:-1]))
-    cells = count_throws(planned, throws, target=dataset.config.sweep.target)
+    target = dataset.config.sweep.target
+    cells = tuple(_show_cells(planned, throws, target, outcomes.verbs[1])) if len(planned) else ()
     return TaskReport(
         tiles=planned.show_ranges("landing distance", "release speed"),
         results=(
@@ -56,7 +56,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
         ),
         episodes=(
             show_examples(dataset, examples, outcomes, height_m=height_m, bodies=bodies),
-            show_physics(measure_residuals(dataset)),
+            show_physics(measure_residuals(dataset), len(dataset.recorded)),
         ),
     )
 
@@ -65,12 +65,12 @@ def _show_landings(
     landings: Points,
     planned: Points,
     outcomes: Outcomes,
-    coverage: Coverage | None,
+    cells: tuple[Panel, ...],
     *,
     height_m: float | None,
     bodies: Sequence[BodyLook],
 ) -> ReportSection:
-    """Show where balls crossed the landing plane; `planned` are those that were thrown as planned."""
+    """Show where balls crossed the landing plane; `planned` are those that were thrown as planned, also by `cells`."""
     title = "Where the balls land"
     if not len(landings):
         return ReportSection("landing", "Landings", title, f"No ball crossed the {_name_plane(outcomes)}.")
@@ -91,27 +91,27 @@ def _show_landings(
     if len({body.name for body in bodies}) < len(bodies):
         notes.append("Bodies differ from throw to throw; those of a few throws are drawn.")
     above = Panel("map", "Landings from above", figure, " ".join(filter(None, notes)))
-    return ReportSection("landing", "Landings", title, text, ((above, *_show_cells(coverage, outcomes.verbs[1])),))
+    return ReportSection("landing", "Landings", title, text, ((above, *cells),))
 
 
-def _show_cells(coverage: Coverage | None, succeeded: str) -> Iterator[Panel]:
+def _show_cells(planned: Points, throws: pa.Table, target: TargetConfig | None, succeeded: str) -> Iterator[Panel]:
     """Show how many throws that succeeded there are in each cell; `succeeded` is what such a throw did, in words."""
-    if coverage is None:
-        return
-    axes, counts = coverage.axes, coverage.counts
+    edges, counts = count_throws(planned, throws, target=target)
+    names, others = list(edges), len(planned) - int(counts.sum())
     text = f"{(counts > 0).sum():,} of {counts.size:,} cells have a throw that {succeeded}, at most {counts.max():,}"
-    text += "." if coverage.others is None else f"; {coverage.others:,} landed in no cell."
-    if len(axes) == 1:
+    text += "." if target is None else f"; {others:,} landed in no cell."
+    if len(names) == 1:
         hover = "near %{x:.3f}: %{y} throws<extra></extra>"
-        figure = go.Figure(go.Bar(**place_bars(axes[0].edges), y=counts, marker_color=BLUE, hovertemplate=hover))
-        figure.update_xaxes(title=axes[0].label, showgrid=False).update_yaxes(title="throws")
+        bars = place_bars(edges[names[0]])
+        figure = go.Figure(go.Bar(**bars, y=counts, marker_color=BLUE, hovertemplate=hover))
+        figure.update_xaxes(title=_TITLES[names[0]][1], showgrid=False).update_yaxes(title="throws")
         yield Panel("cells", "Throws by target", figure.update_layout(height=460, bargap=0), text)
     # Each pair of axes, with the throws summed over the third.
-    for number, (first, second) in enumerate(combinations(range(len(axes)), 2)):
-        over = counts.sum(axis=tuple({*range(len(axes))} - {first, second}))
-        title = f"{'Throws by' if coverage.others is None else 'Targets:'} {axes[first].name} and {axes[second].name}"
-        figure = draw_coverage_map(axes[first], axes[second], over)
-        yield Panel(f"cells-{number}", title, figure, "" if number else text)
+    for number, (first, second) in enumerate(combinations(range(len(names)), 2)):
+        over = counts.sum(axis=tuple({*range(len(names))} - {first, second}))
+        pair = {name: edges[name] for name in (names[first], names[second])}
+        title = f"{'Throws by' if target is None else 'Targets:'} {' and '.join(_TITLES[name][0] for name in pair)}"
+        yield Panel(f"cells-{number}", title, draw_coverage_map(pair, over), "" if number else text)
 
 
 def _show_releases(landings: Points, elevation_deg: NDArray[np.float64], outcomes: Outcomes) -> ReportSection:
@@ -146,44 +146,17 @@ def _name_plane(outcomes: Outcomes) -> str:
     return "landing plane" if outcomes.success == "landed" else "plane of the rim"
 
 
-@dataclass(frozen=True)
-class CellAxis:
-    """One dimension of the cells.
+def count_throws(
+    landings: Points, throws: pa.Table, *, target: TargetConfig | None
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.intp]]:
+    """Count throws that landed in the cells of the configuration's targets, one to three dimensions.
 
-    Attributes:
-        name: Its name.
-        label: Label of its axis: the name, how it is measured, and the unit.
-        edges: Edges of its bins, shape ``(n_bins + 1,)``.
+    Without targets, the cells span the values of the throws, of which there is one. The table is that of all throws.
+
+    Returns:
+        The edges of each dimension by its name, shape ``(n_bins + 1,)``, and the number of throws in each cell; angles
+        are in degrees.
     """
-
-    name: str
-    label: str
-    edges: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Coverage:
-    """Throws that landed, in cells of targets.
-
-    Attributes:
-        axes: One to three dimensions.
-        counts: Number of throws in each cell; an array with one dimension for each axis.
-        others: Number of throws that landed in none of the cells of the configuration; None if the cells are not from
-            there, but span the values of the throws.
-    """
-
-    axes: tuple[CellAxis, ...]
-    counts: NDArray[np.intp]
-    others: int | None
-
-
-def count_throws(landings: Points, throws: pa.Table, *, target: TargetConfig | None) -> Coverage | None:
-    """Count throws that landed in the cells of the configuration's targets; None if none landed.
-
-    Without targets, the cells span the values of the throws. The table is that of all throws.
-    """
-    if not len(landings):
-        return None
     angle = np.degrees(read_numbers(throws, "hit_angle_rad"))[landings.row]
     values = {"distance_m": landings.distance_m, "hit_angle_rad": angle}
     if target is None:
@@ -200,9 +173,7 @@ def count_throws(landings: Points, throws: pa.Table, *, target: TargetConfig | N
             # The configuration has radians, but the axis and the values above are in degrees.
             edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack([values[name] for name in edges]), list(edges.values()))
-    axes = tuple(CellAxis(*_TITLES[name], ends) for name, ends in edges.items())
-    others = None if target is None else len(landings) - int(counts.sum())
-    return Coverage(axes, counts.astype(np.intp), others)
+    return edges, counts.astype(np.intp)
 
 
 def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -224,14 +195,15 @@ def _round_up(width: float) -> float:
     return float(next(step * power for step in (1, 2, 5, 10) if step * power >= width * (1 - 1e-9)))
 
 
-def draw_coverage_map(x: CellAxis, y: CellAxis, counts: NDArray[np.intp]) -> go.Figure:
-    """Draw the number of throws over two axes of the cells; empty cells are blank."""
+def draw_coverage_map(edges: Mapping[str, NDArray[np.float64]], counts: NDArray[np.intp]) -> go.Figure:
+    """Draw the number of throws over two dimensions of the cells; empty cells are blank."""
+    (first, x), (second, y) = edges.items()
     most = max(int(counts.max()), 1)
     marks = {"dtick": 1} if most <= _FEW else {}
     figure = go.Figure(
         go.Heatmap(
-            x=x.edges,
-            y=y.edges,
+            x=x,
+            y=y,
             z=np.where(counts, counts, np.nan).T,
             colorscale=SCALE,
             zmin=0,
@@ -242,6 +214,6 @@ def draw_coverage_map(x: CellAxis, y: CellAxis, counts: NDArray[np.intp]) -> go.
             hovertemplate="%{x:.3f}, %{y:.3f}<br>%{z} throws<extra></extra>",
         )
     )
-    figure.update_xaxes(title=x.label, showgrid=False)
-    figure.update_yaxes(title=y.label, showgrid=False)
+    figure.update_xaxes(title=_TITLES[first][1], showgrid=False)
+    figure.update_yaxes(title=_TITLES[second][1], showgrid=False)
     return figure.update_layout(height=460)

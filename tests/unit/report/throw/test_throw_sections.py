@@ -15,7 +15,6 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.figures import Points
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.throw.throw_sections import (
-    CellAxis,
     _show_cells,
     count_throws,
     draw_coverage_map,
@@ -39,11 +38,10 @@ def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
         }
     )
     throws = pa.table({"scene_landing_height_m": [0.2, 0.7, 1.0, 0.1], "hit_angle_rad": [0.5, 0.5, 1.0, 0.5]})
-    found = count_throws(make_landings([1.2, 1.2, 2.0, 2.1]), throws, target=target)
-    assert found is not None
-    assert found.counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height
-    assert found.others == 1
-    panels = {panel.title: panel for panel in _show_cells(found, "landed")}
+    landings = make_landings([1.2, 1.2, 2.0, 2.1])
+    _, counts = count_throws(landings, throws, target=target)
+    assert counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height
+    panels = {panel.title: panel for panel in _show_cells(landings, throws, target, "landed")}
     assert list(panels) == [
         "Targets: landing distance and hit angle",
         "Targets: landing distance and landing height",
@@ -56,19 +54,18 @@ def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
 
 
 def test_cells_have_round_edges_if_no_target_is_configured() -> None:
-    found = count_throws(make_landings([1.0, 1.34, 2.4]), pa.table({"hit_angle_rad": [1.2, 1.21, 1.3]}), target=None)
-    assert found is not None
-    distance, angle = found.axes
-    assert distance.edges == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance.edges)])
-    assert np.diff(angle.edges) == pytest.approx(0.5)
-    assert found.counts.sum() == 3
-    assert count_throws(make_landings([]), pa.table({}), target=None) is None
+    throws = pa.table({"hit_angle_rad": [1.2, 1.21, 1.3]})
+    edges, counts = count_throws(make_landings([1.0, 1.34, 2.4]), throws, target=None)
+    distance, angle = edges.values()
+    assert distance == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance)])
+    assert np.diff(angle) == pytest.approx(0.5)
+    assert counts.sum() == 3
 
 
 @pytest.mark.parametrize(("most", "mark"), [(1, 1), (8, 1), (9, None)])
 def test_the_colour_scale_begins_at_0_and_marks_only_whole_throws(most: int, mark: int | None) -> None:
-    axis = CellAxis("landing distance", "landing distance [m]", np.array([1.0, 2.0]))
-    (cells,) = draw_coverage_map(axis, axis, np.array([[most]])).data
+    edges = {"distance_m": np.array([1.0, 2.0]), "height_m": np.array([0.0, 1.0])}
+    (cells,) = draw_coverage_map(edges, np.array([[most]])).data
     assert (cells.zmin, cells.zmax, cells.colorbar.dtick) == (0, most, mark)
 
 
