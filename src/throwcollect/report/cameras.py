@@ -15,7 +15,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.sensors import SensorFrames
 from throwcollect.extras import lazily
 from throwcollect.report.contents import ReportSection, Table
-from throwcollect.report.outcomes import in_words
+from throwcollect.report.measured import in_words
 
 images = lazily("PIL.Image")
 

@@ -18,8 +18,15 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from throwcollect.report.contents import Tile
-from throwcollect.report.measured import JointPeaks, SweptKey, Throughput, choose_points, read_numbers
-from throwcollect.report.outcomes import Outcomes, in_words
+from throwcollect.report.measured import (
+    JointPeaks,
+    Outcomes,
+    SweptKey,
+    Throughput,
+    choose_points,
+    in_words,
+    read_numbers,
+)
 from throwcollect.robots.surroundings import BodyLook
 from throwcollect.tasks.outcome_styles import LANDED, style_of
 

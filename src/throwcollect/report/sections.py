@@ -39,13 +39,14 @@ from throwcollect.report.contents import (
 from throwcollect.report.measured import (
     KINDS,
     JointPeaks,
+    Outcomes,
     SweptKey,
     Throughput,
+    in_words,
     measure_throughput,
     read_parameters,
     summarise_peaks,
 )
-from throwcollect.report.outcomes import Outcomes, in_words
 from throwcollect.report.targets import show_model, show_targets
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest

@@ -16,7 +16,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Model, load_model, read_score
-from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, ThrowAtTarget, format_length
+from throwcollect.learning.score import SCORE_HEAD, Errors, ThrowAtTarget, format_length
 from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
 from throwcollect.report.measured import choose_points, read_numbers
@@ -227,24 +227,23 @@ def _show_misses(key: str, shown: str, model: Model, throws: Sequence[ThrowAtTar
 def _show_errors(
     key: str, title: str, errors: Sequence[tuple[int, Errors]], *, x: dict[str, str], y: dict[str, str]
 ) -> Iterator[Panel]:
-    """Make a panel for each unit of misses by a number of throws; x and y are settings of its axes."""
+    """Show median and ninth decile of misses by a number of throws, in a panel for each unit.
+
+    x and y are settings of its axes.
+    """
     throws = [count for count, _ in errors]
     for number, misses in enumerate(zip(*(each.by_unit for _, each in errors), strict=True)):
-        figure = _draw_errors(throws, misses).update_xaxes(x).update_yaxes(y)
-        yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure)
-
-
-def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go.Figure:
-    """Draw median and ninth decile of misses of one unit over a number of throws."""
-    factor, unit = choose_shown_unit(misses[0].unit)
-    figure = go.Figure()
-    # The legend has room for a marker, but hardly for a dash: so the markers differ, too.
-    for name, symbol, values, look in (
-        ("median", "circle", [each.median for each in misses], {"width": 2}),
-        ("9 of 10 below", "circle-open", [each.share90 for each in misses], {"width": 1.5, "dash": "dash"}),
-    ):
-        scaled = [None if value is None else value * factor for value in values]
-        marker, line = {"color": BLUE, "size": 5, "symbol": symbol}, {"color": BLUE, **look}
-        figure.add_scatter(x=list(numbers), y=scaled, mode="lines+markers", line=line, marker=marker, name=name)
-    title = f"{_NOUNS.get(misses[0].unit, 'difference')} from the target [{unit}]"
-    return figure.update_yaxes(title=title).update_layout(height=420, legend=LEGEND_ABOVE)
+        name = misses[0].unit
+        factor, unit = choose_shown_unit(name)
+        figure = go.Figure()
+        # The legend has room for a marker, but hardly for a dash: so the markers differ, too.
+        for label, symbol, values, look in (
+            ("median", "circle", [each.median for each in misses], {"width": 2}),
+            ("9 of 10 below", "circle-open", [each.share90 for each in misses], {"width": 1.5, "dash": "dash"}),
+        ):
+            scaled = [None if value is None else value * factor for value in values]
+            marker, line = {"color": BLUE, "size": 5, "symbol": symbol}, {"color": BLUE, **look}
+            figure.add_scatter(x=throws, y=scaled, mode="lines+markers", line=line, marker=marker, name=label)
+        figure.update_yaxes(title=f"{_NOUNS.get(name, 'difference')} from the target [{unit}]")
+        figure.update_layout(height=420, legend=LEGEND_ABOVE).update_xaxes(x).update_yaxes(y)
+        yield Panel(f"{key}-{name}" if number else key, title, figure)

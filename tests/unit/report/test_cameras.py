@@ -13,7 +13,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.report.cameras import show_cameras
 from throwcollect.report.contents import Table
 from throwcollect.report.figures import Points, draw_map
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import Outcomes
 
 SENSORS = {
     "side": {"kind": "camera"},

@@ -11,8 +11,14 @@ import pytest
 
 from throwcollect.dataset.journal import JournalLine
 from throwcollect.dataset.reader import Dataset
-from throwcollect.report.measured import SweptKey, choose_points, measure_throughput, read_parameters, summarise_peaks
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import (
+    Outcomes,
+    SweptKey,
+    choose_points,
+    measure_throughput,
+    read_parameters,
+    summarise_peaks,
+)
 
 
 def parameters_of(directory: Path) -> tuple[SweptKey, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from throwcollect.report.contents import format_duration, format_share, format_size
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import Outcomes
 from throwcollect.report.sections import tabulate_failures
 from throwcollect.report.throw.flights import MOST_RESIDUALS, show_physics
 from throwcollect.tasks.outcome_styles import style_of

@@ -22,7 +22,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError
 from throwcollect.report.contents import Panel, ReportSection, Table
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import Outcomes
 from throwcollect.report.sections import Report, render_page, report_dataset, write_report
 
 SECTIONS = [

@@ -10,8 +10,7 @@ from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.contents import Panel, ReportSection, TaskReport
 from throwcollect.report.figures import LIMIT_LINE, Points, draw_coloured, draw_map, single_precision
-from throwcollect.report.measured import read_numbers
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import Outcomes, read_numbers
 from throwcollect.robots.surroundings import looks_of
 from throwcollect.wording import format_count
 

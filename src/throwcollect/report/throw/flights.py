@@ -26,7 +26,7 @@ from throwcollect.report.figures import (
     place_bars,
     single_precision,
 )
-from throwcollect.report.outcomes import Outcomes, in_words
+from throwcollect.report.measured import Outcomes, in_words
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.surroundings import BodyLook

@@ -16,8 +16,7 @@ from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.contents import Panel, ReportSection, TaskReport
 from throwcollect.report.figures import BLUE, SCALE, Points, colour_bar, draw_coloured, draw_map, place_bars
-from throwcollect.report.measured import MOST_POINTS, read_numbers
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import MOST_POINTS, Outcomes, read_numbers
 from throwcollect.report.throw.flights import choose_examples, measure_residuals, show_examples, show_physics
 from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.tasks.task import task_of

@@ -10,7 +10,7 @@ import pytest
 from throwcollect.dataset.motion import Joint
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.figures import Points
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import Outcomes
 from throwcollect.report.throw.flights import choose_examples, draw_joint, measure_residuals
 
 

@@ -13,7 +13,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.figures import Points
-from throwcollect.report.outcomes import Outcomes
+from throwcollect.report.measured import Outcomes
 from throwcollect.report.throw.throw_sections import (
     _show_cells,
     count_throws,
