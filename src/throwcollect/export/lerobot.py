@@ -16,7 +16,6 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from throwcollect.config.sensors import PictureConfig
-from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.throw import Throw
@@ -40,48 +39,28 @@ Statistics = dict[str, list[float] | list[int]]
 
 @dataclass(frozen=True)
 class Feature:
-    """One feature of each frame.
+    """One feature of the frames of an episode.
 
     Attributes:
         dtype: Type of its numbers, as both NumPy and Arrow call it.
+        values: Its values, rounded to this type, as statistics are those of the stored numbers.
         names: Names of its components; None for a scalar.
     """
 
     dtype: str
+    values: Frames
     names: tuple[str, ...] | None = None
 
-    @property
-    def arrow_type(self) -> pa.DataType:
-        """Type of its column."""
-        kind = pa.type_for_alias(self.dtype)
-        return kind if self.names is None else pa.list_(kind, len(self.names))
+    def as_column(self) -> pa.Array:
+        """Make its column in the table of frames."""
+        flat = pa.array(self.values.astype(self.dtype).ravel())
+        return flat if self.names is None else pa.FixedSizeListArray.from_arrays(flat, len(self.names))
 
     def as_dict(self) -> dict[str, object]:
         """Make its entry in ``meta/info.json``."""
         names = None if self.names is None else list(self.names)
         # In LeRobot, a scalar has the shape (1,), although its column in the file is no list.
         return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
-
-
-def list_features(moving: Sequence[str], targets: Sequence[TargetColumn], bodies: Sequence[str]) -> dict[str, Feature]:
-    """List features by name, in the order of their columns, for the joints that the task moves, and moving bodies."""
-    positions = tuple(f"{joint}.pos" for joint in moving)
-    free = (f"{body}.{part}" for body in bodies for part in ("x", "y", "z", "vx", "vy", "vz"))
-    goal = tuple(f"target.{each.word.replace(' ', '_')}" for each in targets)
-    return {
-        "observation.state": Feature("float32", (*positions, *(f"{joint}.vel" for joint in moving))),
-        "observation.effort": Feature("float32", tuple(f"{joint}.effort" for joint in moving)),
-        "observation.environment_state": Feature("float32", (*free, *goal)),
-        "action": Feature("float32", positions),
-        "next.reward": Feature("float32"),
-        "next.success": Feature("bool"),
-        "next.done": Feature("bool"),
-        "timestamp": Feature("float32"),
-        "frame_index": Feature("int64"),
-        "episode_index": Feature("int64"),
-        "index": Feature("int64"),
-        "task_index": Feature("int64"),
-    }
 
 
 def describe(source: ExportSource) -> Layout:
@@ -136,8 +115,7 @@ dataset = LeRobotDataset("me/throws", root=".")
 
 def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset in LeRobot's format; see `Exporter.write`."""
-    bodies = moving_bodies_of(source.dataset.config)
-    features = list_features(source.dataset.moving_joints, source.targets, bodies)
+    features: dict[str, Feature] = {}
     tasks: dict[str, int] = {}
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
@@ -161,19 +139,20 @@ def write(source: ExportSource, directory: Path) -> None:
             for number, throw in enumerate(islice(throws, _EPISODES_PER_GROUP), start=start):
                 task = _say_task(source, throw.throw)
                 index = tasks.setdefault(task, len(tasks))
-                frames = _compute_frames(throw, source, features, episode=number, first=first, task=index)
+                features = _compute_features(throw, source, episode=number, first=first, task=index)
                 # This comes before the frames are appended, and says in which file they will be.
                 chunk, file = data.place()
-                table_of_frames = _tabulate_frames(frames, features, source)
-                rows.append(_describe_episode(frames, task, number=number, first=first, chunk=chunk, file=file))
+                columns = {name: feature.as_column() for name, feature in features.items()}
+                table_of_frames = pa.table(columns, metadata={"throwcollect.digest": source.dataset.digest})
+                rows.append(_describe_episode(features, task, number=number, first=first, chunk=chunk, file=file))
                 for name, series in images.items():
                     pictures = source.look(throw.throw, name)["images"]
                     rows[-1] |= series.append(pictures)
                     if series.in_table:
                         table_of_frames = table_of_frames.append_column(series.key, encode_pictures(pictures))
                 data.append(table_of_frames)
-                for name, values in frames.items():
-                    more = Moments.of(values)
+                for name, feature in features.items():
+                    more = Moments.of(feature.values)
                     moments[name] = moments[name].with_more(more) if name in moments else more
                 first += len(throw)
             _append_episodes(meta, rows, episodes.slice(start, len(rows)))
@@ -199,51 +178,47 @@ def _number_episodes(source: ExportSource) -> pa.Table:
     return table.replace_schema_metadata({"throwcollect.digest": source.dataset.digest})
 
 
-def _compute_frames(
-    throw: ThrowSeries, source: ExportSource, features: dict[str, Feature], *, episode: int, first: int, task: int
-) -> dict[str, Frames]:
-    """Compute the values of each feature, as the file stores them, of shape ``(n_frames, n_components)``."""
-    count, signals, done = len(throw), throw.signals, throw.done
-    moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
+def _compute_features(
+    throw: ThrowSeries, source: ExportSource, *, episode: int, first: int, task: int
+) -> dict[str, Feature]:
+    """Compute the features of an episode by name, in the order of their columns."""
+    count, signals, done, joints = len(throw), throw.signals, throw.done, source.dataset.moving_joints
+    moving = [source.dataset.joints.index(joint) for joint in joints]
     index = np.arange(count)
     bodies = moving_bodies_of(source.dataset.config)
     free = [f"{body}_{quantity}" for body in bodies for quantity in ("position_m", "velocity_mps")]
-    targets = [each.name for each in source.targets]
-    values = {
-        "observation.state": np.hstack(
-            [signals[f"joint_{name}"][:, moving] for name in ("position_rad", "velocity_radps")]
-        ),
-        "observation.effort": signals["joint_effort_nm"][:, moving],
-        "observation.environment_state": np.hstack([signals[name] for name in (*free, *targets)]),
-        "action": throw.find_actions(source.rate_hz),
-        "next.reward": done * throw.succeeded,
-        "next.success": done * throw.succeeded,
-        "next.done": done,
-        "timestamp": index / source.rate_hz,
-        "frame_index": index,
-        "episode_index": np.full(count, episode),
-        "index": first + index,
-        "task_index": np.full(count, task),
-    }
-    # Rounded to the types of the file, as statistics are those of the stored numbers.
+    state = np.hstack([signals[f"joint_{name}"][:, moving] for name in ("position_rad", "velocity_radps")])
+    around = np.hstack([signals[name] for name in (*free, *(each.name for each in source.targets))])
+    positions = tuple(f"{joint}.pos" for joint in joints)
+    parts = (f"{body}.{part}" for body in bodies for part in ("x", "y", "z", "vx", "vy", "vz"))
+    goal = (f"target.{each.word.replace(' ', '_')}" for each in source.targets)
+
+    def make(dtype: str, values: NDArray[Any], names: Iterable[str] | None = None) -> Feature:
+        rounded = values.astype(dtype).astype(np.float64).reshape(count, -1)
+        return Feature(dtype, rounded, None if names is None else tuple(names))
+
     return {
-        name: array.astype(features[name].dtype).astype(np.float64).reshape(count, -1) for name, array in values.items()
+        "observation.state": make("float32", state, (*positions, *(f"{joint}.vel" for joint in joints))),
+        "observation.effort": make(
+            "float32", signals["joint_effort_nm"][:, moving], (f"{joint}.effort" for joint in joints)
+        ),
+        "observation.environment_state": make("float32", around, (*parts, *goal)),
+        "action": make("float32", throw.find_actions(source.rate_hz), positions),
+        "next.reward": make("float32", done * throw.succeeded),
+        "next.success": make("bool", done * throw.succeeded),
+        "next.done": make("bool", done),
+        "timestamp": make("float32", index / source.rate_hz),
+        "frame_index": make("int64", index),
+        "episode_index": make("int64", np.full(count, episode)),
+        "index": make("int64", first + index),
+        "task_index": make("int64", np.full(count, task)),
     }
-
-
-def _tabulate_frames(frames: dict[str, Frames], features: dict[str, Feature], source: ExportSource) -> pa.Table:
-    columns = []
-    for name, feature in features.items():
-        flat = pa.array(frames[name].astype(feature.dtype).ravel())
-        columns.append(flat if feature.names is None else pa.FixedSizeListArray.from_arrays(flat, len(feature.names)))
-    schema = pa.schema([pa.field(name, feature.arrow_type) for name, feature in features.items()])
-    return pa.table(columns, schema.with_metadata({"throwcollect.digest": source.dataset.digest}))
 
 
 def _describe_episode(
-    frames: dict[str, Frames], task: str, *, number: int, first: int, chunk: int, file: int
+    features: dict[str, Feature], task: str, *, number: int, first: int, chunk: int, file: int
 ) -> dict[str, Any]:
-    length = len(frames["index"])
+    length = len(features["index"].values)
     row = {
         "episode_index": number,
         "tasks": [task],
@@ -253,9 +228,10 @@ def _describe_episode(
         "dataset_from_index": first,
         "dataset_to_index": first + length,
     }
-    for name, array in frames.items():
-        exact = np.quantile(array, list(QUANTILES.values()), axis=0)
-        row |= {f"stats/{name}/{key}": values for key, values in _list_statistics(Moments.of(array), exact).items()}
+    for name, feature in features.items():
+        exact = np.quantile(feature.values, list(QUANTILES.values()), axis=0)
+        statistics = _list_statistics(Moments.of(feature.values), exact)
+        row |= {f"stats/{name}/{key}": values for key, values in statistics.items()}
     return row
 
 
