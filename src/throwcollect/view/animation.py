@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import product
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -35,6 +33,7 @@ av = lazily("av")
 Picture = NDArray[np.uint8]
 """Red, green and blue, shape ``(height, width, 3)``."""
 
+_KINDS = (".webp", ".gif", ".mp4", ".png")
 _FRAME_MS = 50
 _LAST_FRAME_MS = 1200
 _MOST_THROWS = 64
@@ -92,8 +91,8 @@ def render(
         MissingExtraError: If Pillow or, for a video, PyAV is not installed.
     """
     kind = output.suffix.lower()
-    if kind not in _ENCODERS:
-        raise ConfigError(f"{output}: no picture ends like this", expected=f"a name with {' or '.join(_ENCODERS)}")
+    if kind not in _KINDS:
+        raise ConfigError(f"{output}: no picture ends like this", expected=f"a name with {' or '.join(_KINDS)}")
     if strip > 1 and kind != ".png":
         raise ConfigError(f"{output}: a strip of {strip} pictures", expected="a name with .png")
     require("PIL", *(("av",) if kind == ".mp4" else ()))
@@ -125,7 +124,7 @@ def render(
         _arrange([draw(number, time_s) for number, time_s in sheet], columns)
         for sheet in log_progress(sheets, len(sheets), "picture", "drawn")
     ]
-    data = _ENCODERS[kind](pictures, {HELD, *(each.color for each in throws)})
+    data = _encode(kind, pictures, {HELD, *(each.color for each in throws)})
     write_file(output, data)
     moves_s = (len(pictures) - 1) * _FRAME_MS / 1000
     return Rendering(output, tuple(each.throw.trial for each in throws), len(times), moves_s, len(data))
@@ -179,13 +178,17 @@ def _arrange(pictures: Sequence[Picture], columns: int) -> Picture:
     return sheet
 
 
-def _encode_animation(pictures: Sequence[Picture], lines: Collection[Rgb], kind: str) -> bytes:
+def _encode(kind: str, pictures: Sequence[Picture], lines: Collection[Rgb]) -> bytes:
+    """Encode pictures as a file of a kind, such as ``.gif``, in which lines have some colors."""
+    if kind == ".mp4":
+        return _encode_video(pictures)
     shown = [images.fromarray(picture) for picture in pictures]
-    if kind == "GIF":
+    if kind == ".gif":
         shown = _reduce_colors(shown, lines)
     times = [_FRAME_MS] * (len(shown) - 1) + [_LAST_FRAME_MS]
+    moving = {"save_all": True, "append_images": shown[1:], "duration": times, "loop": 0, "quality": 80, "method": 4}
     buffer = io.BytesIO()
-    shown[0].save(buffer, kind, save_all=True, append_images=shown[1:], duration=times, loop=0, quality=80, method=4)
+    shown[0].save(buffer, kind[1:].upper(), **({"optimize": True} if kind == ".png" else moving))
     return buffer.getvalue()
 
 
@@ -207,13 +210,7 @@ def _reduce_colors(pictures: Sequence[Any], lines: Collection[Rgb]) -> list[Any]
     return [picture.quantize(palette=palette, dither=images.Dither.NONE) for picture in pictures]
 
 
-def _encode_still(pictures: Sequence[Picture], _lines: Collection[Rgb]) -> bytes:
-    buffer = io.BytesIO()
-    images.fromarray(pictures[0]).save(buffer, "PNG", optimize=True)
-    return buffer.getvalue()
-
-
-def _encode_video(pictures: Sequence[Picture], _lines: Collection[Rgb]) -> bytes:
+def _encode_video(pictures: Sequence[Picture]) -> bytes:
     """Encode H.264, which all browsers and players show; the last picture stays for a while."""
     # Colors have half the resolution, so that height and width must be even.
     height, width = (length - length % 2 for length in pictures[0].shape[:2])
@@ -226,13 +223,3 @@ def _encode_video(pictures: Sequence[Picture], _lines: Collection[Rgb]) -> bytes
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return buffer.getvalue()
-
-
-_ENCODERS: MappingProxyType[str, Callable[[Sequence[Picture], Collection[Rgb]], bytes]] = MappingProxyType(
-    {
-        ".webp": partial(_encode_animation, kind="WEBP"),
-        ".gif": partial(_encode_animation, kind="GIF"),
-        ".mp4": _encode_video,
-        ".png": _encode_still,
-    }
-)
