@@ -232,7 +232,10 @@ def _find(
     # The standard deviation that is expected of each number before any throw: the prior of the least squares below.
     spread = np.full(width + targets, _SMALL_OFFSET if width else _OFFSET)
     spread[:width] = _BIAS if method is Method.BIAS else _LATENT
-    low, high = _find_bounds(learned, method, len(spread))
+    low, high = np.full(len(spread), -np.inf), np.full(len(spread), np.inf)
+    if method is Method.LATENT:
+        # Latents stay inside of the ranges of the dataset.
+        low[:width], high[:width] = -1.0 - learned.correction.latents, 1.0 - learned.correction.latents
     found = np.zeros(len(spread)) if begun is None else begun
     for step in range(_STEPS):
         current = learned.correct(_shift(learned.correction, method, found))
@@ -257,15 +260,6 @@ def _find(
     # The normal matrix includes the prior, so its inverse is the covariance of the most probable difference.
     covariance = solve(normal, np.eye(len(found)))
     return found, np.sqrt(np.diagonal(covariance))
-
-
-def _find_bounds(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array]:
-    """Bounds of a difference: latents stay inside of the ranges of the dataset."""
-    low, high = np.full(count, -np.inf), np.full(count, np.inf)
-    if method is Method.LATENT:
-        latents = learned.correction.latents
-        low[: len(latents)], high[: len(latents)] = -1.0 - latents, 1.0 - latents
-    return low, high
 
 
 def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Array) -> Array:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,7 +145,7 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
     places = grid.measure(columns)
     learned, _, _ = fit_throws(Kind.LOCAL, axes, grid.names, values[landed], places, columns[EFFORT])
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(number, 0)))
-    found = _aim(learned, partial(_find_promising, axes, values, ~landed), parameters, grid, count, randomness)
+    found = _aim(learned, (values, ~landed), parameters, grid, count, randomness)
     if not len(found):
         raise ConfigError("sweep.target: none of its cells is in reach", hint="look at the report of the first round")
     keys = [axis.key for axis in axes]
@@ -179,13 +178,16 @@ def _find_promising(
 
 def _aim(
     learned: LearnedMap,
-    find_promising: Callable[[Array], NDArray[np.bool_]],
+    tried: tuple[Array, NDArray[np.bool_]],
     parameters: Mapping[str, Parameter],
     grid: Grid,
     count: int,
     randomness: np.random.Generator,
 ) -> Array:
-    """Find throws into the emptiest cells, in the units of the axes, shape ``(n, n_axes)``."""
+    """Find throws into the emptiest cells, in the units of the axes, shape ``(n, n_axes)``.
+
+    `tried` are all trials so far, and which of them have failed.
+    """
     landed = grid.count(learned.outputs)
     # In a cell at the edge, throws may fail that should land there, so their number grows from round to round.
     most = _GROWTH * landed + 2
@@ -219,7 +221,7 @@ def _aim(
         noise = spread_out * randomness.standard_normal((len(starts), len(learned.axes_of(KeyRole.PARAMETER))))
         aims = aim(_start_from(learned, starts, noise), goals, learned.scale(KeyRole.CONTEXT, context))
         values = np.hstack([learned.unscale(KeyRole.PARAMETER, aims.parameters), context])
-        predicted, safe = grid.find_cells(aims.predicted) == cells, find_promising(values)
+        predicted, safe = grid.find_cells(aims.predicted) == cells, _find_promising(learned.axes, *tried, values)
         for cell, inside, sure, row in zip(cells.tolist(), predicted.tolist(), safe.tolist(), values, strict=True):
             # At the edge of what is in reach, many throws have failed; some risk shows where the edge is.
             hit = inside and (sure or planned[cell] < landed[cell] + _RISKY)
