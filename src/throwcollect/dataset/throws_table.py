@@ -25,7 +25,7 @@ from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import REFUSED, Result
-from throwcollect.tasks.result_columns import body_columns, join_body
+from throwcollect.tasks.result_columns import BodyColumns
 from throwcollect.tasks.task import task_of
 from throwcollect.units import ascii_unit, unit_of_name
 
@@ -34,6 +34,7 @@ Row = dict[str, Any]
 
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
+_STATE = BodyColumns("")
 
 
 def place_columns(shard: str, chunk_offset: int, episode: Episode) -> Row:
@@ -55,8 +56,8 @@ def body_state(row: Row, name: str) -> ObjectState | None:
 
     It is None if the trial came to no such event, or its task knows none.
     """
-    values: list[Any] = [row.get(column) for column in body_columns(name)]
-    return None if None in values else join_body(values)
+    values: list[Any] = [row.get(column.name) for column in _STATE.declare(name, ())]
+    return None if None in values else _STATE.join(values, ())
 
 
 class ThrowsTable:

@@ -10,12 +10,11 @@ A description may name the ``{tool}`` and the ``{object}``, by which contacts an
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import Field, dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
-from throwcollect.tasks.measures import ObjectState, Peak, Vector
+from throwcollect.tasks.measures import ObjectState, Peak
 
 _DECLARED = "columns"
 
@@ -35,155 +34,106 @@ class Column:
     description: str
 
 
-class Columns(ABC):
-    """The columns of one field of a result, by default a single column; all are null where the field is None."""
+class Columns:
+    """The columns of one field of a result, by default a single column; all are null where the field is None.
 
-    @abstractmethod
+    Args:
+        columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field.
+        split: Splits a value of the field, which is not None, into one value for each column.
+        join: Makes a value of the field from the columns' values, none of which is null.
+    """
+
+    def __init__(
+        self,
+        columns: Sequence[Column],
+        split: Callable[[Any], Sequence[object]] = lambda value: (value,),
+        join: Callable[..., Any] = lambda value: value,
+    ) -> None:
+        self._columns, self._split, self._join = columns, split, join
+
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns of the field `name`, for the joints that the task moves."""
+        return [
+            Column(each.name.replace("{field}", name), each.kind, each.description.replace("{field}", name))
+            for each in self._columns
+        ]
 
     def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Split a value of the field, which is not None, into one value for each column."""
-        return (value,)
+        return self._split(value)
 
     def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
         """Make the field's value from the columns' values, none of which is null."""
-        return values[0]
+        return self._join(*values)
 
 
-@dataclass(frozen=True)
 class Number(Columns):
-    """A number, in a column that has the field's name.
+    """A number, in a column that has the field's name; the description is one sentence, with the unit."""
 
-    Attributes:
-        description: One sentence, with the unit.
-    """
-
-    kind: ClassVar[Literal["number", "count"]] = "number"
-    description: str
-
-    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the column; see `Columns`."""
-        return [Column(name, self.kind, self.description)]
+    def __init__(self, description: str) -> None:
+        super().__init__([Column("{field}", "number", description)])
 
 
-class Count(Number):
-    """A whole number, in a column that has the field's name."""
+class Count(Columns):
+    """A whole number, in a column that has the field's name; the description is one sentence."""
 
-    kind = "count"
+    def __init__(self, description: str) -> None:
+        super().__init__([Column("{field}", "count", description)])
 
 
-@dataclass(frozen=True)
 class BodyColumns(Columns):
-    """A `ObjectState`: ``<field>_time_s``, ``<field>_x_m`` and so on.
+    """A `ObjectState`: ``<field>_time_s``, ``<field>_x_m`` and so on; `when` ends a sentence with the instant."""
 
-    Attributes:
-        when: The instant, as the end of a sentence.
-    """
-
-    when: str
-
-    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the columns; see `Columns`."""
-        descriptions = [
-            f"Time since the start of the trial {self.when} [s].",
-            *(f"Centre of the {{object}} in world {self.when}, {axis} [m]." for axis in "xyz"),
-            *(f"Velocity of the {{object}} in world {self.when}, {axis} [m/s]." for axis in "xyz"),
-        ]
-        return [Column(column, "number", text) for column, text in zip(body_columns(name), descriptions, strict=True)]
-
-    def split(self, value: ObjectState, joints: Sequence[str]) -> Sequence[object]:
-        """Return time, position and velocity; see `Columns`."""
-        return (value.time_s, *value.position, *value.velocity)
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Return the state; see `Columns`."""
-        return join_body(values)
+    def __init__(self, when: str) -> None:
+        time = Column("{field}_time_s", "number", f"Time since the start of the trial {when} [s].")
+        place, speed = (f"{what} of the {{object}} in world {when}" for what in ("Centre", "Velocity"))
+        super().__init__(
+            [
+                time,
+                *(Column(f"{{field}}_{axis}_m", "number", f"{place}, {axis} [m].") for axis in "xyz"),
+                *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
+            ],
+            lambda state: (state.time_s, *state.position, *state.velocity),
+            lambda time_s, x, y, z, vx, vy, vz: ObjectState(time_s, (x, y, z), (vx, vy, vz)),
+        )
 
 
-def body_columns(name: str) -> list[str]:
-    """List the names of the columns of a `ObjectState`: time, position and velocity."""
-    return [f"{name}_time_s", *(f"{name}_{axis}_m" for axis in "xyz"), *(f"{name}_v{axis}_mps" for axis in "xyz")]
-
-
-def join_body(values: Sequence[float]) -> ObjectState:
-    """Make a state of the object from the values of its columns."""
-    time_s, x, y, z, vx, vy, vz = values
-    return ObjectState(time_s, (x, y, z), (vx, vy, vz))
-
-
-@dataclass(frozen=True)
 class SpinColumns(Columns):
-    """An angular velocity of the object: ``<field>_x_radps`` and so on.
+    """An angular velocity of the object: ``<field>_x_radps`` and so on; `when` is as for `BodyColumns`."""
 
-    Attributes:
-        when: The instant, as the end of a sentence.
-    """
-
-    when: str
-
-    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the columns; see `Columns`."""
-        return [
-            Column(
-                f"{name}_{axis}_radps",
-                "number",
-                f"Angular velocity of the {{object}} in world {self.when}, {axis} [rad/s].",
-            )
-            for axis in "xyz"
-        ]
-
-    def split(self, value: Vector, joints: Sequence[str]) -> Sequence[object]:
-        """Return the components; see `Columns`."""
-        return value
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Return the vector; see `Columns`."""
-        return tuple(values)
+    def __init__(self, when: str) -> None:
+        spin = f"Angular velocity of the {{object}} in world {when}"
+        columns = [Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz"]
+        super().__init__(columns, tuple, lambda *parts: parts)
 
 
-@dataclass(frozen=True)
 class PeakColumns(Columns):
-    """A `Peak`: ``<field>_share`` and ``<field>_joint``.
+    """A `Peak`: ``<field>_share`` and ``<field>_joint``; `of` describes the share, as the beginning of a sentence."""
 
-    Attributes:
-        of: Description of the share, as the beginning of a sentence.
-    """
-
-    of: str
-
-    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the columns; see `Columns`."""
-        return [
-            Column(f"{name}_share", "number", f"{self.of} [-]; 1 is at the limit."),
-            Column(f"{name}_joint", "text", f"Joint that had {name}_share."),
-        ]
-
-    def split(self, value: Peak, joints: Sequence[str]) -> Sequence[object]:
-        """Return share and joint; see `Columns`."""
-        return (value.share, value.joint)
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Return the peak; see `Columns`."""
-        share, joint = values
-        return Peak(joint, share)
+    def __init__(self, of: str) -> None:
+        share = Column("{field}_share", "number", f"{of} [-]; 1 is at the limit.")
+        joint = Column("{field}_joint", "text", "Joint that had {field}_share.")
+        super().__init__([share, joint], lambda peak: (peak.share, peak.joint), lambda share, joint: Peak(joint, share))
 
 
-@dataclass(frozen=True)
 class JointColumns(Columns):
     """A number for each joint that the task moves, by joint: ``<joint>_<field>``.
 
-    Attributes:
-        description: One sentence, with the unit; ``{joint}`` stands for the joint.
+    The description is one sentence, with the unit, in which ``{joint}`` stands for the joint.
     """
 
-    description: str
+    def __init__(self, description: str) -> None:
+        super().__init__([Column("{joint}_{field}", "number", description)])
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns; see `Columns`."""
-        return [Column(f"{joint}_{name}", "number", self.description.replace("{joint}", joint)) for joint in joints]
+        (each,) = super().declare(name, joints)
+        return [
+            Column(each.name.replace("{joint}", joint), each.kind, each.description.replace("{joint}", joint))
+            for joint in joints
+        ]
 
-    def split(self, value: Mapping[str, float], joints: Sequence[str]) -> Sequence[object]:
+    def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Return the numbers in the order of the joints; see `Columns`."""
         return [value[joint] for joint in joints]
 
