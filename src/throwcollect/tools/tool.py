@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,12 +40,20 @@ class Tool(ABC):
 
     Opening, depth, seat and way out are those of tools in which an object can lie; by default, a tool holds none.
 
+    Mount and inertia follow from two keys by default: ``mount_offset_m``, and ``mass_kg``.
+
+    Args:
+        config: The tool's section of the configuration.
+
     Attributes:
         name: Name of the tool, as of its entry point, such as ``spoon``, by which contacts with it are recorded; its
             link is ``<name>_link``.
     """
 
     name: str
+
+    def __init__(self, config: Any) -> None:
+        self._config = config
 
     @property
     def release_s(self) -> float | None:
@@ -58,9 +66,9 @@ class Tool(ABC):
         return f"{self.name}_link"
 
     @property
-    @abstractmethod
     def mount(self) -> pinocchio.SE3:
-        """Pose of the tool's frame in the hand that holds it."""
+        """Pose of the tool's frame in the hand that holds it; by default, the tool is shifted along -z of the hand."""
+        return shift(z=-self._config.mount_offset_m)
 
     @property
     @abstractmethod
@@ -68,9 +76,9 @@ class Tool(ABC):
         """The boxes that the tool consists of, at least one."""
 
     @property
-    @abstractmethod
     def inertia(self) -> pinocchio.Inertia:
-        """Inertia of the tool, in its frame."""
+        """Inertia of the tool, in its frame; by default, the mass is spread evenly over the volume of the boxes."""
+        return spread_mass(self._config.mass_kg, self.boxes)
 
     @property
     def rim_radius_m(self) -> float:
@@ -112,6 +120,11 @@ class Tool(ABC):
         """Make the error for a configuration in which the object starts in a tool that holds none."""
         what = "set `object` to a body that lies elsewhere, or a task that has one, such as slide"
         return ConfigError([Problem(f"the {self.name} holds no object; {what}", "tool.name")])
+
+
+def shift(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> pinocchio.SE3:
+    """Make the pose of a frame that is shifted [m], and not turned."""
+    return pinocchio.SE3(np.eye(3), np.array([x, y, z]))
 
 
 def spread_mass(mass_kg: float, boxes: Sequence[Box]) -> pinocchio.Inertia:

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.pinocchio_library import pinocchio
 from throwcollect.tools.claw.claw_config import ClawConfig
-from throwcollect.tools.tool import Box, Tool, spread_mass
+from throwcollect.tools.tool import Box, Tool, shift
 
 
 class Claw(Tool):
@@ -23,18 +22,12 @@ class Claw(Tool):
 
     name = "claw"
 
-    def __init__(self, config: ClawConfig) -> None:
-        self._config = config
+    _config: ClawConfig
 
     @property
     def release_s(self) -> float:
         """Time at which it lets go of the ball [s]."""
         return self._config.release_s
-
-    @property
-    def mount(self) -> pinocchio.SE3:
-        """Pose of ``claw_link`` in the hand."""
-        return pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -self._config.mount_offset_m]))
 
     @property
     def rim_radius_m(self) -> float:
@@ -53,15 +46,10 @@ class Claw(Tool):
         width, length, palm = config.finger_width_m, config.finger_length_m, config.palm_length_m
         aside, end = (config.opening_m + width) / 2, width / 2 - palm
         return (
-            _place((width, width, palm), (0.0, 0.0, -palm / 2)),
-            _place((width, 2 * aside + width, width), (0.0, 0.0, end)),
-            *(_place((length, width, width), ((width + length) / 2, y, end)) for y in (-aside, aside)),
+            Box((width, width, palm), shift(z=-palm / 2)),
+            Box((width, 2 * aside + width, width), shift(z=end)),
+            *(Box((length, width, width), shift((width + length) / 2, y, end)) for y in (-aside, aside)),
         )
-
-    @property
-    def inertia(self) -> pinocchio.Inertia:
-        """Inertia of the claw in ``claw_link``, with its mass spread evenly over the volume of its boxes."""
-        return spread_mass(self._config.mass_kg, self.boxes)
 
     def ball_seat(self, radius: float) -> tuple[float, float, float]:
         """Find the centre [m] of a ball that the fingers hold at their tips, in ``claw_link``."""
@@ -77,7 +65,3 @@ class Claw(Tool):
     def way_out(self, radius: float, up: NDArray[np.float64]) -> float:  # noqa: ARG002 - neither matters
         """Return the slope of a vertical way [rad], as the fingers hold the ball at any tilt; see `Tool.way_out`."""
         return math.pi / 2
-
-
-def _place(size: tuple[float, float, float], middle: tuple[float, float, float]) -> Box:
-    return Box(size, pinocchio.SE3(np.eye(3), np.array(middle)))

@@ -8,11 +8,8 @@ from __future__ import annotations
 
 from functools import cached_property
 
-import numpy as np
-
-from throwcollect.pinocchio_library import pinocchio
 from throwcollect.tools.paddle.paddle_config import PaddleConfig
-from throwcollect.tools.tool import Box, Tool, spread_mass
+from throwcollect.tools.tool import Box, Tool, shift
 
 
 class Paddle(Tool):
@@ -20,13 +17,7 @@ class Paddle(Tool):
 
     name = "paddle"
 
-    def __init__(self, config: PaddleConfig) -> None:
-        self._config = config
-
-    @property
-    def mount(self) -> pinocchio.SE3:
-        """Pose of ``paddle_link`` in the hand."""
-        return _shift(-self._config.mount_offset_m)
+    _config: PaddleConfig
 
     @cached_property
     def boxes(self) -> tuple[Box, ...]:
@@ -34,15 +25,6 @@ class Paddle(Tool):
         config = self._config
         width, handle, blade = config.handle_width_m, config.handle_length_m, config.blade_length_m
         return (
-            Box((width, width, handle), _shift(-handle / 2)),
-            Box((config.blade_thickness_m, config.blade_width_m, blade), _shift(-handle - blade / 2)),
+            Box((width, width, handle), shift(z=-handle / 2)),
+            Box((config.blade_thickness_m, config.blade_width_m, blade), shift(z=-handle - blade / 2)),
         )
-
-    @property
-    def inertia(self) -> pinocchio.Inertia:
-        """Inertia of the paddle in ``paddle_link``, with its mass spread evenly over the volume of its boxes."""
-        return spread_mass(self._config.mass_kg, self.boxes)
-
-
-def _shift(z: float) -> pinocchio.SE3:
-    return pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, z]))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.tools.spoon.spoon_config import SpoonConfig
-from throwcollect.tools.tool import Box, Tool, spread_mass
+from throwcollect.tools.tool import Box, Tool, shift
 
 
 class Spoon(Tool):
@@ -23,13 +23,7 @@ class Spoon(Tool):
 
     name = "spoon"
 
-    def __init__(self, config: SpoonConfig) -> None:
-        self._config = config
-
-    @property
-    def mount(self) -> pinocchio.SE3:
-        """Pose of ``spoon_link`` in the hand."""
-        return pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -self._config.mount_offset_m]))
+    _config: SpoonConfig
 
     @property
     def rim_radius_m(self) -> float:
@@ -48,14 +42,12 @@ class Spoon(Tool):
         The inner faces of the walls touch the cone from outside, so a ball that rests in the cup touches all of them.
         """
         config = self._config
-        handle = Box(
-            (config.handle_width_m, config.handle_width_m, config.handle_length_m),
-            pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -config.handle_length_m / 2])),
-        )
+        size = (config.handle_width_m, config.handle_width_m, config.handle_length_m)
+        handle = Box(size, shift(z=-config.handle_length_m / 2))
         length, lean = self._slant
         middle = np.array([config.cup_depth_m / 2, (config.cup_rim_radius_m + config.cup_floor_radius_m) / 2, 0.0])
         inner_face = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0.0, 0.0, lean), middle)
-        wall = inner_face * pinocchio.SE3(np.eye(3), np.array([0.0, config.wall_thickness_m / 2, 0.0]))
+        wall = inner_face * shift(y=config.wall_thickness_m / 2)
         # Narrower walls would leave gaps at the rim. Further down, these walls overlap, but only outside the cup.
         width = 2 * config.cup_rim_radius_m * math.tan(math.pi / config.cup_walls)
         turns = (
@@ -64,11 +56,6 @@ class Spoon(Tool):
         )
         walls = (Box((length, config.wall_thickness_m, width), self._cup * turn * wall) for turn in turns)
         return (handle, *walls)
-
-    @property
-    def inertia(self) -> pinocchio.Inertia:
-        """Inertia of the spoon in ``spoon_link``, with its mass spread evenly over the volume of its boxes."""
-        return spread_mass(self._config.mass_kg, self.boxes)
 
     def ball_seat(self, radius: float) -> tuple[float, float, float]:
         """Find the centre [m] of a ball that rests in the upright cup, in ``spoon_link``."""
@@ -118,8 +105,7 @@ class Spoon(Tool):
     def _cup(self) -> pinocchio.SE3:
         # The handle reaches into the rim by a wall's thickness, so that handle and cup are one piece.
         config = self._config
-        distance = config.handle_length_m + config.cup_rim_radius_m - config.wall_thickness_m
-        return pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -distance]))
+        return shift(z=-(config.handle_length_m + config.cup_rim_radius_m - config.wall_thickness_m))
 
     @property
     def _slant(self) -> tuple[float, float]:
