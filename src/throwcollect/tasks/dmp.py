@@ -175,61 +175,26 @@ def kernels(*, count: int, alpha_x: float) -> tuple[NDArray[np.float64], NDArray
     return centres, np.append(widths, widths[-1])
 
 
-def fit_dmp(
-    joints: Sequence[str],
-    times: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    *,
-    velocities: NDArray[np.float64],
-    accelerations: NDArray[np.float64],
-    basis_functions: int,
-) -> DynamicMovementPrimitive:
-    """Find the weights with which a DMP repeats a demonstrated motion, by least squares over all basis functions.
-
-    The DMP starts at the first position; its goal is the last one and its tau the duration of the demonstration,
-    which should start and end at rest. Its other constants have their defaults.
-
-    Args:
-        joints: Names of the joints, ``(n_joints,)``.
-        times: [s], from 0, strictly increasing, shape ``(n,)`` with at least as many as there are basis functions.
-        positions: [rad], shape ``(n, n_joints)``.
-        velocities: [rad/s], shape ``(n, n_joints)``.
-        accelerations: [rad/s²], shape ``(n, n_joints)``.
-        basis_functions: Number of basis functions for each joint.
-    """
-    family = DynamicMovementPrimitive(family="dmp", basis_functions=basis_functions)
-    alpha_z, tau = family.alpha_z, times[-1]
-    # These are the equations above, solved for the forcing term that the demonstration needs.
-    target = tau**2 * accelerations - alpha_z * (alpha_z / 4 * (positions[-1] - positions) - tau * velocities)
-    features = basis(exp(-family.alpha_x / tau * times), count=basis_functions, alpha_x=family.alpha_x)
-    weights = np.linalg.lstsq(features, target, rcond=None)[0]
-    learned = {joint: column.tolist() for joint, column in zip(joints, weights.T, strict=True)}
-    return family.model_copy(update={"weights": learned})
-
-
 def fit_motions(motions: Sequence[JointTrajectory], *, basis_functions: int) -> list[DynamicMovementPrimitive]:
-    """Fit a DMP to each motion, all by one decomposition: stretched to a duration of 1, they have the same phases."""
+    """Find the weights with which a DMP repeats each motion, by least squares over all basis functions.
+
+    A DMP starts at the first position of its motion; its goal is the last one and its tau the duration of the motion,
+    which should start and end at rest. Its other constants have their defaults. All motions are fitted by one
+    decomposition: stretched to a duration of 1, they have the same phases.
+    """
     if not motions:
         return []
-    shares = np.linspace(0, 1, FIT_POINTS)
-    sampled = [sample_quintic(motion, shares * motion.times[-1]) for motion in motions]
-    # A motion of duration T is stretched to 1, so its derivatives are multiplied by T and T squared.
-    durations = [motion.times[-1] for motion in motions]
-    positions, velocities, accelerations = (
-        np.hstack([each[order] * (1.0, T, T**2)[order] for each, T in zip(sampled, durations, strict=True)])
-        for order in range(3)
-    )
-    # A primitive has each joint once, so columns of several motions get names with their numbers.
-    names = [(number, joint) for number, motion in enumerate(motions) for joint in motion.joints]
-    together = fit_dmp(
-        [f"{number} {joint}" for number, joint in names],
-        shares,
-        positions,
-        velocities=velocities,
-        accelerations=accelerations,
-        basis_functions=basis_functions,
-    )
-    weights: list[dict[str, list[float]]] = [{} for _ in motions]
-    for number, joint in names:
-        weights[number][joint] = together.weights[f"{number} {joint}"]
-    return [together.model_copy(update={"weights": each}) for each in weights]
+    family = DynamicMovementPrimitive(family="dmp", basis_functions=basis_functions)
+    alpha_z, shares = family.alpha_z, np.linspace(0, 1, FIT_POINTS)
+    targets = []
+    for motion in motions:
+        tau = motion.times[-1]
+        positions, velocities, accelerations = sample_quintic(motion, shares * tau)
+        # These are the equations above, solved for the forcing term that the motion needs.
+        spring = alpha_z * (alpha_z / 4 * (positions[-1] - positions) - tau * velocities)
+        targets.append(tau**2 * accelerations - spring)
+    features = basis(exp(-family.alpha_x * shares), count=basis_functions, alpha_x=family.alpha_x)
+    columns = iter(np.linalg.lstsq(features, np.hstack(targets), rcond=None)[0].T.tolist())
+    # The iterator goes on from motion to motion.
+    weights = [dict(zip(motion.joints, columns, strict=False)) for motion in motions]
+    return [family.model_copy(update={"weights": each}) for each in weights]

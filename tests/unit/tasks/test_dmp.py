@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.tasks.dmp import basis, dmp_trajectory, fit_dmp, roll_out
+from throwcollect.tasks.dmp import basis, dmp_trajectory, fit_motions, roll_out
 from throwcollect.tasks.task import task_of
 
 ELBOW = "arm_right_4_joint"
@@ -17,13 +17,6 @@ PLAIN = DynamicMovementPrimitive(family="dmp")
 def roll(times, *, weights, family=PLAIN, tau=0.8):
     start, goal = np.array([-1.9, 0.2]), np.array([-0.5, 0.2])
     return roll_out(times, start=start, goal=goal, weights=weights, tau=tau, family=family)
-
-
-def demonstration(gamma=1.2, samples=401):
-    config = Config(task={"trajectory": {"family": "minimum_jerk", "gamma": gamma}})
-    times = np.linspace(0, 1, samples)
-    points = task_of(config).trajectory()
-    return points.joints, times, *sample_quintic(points, times)
 
 
 def test_without_weights_a_dmp_is_a_critically_damped_spring():
@@ -80,13 +73,12 @@ def test_basis_functions_sum_to_the_phase_everywhere():
     ("count", "gamma", "bound"), [(10, 1.2, 2e-3), (20, 1.2, 5e-4), (40, 1.2, 1.5e-4), (20, 0.95, 5e-4)]
 )
 def test_fitted_weights_repeat_the_demonstrated_motion(count, gamma, bound):
-    joints, times, positions, velocities, accelerations = demonstration(gamma)
-    family = fit_dmp(
-        joints, times, positions, velocities=velocities, accelerations=accelerations, basis_functions=count
-    )
+    motion = task_of(Config(task={"trajectory": {"family": "minimum_jerk", "gamma": gamma}})).trajectory()
+    times = np.linspace(0, 1, 401)
+    positions, velocities, _ = sample_quintic(motion, times)
+    (family,) = fit_motions([motion], basis_functions=count)
     config = Config(task={"trajectory": family.model_dump()})
-    repeated = task_of(config).trajectory()
-    curve, speed, _ = sample_quintic(repeated, times)
+    curve, speed, _ = sample_quintic(task_of(config).trajectory(), times)
     assert np.abs(curve - positions).max() < bound
     assert np.abs(speed - velocities).max() < 50 * bound
     assert family.basis_functions == count
