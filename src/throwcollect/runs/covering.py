@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.config.loader import load_locating_errors
@@ -21,27 +20,6 @@ from throwcollect.runs.preparation import prepare, resume
 from throwcollect.sweep.point_file import encode_points
 
 
-@dataclass(frozen=True)
-class Round:
-    """One of the datasets, with the files that it is collected from.
-
-    Attributes:
-        config: Its configuration, which `throwcollect up` takes, too.
-        list: The list of its trials; only the first round has none.
-        directory: The dataset.
-    """
-
-    config: Path
-    list: Path
-    directory: Path
-
-    @classmethod
-    def of(cls, directory: Path, number: int) -> Round:
-        """Name the files of a round, whose number begins at 1."""
-        name = f"round_{number:02}"
-        return cls(directory / f"{name}.yaml", directory / f"{name}.parquet", directory / name)
-
-
 def cover(
     path: Path,
     directory: Path,
@@ -56,7 +34,9 @@ def cover(
 
     The first round has the trials that the configuration draws; the throws of each further round are aimed at the cells
     in which few throws of all rounds before have landed. Rounds that are there already are kept or continued, so the
-    same call goes on after an interruption, and adds rounds if `rounds` is larger.
+    same call goes on after an interruption, and adds rounds if `rounds` is larger. Beside each dataset, such as
+    ``round_02``, lie its configuration, which `throwcollect up` takes, too, and the list of its trials, which only the
+    first one lacks.
 
     Args:
         path: The configuration's file. `trials` is the number of throws of all rounds together.
@@ -75,13 +55,13 @@ def cover(
         directory.mkdir(parents=True, exist_ok=True)
         datasets: list[Path] = []
         for number in range(1, rounds + 1):
-            each = Round.of(directory, number)
-            if not is_begun(each.directory):
+            each = directory / f"round_{number:02}"
+            if not is_begun(each):
                 count = trials // rounds + (number <= trials % rounds)
                 _write(each, config, datasets, count=count, number=number)
-            onlooker.say(f"round {number} of {rounds}: {each.directory}")
+            onlooker.say(f"round {number} of {rounds}: {each}")
             _collect(each, processes, onlooker, interruptions)
-            datasets.append(each.directory)
+            datasets.append(each)
     return datasets
 
 
@@ -100,31 +80,32 @@ def _check(config: Config, rounds: int) -> int:
     return config.trials or 0
 
 
-def _write(each: Round, config: Config, before: Sequence[Path], *, count: int, number: int) -> None:
+def _write(each: Path, config: Config, before: Sequence[Path], *, count: int, number: int) -> None:
     """Write the configuration of a round and, from the second one on, the list of its trials."""
+    points_file = each.with_suffix(".parquet")
     # Trials of the same number would have the same seed otherwise.
     changes: dict[str, object] = {"seed": (config.seed + number - 1) % 2**32, "trials": count}
     if before:
         from throwcollect.learning.covering import choose_throws
 
-        points = choose_throws(config, [Dataset.open(each) for each in before], count=count, number=number)
-        write_file(each.list, encode_points(points))
+        points = choose_throws(config, [Dataset.open(one) for one in before], count=count, number=number)
+        write_file(points_file, encode_points(points))
         target = config.sweep.target
-        sweep = SweepConfig(sampler="list", file=each.list.name, target=target, feasibility=config.sweep.feasibility)
+        sweep = SweepConfig(sampler="list", file=points_file.name, target=target, feasibility=config.sweep.feasibility)
         changes |= {"sweep": sweep, "trials": None}
-    if not (each.config.parent / ROBOT).exists():
-        carry_robot(config, each.config.parent)
-    write_file(each.config, config_text(config.model_copy(update=changes)).encode())
+    if not (each.parent / ROBOT).exists():
+        carry_robot(config, each.parent)
+    write_file(each.with_suffix(".yaml"), config_text(config.model_copy(update=changes)).encode())
 
 
-def _collect(each: Round, processes: int, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+def _collect(each: Path, processes: int, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Collect a round, or what is left of it."""
-    if is_complete(each.directory):
+    if is_complete(each):
         return
-    if is_begun(each.directory):
-        run = resume(each.directory, processes=processes, onlooker=onlooker)
+    if is_begun(each):
+        run = resume(each, processes=processes, onlooker=onlooker)
     else:
-        run = prepare(each.config, output=each.directory, processes=processes, onlooker=onlooker)
+        run = prepare(each.with_suffix(".yaml"), output=each, processes=processes, onlooker=onlooker)
     if run is not None:
         with run:
             run.collect(interruptions=interruptions)
