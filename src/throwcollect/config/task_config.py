@@ -47,6 +47,16 @@ class TargetColumn:
     required: bool = False
 
 
+def target_place(end: str, sentence: str) -> tuple[TargetColumn, ...]:
+    """Make the columns of a place in the plane, where a trial should end at the measures ``<end>_x_m`` and ``_y_m``."""
+    return tuple(
+        TargetColumn(
+            f"target_{axis}_m", f"{end}_{axis}_m", "miss_m", axis, f"{sentence}: {axis} in world [m].", required=True
+        )
+        for axis in "xy"
+    )
+
+
 def is_target(column: str) -> bool:
     """Whether a column of a list or a table is one of targets."""
     return column.startswith(TARGET_PREFIX) and "." not in column

@@ -11,7 +11,7 @@ from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.scene import AnyBody, BoxConfig, CylinderConfig
 from throwcollect.config.section import Section
-from throwcollect.config.task_config import TargetColumn, TaskConfig, UntilConfig, Wanted
+from throwcollect.config.task_config import TargetColumn, TaskConfig, UntilConfig, Wanted, target_place
 
 PUCK, TABLE = "puck", "table"
 """Names of the bodies of the task."""
@@ -94,17 +94,7 @@ class SlideConfig(TaskConfig):
     events: ClassVar[tuple[str, ...]] = ("hit", "leave", "rest")
     targets: ClassVar[tuple[str, ...]] = ("rest_x_m", "rest_y_m")
     given: ClassVar[tuple[str, ...]] = ("task.puck.x_m", "task.puck.y_m", "task.puck.mass_kg", "task.table.friction")
-    target_columns: ClassVar[tuple[TargetColumn, ...]] = tuple(
-        TargetColumn(
-            f"target_{axis}_m",
-            f"rest_{axis}_m",
-            "miss_m",
-            axis,
-            f"Where the puck should rest: {axis} in world [m].",
-            required=True,
-        )
-        for axis in "xy"
-    )
+    target_columns: ClassVar[tuple[TargetColumn, ...]] = target_place("rest", "Where the puck should rest")
 
     name: Literal["slide"] = "slide"
     """Task."""

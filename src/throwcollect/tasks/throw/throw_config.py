@@ -8,7 +8,7 @@ from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
-from throwcollect.config.task_config import TargetColumn, TaskConfig, UntilConfig, Wanted
+from throwcollect.config.task_config import TargetColumn, TaskConfig, UntilConfig, Wanted, target_place
 from throwcollect.errors import ConfigError, Problem
 
 
@@ -62,12 +62,7 @@ class ThrowConfig(SwingConfig):
     implementation: ClassVar[str] = "throwcollect.tasks.throw.throw_task:ThrowTask"
     given: ClassVar[tuple[str, ...]] = ("scene.landing_height_m",)
     target_columns: ClassVar[tuple[TargetColumn, ...]] = (
-        TargetColumn(
-            "target_x_m", "landing_x_m", "miss_m", "x", "Where the ball should land: x in world [m].", required=True
-        ),
-        TargetColumn(
-            "target_y_m", "landing_y_m", "miss_m", "y", "Where the ball should land: y in world [m].", required=True
-        ),
+        *target_place("landing", "Where the ball should land"),
         TargetColumn(
             "target_z_m", "scene.landing_height_m", "miss_m", "z", "Height at which the ball should land [m]."
         ),
