@@ -16,7 +16,8 @@ from throwcollect.members import names_of
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, _choose_installed
 from throwcollect.runs.doctor import examine
-from throwcollect.runtimes.docker.docker_engine import SOURCES_LABEL, default_tag
+from throwcollect.runtimes.docker.docker_engine import default_tag
+from throwcollect.runtimes.image_sources import SOURCES_LABEL
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 

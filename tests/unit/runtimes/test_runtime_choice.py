@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
@@ -16,6 +17,7 @@ from throwcollect.runtimes import registry
 from throwcollect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.runtimes.docker import docker_engine as docker_image
 from throwcollect.runtimes.docker.docker_engine import default_tag
+from throwcollect.runtimes.image_sources import SOURCES_LABEL
 
 
 @pytest.fixture
@@ -45,15 +47,14 @@ def no_engine(socket_is_there, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.fixture
 def engine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(docker_engine, "connect", lambda **_: Mock())
-    monkeypatch.setattr(docker_image, "is_outdated", lambda *_: False)
-    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: None)
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels={}))
 
 
 @pytest.fixture
 def outdated(engine, monkeypatch: pytest.MonkeyPatch) -> None:
     """An engine whose images are all outdated."""
-    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
-    monkeypatch.setattr(docker_image, "is_outdated", lambda *_: True)
+    labels = {SOURCES_LABEL: "0" * 64}
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels=labels))
 
 
 def lacks_image(*_: object, **__: object) -> None:
@@ -78,10 +79,7 @@ def test_requested_containers_without_a_docker_engine_are_an_error(choose, no_en
 
 
 @pytest.mark.parametrize(("runtime", "note"), [("auto", " (auto)"), ("docker", "")])
-def test_containers_are_chosen_if_engine_and_image_are_there(
-    choose, engine, monkeypatch: pytest.MonkeyPatch, runtime: str, note: str
-) -> None:
-    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
+def test_containers_are_chosen_if_engine_and_image_are_there(choose, engine, runtime: str, note: str) -> None:
     assert choose(runtime) == ("docker", [f"runtime: Docker containers of {default_tag()}{note}"])
 
 
@@ -128,8 +126,8 @@ ZENOH = Middleware("rclpy", "rmw_zenoh_cpp")
 def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
     engine, monkeypatch: pytest.MonkeyPatch, launcher: Middleware, rmw: str | None, ros: str, expected: Middleware
 ) -> None:
-    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
-    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
+    labels = {} if rmw is None else {docker_image.RMW_LABEL: rmw}
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels=labels))
     monkeypatch.setattr(registry, "choose_middleware", lambda _: launcher)
     said: list[str] = []
     found = registry.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
@@ -147,8 +145,8 @@ def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
 def test_requested_rclpy_that_containers_cannot_have_is_an_error(
     engine, monkeypatch: pytest.MonkeyPatch, rmw: str | None, problem: str
 ) -> None:
-    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
-    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
+    labels = {} if rmw is None else {docker_image.RMW_LABEL: rmw}
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels=labels))
     monkeypatch.setattr(registry, "choose_middleware", lambda _: FAST_DDS)
     with pytest.raises(ConfigError, match=problem) as caught:
         registry.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)

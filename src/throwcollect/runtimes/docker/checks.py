@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 from docker.client import DockerClient
-from docker.errors import ImageNotFound
 
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.config.schema import Config
@@ -18,9 +18,26 @@ from throwcollect.runtimes.docker.container_options import (
     mount_source,
     mount_target,
 )
-from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors
-from throwcollect.runtimes.docker.host_paths import DEVICES, is_allowed_device, refusal
+from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors, find_image
 from throwcollect.state_directory import state_directory
+
+_SYSTEM = (
+    *("/bin", "/boot", "/dev", "/etc", "/lib", "/lib32", "/lib64", "/libx32", "/lost+found", "/proc"),
+    *("/run", "/sbin", "/sys", "/usr", "/var/backups", "/var/cache", "/var/lib", "/var/lock", "/var/log", "/var/mail"),
+    *("/var/run", "/var/spool"),
+)
+"""Directories of the system. Neither what is in them nor a directory that contains one of them may be mounted."""
+
+_SHARED = ("/home", "/tmp", "/var/tmp")  # noqa: S108
+"""Directories that all users and programs share; directories in them may be data."""
+
+_HOME = re.compile("/root|/home/[^/]+")
+"""Home directories. What begins with a dot in them belongs to programs, and is full of keys and passwords."""
+
+_DEVICE = re.compile(r"/dev/(dri(/.+)?|nvidia[^/]*|nvidia-caps(/.+)?|kfd|dxg)")
+"""Device files of graphics processors, with which a simulation may compute."""
+
+_DEVICES = "graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg"
 
 
 def check(client: DockerClient, config: Config) -> str:
@@ -45,17 +62,15 @@ def _check(
         # The network of the host, and none at all, are in the list of every engine.
         networks = {each["Name"] for each in client.api.networks()} - {"host", "none"}
         root = os.path.realpath(client.api.info()["DockerRootDir"])
-        try:
-            image_id = str(client.images.get(name).id)
-        except ImageNotFound as error:
-            hint = BUILD_COMMAND if name == default_tag() else f"docker pull {name}"
-            raise WorkerError(f"the Docker engine has no image {name}", hint=hint) from error
+    if (found := find_image(client, name)) is None:
+        hint = BUILD_COMMAND if name == default_tag() else f"docker pull {name}"
+        raise WorkerError(f"the Docker engine has no image {name}", hint=hint)
     problems: list[Problem] = []
     for key, section in sections.items():
         problems += _problems(key, section, networks, root, mounts=mounts)
     if problems:
         raise ConfigError(problems)
-    return image_id
+    return str(found.id)
 
 
 def _problems(
@@ -99,6 +114,29 @@ def _wrong_mount(source: Path, root: str) -> str | None:
     return f"{source} {reason}" if real == source else f"{source}, which is {real}, {reason}"
 
 
+def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
+    """Say why a directory or file of the host must not be mounted; None if it may be.
+
+    Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets. The
+    path is absolute and leads through no links; `more` are further directories of the system, such as those of the
+    engine.
+    """
+    if path in _SHARED:
+        return f"is refused, as all users of the machine share {path}; mounts are for data"
+    for place in (*_SYSTEM, *more):
+        if os.path.commonpath([path, place]) in (path, place):
+            return f"is refused, as {place} belongs to the system; mounts are for data"
+    if _HOME.fullmatch(path):
+        return "is refused, as a home directory holds secrets; mounts are for data"
+    hidden = next((part for part in PurePosixPath(path).parts if part.startswith(".")), None)
+    return None if hidden is None else f"is refused, as {hidden} may hold secrets of programs; mounts are for data"
+
+
+def is_allowed_device(path: str) -> bool:
+    """Whether a device file, or a directory of them, may be handed over to a container; the path has no links."""
+    return _DEVICE.fullmatch(path) is not None
+
+
 def _wrong_device(device: Path) -> str | None:
     """Why a container must not get a device, or its target if it is a link; None if it may."""
     if not device.exists():
@@ -106,4 +144,4 @@ def _wrong_device(device: Path) -> str | None:
     files = [device, *device.rglob("*")] if device.is_dir() else [device]
     if all(is_allowed_device(str(file.resolve())) and not file.is_block_device() for file in files):
         return None
-    return f"{device} is refused, as it leads to other devices; containers get {DEVICES}"
+    return f"{device} is refused, as it leads to other devices; containers get {_DEVICES}"

@@ -12,11 +12,11 @@ from contextlib import contextmanager
 
 from docker.client import DockerClient
 from docker.errors import APIError, DockerException, ImageNotFound
+from docker.models.images import Image
 from urllib3.exceptions import HTTPError
 
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.address import engine_address, no_answer
-from throwcollect.runtimes.image_sources import SOURCES_LABEL, are_others
 from throwcollect.version import __version__
 
 RMW_LABEL = "throwcollect.rmw"
@@ -84,38 +84,21 @@ def default_tag() -> str:
     return f"throwcollect:{__version__}"
 
 
-def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> None:
-    """Make sure that the engine has an image: any other than the default one is pulled if it is missing."""
-    if is_there(client, tag):
-        return
+def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Image:
+    """Find an image of the engine: any other than the default one is pulled if it is missing."""
+    if (found := find_image(client, tag)) is not None:
+        return found
     if tag == default_tag():
         raise WorkerError(f"the image {tag} is not here; {BUILD_COMMAND}, in a clone of the project, builds it")
     say(f"image {tag} is not here; pulling it")
     with engine_errors(f"the image {tag} is not here and cannot be pulled", hint="docker load brings one from a file"):
-        client.images.pull(tag)
+        return client.images.pull(tag)
 
 
-def is_outdated(client: DockerClient, tag: str) -> bool:
-    """Whether an image of the engine was made from other sources than those of this package's clone."""
-    return are_others(_read_label(client, tag, SOURCES_LABEL))
-
-
-def rmw_of(client: DockerClient, tag: str) -> str | None:
-    """Middleware of the genuine rclpy in an image of the engine; None if the image has no rclpy."""
-    return _read_label(client, tag, RMW_LABEL)
-
-
-def is_there(client: DockerClient, image: str) -> bool:
-    """Whether the engine has an image."""
-    with engine_errors(f"the engine does not say whether it has the image {image}"):
+def find_image(client: DockerClient, name: str) -> Image | None:
+    """Find an image of the engine, with its labels; None if the engine does not have it."""
+    with engine_errors(f"the engine does not say whether it has the image {name}"):
         try:
-            client.images.get(image)
+            return client.images.get(name)
         except ImageNotFound:
-            return False
-        return True
-
-
-def _read_label(client: DockerClient, tag: str, name: str) -> str | None:
-    with engine_errors(f"the engine does not say what the image {tag} holds"):
-        label = client.images.get(tag).labels.get(name)
-    return label if isinstance(label, str) else None
+            return None

@@ -13,6 +13,7 @@ from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket
+from throwcollect.runtimes.image_sources import SOURCES_LABEL, are_others
 from throwcollect.runtimes.runtime import Check, RunContext, Runtime
 
 if TYPE_CHECKING:
@@ -52,14 +53,14 @@ class DockerRuntime(Runtime):
 
         name, patience_s = image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
         with closing(docker.connect(timeout_s=patience_s)) as client:
-            docker.ensure(client, name, say=say)
-            if docker.is_outdated(client, name):
+            labels = docker.ensure(client, name, say=say).labels
+            if are_others(labels.get(SOURCES_LABEL)):
                 finding = f"the image {name} was made from other sources than these"
                 # It may collect other bytes, so it is used only if the user has named it.
                 if config.containers.image is None:
                     raise WorkerError(f"{finding}; {docker.BUILD_COMMAND} builds it anew")
                 warn(f"{finding}; it is used, as containers.image names it")
-            return _choose_middleware(docker.rmw_of(client, name), name, config, middleware)
+            return _choose_middleware(labels.get(docker.RMW_LABEL), name, config, middleware)
 
     def check(self) -> Check:
         """Whether an engine answers, and has the image of these sources."""
@@ -70,10 +71,10 @@ class DockerRuntime(Runtime):
             with closing(docker.connect(timeout_s=_PROBE_S)) as client, docker.engine_errors("the Docker engine fails"):
                 engine = client.version()["Version"]
                 found = f"Docker {engine} answers at {engine_address()}"
-                if not docker.is_there(client, tag):
+                if (image := docker.find_image(client, tag)) is None:
                     lacking = f"the image {tag} is not there yet; {docker.BUILD_COMMAND}, in a clone, builds it"
                     return Check("docker", "note", f"{found}; {lacking}")
-                if docker.is_outdated(client, tag):
+                if are_others(image.labels.get(SOURCES_LABEL)):
                     old = f"the image {tag} was made from other sources than these"
                     return Check("docker", "note", f"{found}; {old}; {docker.BUILD_COMMAND} builds it anew")
         except WorkerError as error:

@@ -12,7 +12,7 @@ from tests.unit.runtimes.docker.engine import Engine, engine_at
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.runtimes.docker import checks as docker_checks
-from throwcollect.runtimes.docker.checks import check
+from throwcollect.runtimes.docker.checks import check, is_allowed_device, refusal
 from throwcollect.runtimes.docker.docker_engine import connect
 
 Check = Callable[..., list[str]]
@@ -105,3 +105,30 @@ def test_a_device_link_to_a_device_that_is_not_allowed_is_refused(
     assert problems(options={"devices": ["/dev/nvidia99:/dev/nvidia99:rw"]}) == [
         "options.devices.0: /dev/nvidia99 does not exist on this machine"
     ]
+
+
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [
+        ("/etc", "/etc belongs to the system"),
+        ("/proc/1", "/proc belongs to the system"),
+        ("/var/lib/docker/x", "/var/lib belongs to the system"),
+        ("/var", "/var/backups belongs to the system"),
+        ("/", "/bin belongs to the system"),
+        ("/root", "a home directory holds secrets"),
+        ("/home/me/.ssh/id", ".ssh may hold secrets of programs"),
+        ("/tmp", "all users of the machine share /tmp"),
+    ],
+)
+def test_directories_that_hold_no_data_are_refused(path: str, reason: str) -> None:
+    assert refusal(path) == f"is refused, as {reason}; mounts are for data"
+
+
+@pytest.mark.parametrize("path", ["/srv/models", "/home/me/data", "/var/tmp/x", "/tmpdata"])
+def test_directories_of_data_are_accepted(path: str) -> None:
+    assert refusal(path) is None
+
+
+def test_only_devices_of_graphics_processors_are_allowed() -> None:
+    devices = ("/dev/dri", "/dev/dri/renderD128", "/dev/nvidia0", "/dev/vda", "/dev/mem")
+    assert [is_allowed_device(each) for each in devices] == [True, True, True, False, False]
