@@ -12,7 +12,6 @@ from docker.client import DockerClient
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
-from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin
 from throwcollect.runtimes.docker.container_options import RUN_LABEL
@@ -47,8 +46,7 @@ def test_a_container_hears_the_run_that_it_joined_and_ends_with_it(
         until(lambda: runs_all(session))
         command = ("ros", "topic", "echo", "/sim_0/clock")
         spec = ContainerSpec(default_tag(), command, NodeContainerConfig(memory="512m"))
-        order = ContainerOrder("ear", spec, joins=session.id)
-        ear = begin_container(order, run="ear-1", origin=Origin("ear", joins=session.id), urdf=None)
+        ear = begin_container(spec, run="ear-1", origin=Origin("ear", joins=session.id), urdf=None)
         heard = Path(ear.record.logs) / "container.log"
         until(lambda: heard.is_file() and "nanosec:" in heard.read_text())
         assert runs_all(ear)

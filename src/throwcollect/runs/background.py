@@ -20,6 +20,7 @@ from typing import IO, Literal, cast
 
 from pydantic import TypeAdapter
 
+from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
@@ -31,13 +32,7 @@ from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectE
 from throwcollect.files import open_log
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.router_endpoint import reserve_port
-from throwcollect.runs.component_container import (
-    CONTAINER_ORDERS,
-    DESCRIPTION,
-    ContainerOrder,
-    check_order,
-    launch_container,
-)
+from throwcollect.runs.component_container import DESCRIPTION, check_request, launch_container
 from throwcollect.runs.launcher import launch
 from throwcollect.runs.preparation import MANY_TRIALS, prepare, resume
 from throwcollect.runs.records import Records
@@ -62,6 +57,7 @@ class Order:
 
 
 _ORDERS = TypeAdapter(Order)
+_SPECS = TypeAdapter(ContainerSpec)
 
 
 def begin_run(
@@ -100,13 +96,13 @@ def begin_run(
     return _begin(made, record, _ORDERS.dump_json(order))
 
 
-def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Path | None) -> Run:
+def begin_container(spec: ContainerSpec, *, run: str, origin: Origin, urdf: Path | None) -> Run:
     """Begin a run that is a container of the catalogue, in a process of its own, as `begin_run` does.
 
     `urdf` is a file with a description of the robot for viewers; None if the component has none.
     """
-    check_order(order)
-    made = Records().new(order.component, run=run)
+    check_request(spec, origin)
+    made = Records().new(origin.component, run=run)
     directory, logs = made.files / "data", made.files / "logs"
 
     def lay_out() -> None:
@@ -115,9 +111,9 @@ def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Pa
             shutil.copyfile(urdf, directory / DESCRIPTION)
 
     record = RunRecord.begin(
-        made.id, order.component, directory, logs=logs, runtime="docker", kind="container", origin=origin
+        made.id, origin.component, directory, logs=logs, runtime="docker", kind="container", origin=origin
     )
-    return _begin(made, record, CONTAINER_ORDERS.dump_json(order), lay_out)
+    return _begin(made, record, _SPECS.dump_json(spec), lay_out)
 
 
 def _begin(run: Run, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
@@ -161,7 +157,7 @@ def carry_out(id: str, lock: int, order: bytes, *, onlooker: Onlooker, interrupt
         launch(run, interruptions, config=load(config_path(run.context.directory)), onlooker=onlooker)
         return
     if run.record.kind == "container":
-        launch_container(run, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
+        launch_container(run, _SPECS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
         return
     log = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
     # If anything fails before the launch, the error is written into the record, and then the files of the run are

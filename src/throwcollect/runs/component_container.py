@@ -5,10 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-from pydantic import TypeAdapter
+from typing import TYPE_CHECKING, cast
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.coordinator.onlooker import Onlooker
@@ -16,6 +13,7 @@ from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
+from throwcollect.runs.run_record import Origin
 from throwcollect.runs.run_selection import require_living
 from throwcollect.runtimes.runtime import Host, RunContext
 
@@ -29,41 +27,29 @@ _ANSWER_S = 5.0
 """A client that asks for a container waits this long for the engine."""
 
 
-@dataclass(frozen=True)
-class ContainerOrder:
-    """The order for a container of a component, as the catalogue describes it; `joins` is a run that it joins."""
-
-    component: str
-    spec: ContainerSpec
-    joins: str | None = None
-
-
-CONTAINER_ORDERS = TypeAdapter(ContainerOrder)
-
-
-def check_order(order: ContainerOrder) -> None:
-    """Refuse an order that would fail at once."""
+def check_request(spec: ContainerSpec, origin: Origin) -> None:
+    """Refuse a request for a container of the catalogue that would fail at once."""
     with explain_missing():
         from throwcollect.runtimes.docker.checks import check_container
         from throwcollect.runtimes.docker.docker_engine import connect
-    if order.joins is not None:
-        _find_join_options(Records().get(order.joins), order.spec)
+    if origin.joins is not None:
+        _find_join_options(Records().get(origin.joins), spec)
     with closing(connect(timeout_s=_ANSWER_S)) as client:
-        check_container(client, order.spec, order.component)
+        check_container(client, spec, origin.component)
 
 
-def launch_container(run: Run, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+def launch_container(run: Run, spec: ContainerSpec, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run."""
-    # `serve` imports this module for `check_order`, and should not wait for the launcher's imports.
+    # `serve` imports this module for `check_request`, and should not wait for the launcher's imports.
     from throwcollect.runs.launcher import launch_host
+
+    origin = cast(Origin, run.record.origin)
 
     def host(context: RunContext) -> Host:
         from throwcollect.runtimes.docker.component import ComponentContainer
 
-        joining = None if order.joins is None else _wait_for_router(order.joins, order.spec, interruptions)
-        return ComponentContainer(
-            context, order.component, order.spec, joining, is_running=_is_running, warn=onlooker.warn
-        )
+        joining = None if origin.joins is None else _wait_for_router(origin.joins, spec, interruptions)
+        return ComponentContainer(context, origin.component, spec, joining, is_running=_is_running, warn=onlooker.warn)
 
     launch_host(run, host, onlooker=onlooker, interruptions=interruptions)
 

@@ -22,7 +22,6 @@ from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Probl
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
-from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin
@@ -74,8 +73,7 @@ class Instances:
                 raise ConflictError(f"there is an instance {instance} already, of another request")
             _check_room(component)
             if isinstance(component.source, ContainerSpec):
-                order = ContainerOrder(component.name, component.source, origin.joins)
-                return begin_container(order, run=instance, origin=origin, urdf=component.urdf), True
+                return begin_container(component.source, run=instance, origin=origin, urdf=component.urdf), True
             directory = self.datasets / instance
             if component.kind == "collection":
                 # The run would refuse it, too, but only after the client got its answer.

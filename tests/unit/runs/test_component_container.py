@@ -17,7 +17,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runs.component_container import ContainerOrder, launch_container
+from throwcollect.runs.component_container import launch_container
 from throwcollect.runs.control import down
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
@@ -28,7 +28,6 @@ from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LA
 from throwcollect.state_directory import STATE_VARIABLE
 
 SPEC = ContainerSpec("nodes", ("listen",), NodeContainerConfig())
-ORDER = ContainerOrder("ear", SPEC)
 
 
 @pytest.fixture(autouse=True)
@@ -59,11 +58,11 @@ def session() -> Iterator[Run]:
     run.close()
 
 
-def launch(engine: Engine, each_look: Callable[[], bool], order: ContainerOrder = ORDER) -> RunRecord:
+def launch(engine: Engine, each_look: Callable[[], bool], joins: str | None = None) -> RunRecord:
     """The record of a container that runs until it is told to end."""
-    run = remember("ear-1", "container", "docker", joins=order.joins)
+    run = remember("ear-1", "container", "docker", joins=joins)
     with suppress(WorkerError):
-        launch_container(run, order, onlooker=SILENT, interruptions=lambda: int(bool(engine.running()) and each_look()))
+        launch_container(run, SPEC, onlooker=SILENT, interruptions=lambda: int(bool(engine.running()) and each_look()))
     return Records().get("ear-1").record
 
 
@@ -103,7 +102,7 @@ def test_a_container_ends_with_the_run_that_it_has_joined(engine: Engine, sessio
         session.close()
         return False
 
-    record = launch(engine, end, replace(ORDER, joins="talos"))
+    record = launch(engine, end, "talos")
     assert (record.exit_code, record.failure) == (0, None)
     assert engine.names() == []
 

@@ -10,7 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served, make_end_fields
 
-from throwcollect.runs.component_container import ContainerOrder
+from throwcollect.config.containers import ContainerSpec
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin, RunFailure
@@ -130,10 +130,10 @@ def test_the_state_says_which_collections_can_be_resumed(
 def test_a_container_can_join_a_run(
     served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    orders: list[ContainerOrder] = []
+    joined: list[str | None] = []
 
-    def begin(order: ContainerOrder, *, run: str, origin: Origin, urdf: Path | None) -> Run:
-        orders.append(order)
+    def begin(spec: ContainerSpec, *, run: str, origin: Origin, urdf: Path | None) -> Run:
+        joined.append(origin.joins)
         directory = tmp_path / "datasets" / run
         directory.mkdir(parents=True)
         if urdf is not None:
@@ -156,7 +156,7 @@ def test_a_container_can_join_a_run(
     assert ask("e", component="ear").status_code == 409
     assert (answer := ask("f", component="ear", joins="t")).status_code == 409
     assert answer.json()["title"] == "component ear: 1 instance lives, as many as max_instances allows"
-    assert [each.joins for each in orders] == ["t"]
+    assert joined == ["t"]
     assert client.get(f"{URL}/e/urdf").text == "<robot/>"
     assert client.put(f"{URL}/e/urdf", content="<robot/>").status_code == 409
     patched = client.patch(f"{URL}/e", json={"simulations": 2})
