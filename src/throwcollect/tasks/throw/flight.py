@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.measures import ObjectState, Vector
-from throwcollect.tasks.throw.throw_config import throw_section
+from throwcollect.tasks.throw.throw_config import SwingConfig
 from throwcollect.units import NS_PER_S
 
 BALLISTIC_TOLERANCE_M = 1e-9
@@ -160,7 +161,7 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
     Returns:
         The largest distance [m]; None without a release, or with fewer than two such samples.
     """
-    gap_s = throw_section(config.task).recatch_gap_s
+    gap_s = cast("SwingConfig", config.task).recatch_gap_s
     release_ns = release_of(header.contacts, tool=config.tool.name, gap_s=gap_s)
     if release_ns is None:
         return None

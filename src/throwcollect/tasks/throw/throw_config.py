@@ -9,7 +9,6 @@ from pydantic import Field
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.task_config import TargetColumn, TaskConfig, UntilConfig, Wanted, target_place
-from throwcollect.errors import ConfigError, Problem
 
 
 class UntilLanded(UntilConfig):
@@ -77,10 +76,3 @@ class ThrowConfig(SwingConfig):
 
     name: Literal["throw"] = "throw"
     """Task."""
-
-
-def throw_section(task: TaskConfig) -> SwingConfig:
-    """Return the section of a task, which has to throw."""
-    if not isinstance(task, SwingConfig):
-        raise ConfigError([Problem(f"should be 'throw', got {task.name!r}", key="task.name")])
-    return task

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, cast
 
 from throwcollect.engines.engine import GROUND
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
@@ -22,7 +22,7 @@ from throwcollect.tasks.throw.flight import (
     spin_after,
     without_impact,
 )
-from throwcollect.tasks.throw.throw_config import throw_section
+from throwcollect.tasks.throw.throw_config import SwingConfig
 from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
 
@@ -56,8 +56,8 @@ class ThrowTask(Task[ThrowResult]):
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader
     ) -> tuple[ThrowResult, Failure | None]:
         """Measure the flight, and find what kept the ball from landing; see `Task.assess`."""
-        config = self.config
-        release_ns = release_of(header.contacts, tool=config.tool.name, gap_s=throw_section(config.task).recatch_gap_s)
+        config, gap_s = self.config, cast("SwingConfig", self.config.task).recatch_gap_s
+        release_ns = release_of(header.contacts, tool=config.tool.name, gap_s=gap_s)
         touched: list[Contact] = []
         impacts: list[Contact] = []
         if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
