@@ -151,12 +151,7 @@ def scale(simulations: int, *, run: RunOption = None) -> None:
 
 def stop(run: RunOption = None) -> None:
     """Finish the running trials of a run, close its files and end it; if no run lives, end the server."""
-    if (submitted := _find_submitted(run)) is not None:
-        from throwcollect.cli.cluster_runs import end
-
-        end(submitted)
-        return
-    if _end_server(run):
+    if _end_elsewhere(run):
         return
     from throwcollect.runs import control
     from throwcollect.runs.run_selection import describe_death, find_run_to_change, require_living
@@ -182,12 +177,7 @@ def stop(run: RunOption = None) -> None:
 
 def down(*, run: RunOption = None) -> None:
     """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
-    if (submitted := _find_submitted(run)) is not None:
-        from throwcollect.cli.cluster_runs import end
-
-        end(submitted)
-        return
-    if _end_server(run):
+    if _end_elsewhere(run):
         return
     from throwcollect.runs import control
     from throwcollect.runs.run_selection import find_run_to_change
@@ -200,12 +190,19 @@ def down(*, run: RunOption = None) -> None:
     typer.echo(f"{ended}: ended and forgotten")
 
 
-def _end_server(named: str | None) -> bool:
-    """End the server if a command means it: by its name, unless a run has that, or as no run is there to end.
+def _end_elsewhere(named: str | None) -> bool:
+    """End a submitted dataset, or the server, if a command means one of them.
+
+    It means the server by its name, unless a run has that, or if no run is there to end.
 
     Returns:
         Whether there was one to end.
     """
+    if (submitted := _find_submitted(named)) is not None:
+        from throwcollect.cli.cluster_runs import end
+
+        end(submitted)
+        return True
     from throwcollect.runs.records import Records
     from throwcollect.serve.finding import SERVER, end_server
 
