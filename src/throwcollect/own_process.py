@@ -24,13 +24,13 @@ def prepare_environment() -> None:
         os.environ.setdefault(name, value)
 
 
-def make_command(module: str = "throwcollect") -> list[str]:
-    """Make the beginning of a command line that runs a module of ours by this Python.
+def make_command() -> list[str]:
+    """Make the beginning of a command line that runs `throwcollect` by this Python.
 
     With ``-m`` alone, Python would look for all modules in the working directory first, even for modules of its own
     library: a file of the user, or a file in somebody's dataset, would be run in their place.
     """
     if sys.version_info >= (3, 11):
-        return [sys.executable, "-P", "-m", module]
-    run = f"import runpy; runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
+        return [sys.executable, "-P", "-m", "throwcollect"]
+    run = "import runpy; runpy.run_module('throwcollect', run_name='__main__', alter_sys=True)"
     return [sys.executable, "-c", f"import sys; del sys.path[0]; {run}"]

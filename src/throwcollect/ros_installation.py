@@ -8,8 +8,9 @@ from __future__ import annotations
 import os
 import sys
 from importlib.metadata import PackageNotFoundError, version
-from importlib.util import find_spec
 from pathlib import Path
+
+from throwcollect.extras import is_installed
 
 PACKAGES = (
     "action_msgs",
@@ -38,7 +39,8 @@ HOW_TO_INSTALL = (
 
 def missing() -> list[str]:
     """List the parts of genuine ROS 2 that nodes need and Python lacks: rclpy, or else packages of interfaces."""
-    return [package for package in PACKAGES if not _is_there(package)] if _is_there("rclpy") else ["rclpy"]
+    # A directory of that name in the working directory, without a module in it, is no package of ROS.
+    return [package for package in PACKAGES if not is_installed(package)] if is_installed("rclpy") else ["rclpy"]
 
 
 def rmws() -> list[str]:
@@ -59,9 +61,3 @@ def rclpy_version() -> str | None:
         except PackageNotFoundError:
             continue
     return None
-
-
-def _is_there(package: str) -> bool:
-    spec = find_spec(package)
-    # A directory of that name in the working directory, without a module in it, is no package of ROS.
-    return spec is not None and spec.origin is not None

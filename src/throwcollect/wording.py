@@ -77,9 +77,5 @@ def command(*words: object) -> str:
 
 def printable(text: str) -> str:
     """Make a message safe for a terminal: escape control characters."""
-    return "\n".join(_printable_line(line) for line in text.split("\n"))
-
-
-def _printable_line(line: str) -> str:
     # `ascii` writes the escape between two quotes.
-    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in line)
+    return "".join(each if each.isprintable() or each == "\n" else ascii(each)[1:-1] for each in text)

@@ -36,7 +36,7 @@ def ros(monkeypatch, tmp_path):
         (index / name).touch()
     # Only this installation is found, even if the machine has another ROS 2.
     monkeypatch.setattr(
-        "throwcollect.ros_installation.find_spec", lambda name: PathFinder.find_spec(name, [str(tmp_path)])
+        "throwcollect.extras.find_spec", lambda name: PathFinder.find_spec(name, [str(tmp_path)])
     )
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
     monkeypatch.setattr("sys.prefix", str(tmp_path))
