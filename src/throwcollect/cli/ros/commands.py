@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shlex
 import time
 from operator import attrgetter
@@ -40,6 +41,8 @@ _PROFILE = "fast_dds.xml"
 _DEPTH = 100
 """Messages that wait for `hz` to count them."""
 _PERIOD_S = 1.0
+_SHORT = 128
+"""Length at which texts and arrays are cut off, unless the user asks for all of them."""
 _SERVICE_S = 5.0
 """Longest wait for the parameter services of a node."""
 _STATUSES = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
@@ -91,7 +94,6 @@ def echo(
     run: RunOption = None,
 ) -> None:
     """Print the messages of a topic as YAML."""
-    from throwcollect.cli.ros.yaml_values import shorten, yaml_text
     from throwcollect.ros.message_values import plain
 
     with join_graph(run) as session:
@@ -108,7 +110,7 @@ def echo(
                 value = plain(attrgetter(field)(message) if field else message)
             except AttributeError as error:
                 raise ConfigError(f"--field {field}: {error}") from error
-            print(yaml_text(value if full else shorten(value)), end="---\n", flush=True)
+            print(_write_yaml(value if full else _shorten(value)), end="---\n", flush=True)
 
         qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(message_type, name, show, qos)
@@ -149,12 +151,11 @@ def send_goal(
     run: RunOption = None,
 ) -> None:
     """Send a goal and print its result; Ctrl-C cancels the goal."""
-    from throwcollect.cli.ros.yaml_values import parse
     from throwcollect.ros.message_values import fill
 
     action_type = find_interface("action", kind)
     message = action_type.Goal()
-    fill(message, parse(goal, "GOAL"))
+    fill(message, _parse(goal, "GOAL"))
     with join_graph(run) as session:
         name = absolute_name(action)
         actions = dict(ros.get_action_names_and_types(session.node))
@@ -195,23 +196,20 @@ def _show_feedback(message: Any) -> None:
 
 
 def _indent(message: Any) -> str:
-    from throwcollect.cli.ros.yaml_values import yaml_text
     from throwcollect.ros.message_values import plain
 
-    return "".join(f"    {line}\n" for line in yaml_text(plain(message)).splitlines())
+    return "".join(f"    {line}\n" for line in _write_yaml(plain(message)).splitlines())
 
 
 @param_app.command("get")
 def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
     """Print the value of a parameter as YAML."""
-    from throwcollect.cli.ros.yaml_values import yaml_text
-
     with join_graph(run) as session:
         owner = _find_node(session, node)
         values = _ask(session, owner, "get_parameters", names=[name]).values
         if not values:
             require_name("parameter", name, _ask(session, owner, "list_parameters").result.names, of=owner)
-        print(yaml_text(ros.parameter_value_to_python(values[0]) if values else None), end="")
+        print(_write_yaml(ros.parameter_value_to_python(values[0]) if values else None), end="")
 
 
 # A value may be a negative number, which would otherwise be taken for an option.
@@ -223,10 +221,8 @@ def set_parameter(
     run: RunOption = None,
 ) -> None:
     """Set a parameter."""
-    from throwcollect.cli.ros.yaml_values import parse
-
     try:
-        parsed = parse(value, "VALUE")
+        parsed = _parse(value, "VALUE")
         parameter = ros.Parameter(name, value=value if parsed is None else parsed)
     except (TypeError, ConfigError):
         parameter = ros.Parameter(name, value=value)
@@ -251,3 +247,41 @@ def _ask(session: GraphSession, node: str, service: str, **fields: Any) -> Any:
     if not client.wait_for_service(timeout_sec=_SERVICE_S):
         raise WorkerError(f"{node} offers no {service}")
     return session.answer(client.call_async(kind.Request(**fields)), alive=client.service_is_ready, who=node)
+
+
+def _parse(text: str, what: str) -> Any:
+    """Read a value from YAML, which is the argument `what` of a command."""
+    # This takes a while, and every command of throwcollect loads this module.
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        return YAML(typ="safe", pure=True).load(text)
+    except (YAMLError, ValueError) as error:
+        raise ConfigError(f"{what}: not YAML: {str(error).splitlines()[0]}, got {text!r:.80}") from error
+
+
+def _shorten(value: Any) -> Any:
+    """Cut off the texts and lists in a value that are longer than 128."""
+    if isinstance(value, dict):
+        return {name: _shorten(each) for name, each in value.items()}
+    if isinstance(value, list):
+        items = [_shorten(each) for each in value[:_SHORT]]
+        return items if len(items) == len(value) else [*items, "..."]
+    return f"{value[:_SHORT]}..." if isinstance(value, str) and len(value) > _SHORT else value
+
+
+def _write_yaml(value: Any) -> str:
+    """Write a value as YAML, in block style, with its fields in their order."""
+    from ruamel.yaml import YAML
+
+    writer = YAML(typ="safe", pure=True)
+    writer.default_flow_style = False
+    writer.allow_unicode = True
+    writer.width = 1 << 30
+    writer.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    stream = io.StringIO()
+    writer.dump(value, stream)
+    text = stream.getvalue()
+    # ruamel.yaml ends a document that is a single scalar with this line; `ros2` does not.
+    return text.removesuffix("...\n") if text.endswith("\n...\n") else text
