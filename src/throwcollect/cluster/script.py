@@ -44,14 +44,9 @@ class BatchScripts:
     def collect(self, tasks: int, indexes: str) -> str:
         """Write the script of a task that collects a slice, for indexes of slices as ``sbatch --array`` takes them."""
         cluster = self.config.cluster
-        directives = {
-            "job-name": f"throwcollect-{self.config.name}",
+        directives: dict[str, object] = {
             "array": indexes + (f"%{cluster.at_once}" if cluster.at_once else ""),
             "output": self._name_output("%A_%a.log"),
-            "cpus-per-task": cluster.cores,
-            "mem": cluster.memory,
-            "time": cluster.time,
-            "signal": self._signal,
         }
         words = [
             *("up", "--slice", f"$SLURM_ARRAY_TASK_ID/{tasks}", "--output", str(self.directory)),
@@ -73,16 +68,11 @@ class BatchScripts:
     def live(self, nodes: int) -> str:
         """Write the script of one run on several nodes: the first has the coordinator, and the others join it."""
         cluster = self.config.cluster
-        directives = {
-            "job-name": f"throwcollect-{self.config.name}",
+        directives: dict[str, object] = {
             "output": self._name_output("%j_live.log"),
             "nodes": nodes,
             "ntasks": nodes,
             "ntasks-per-node": 1,
-            "cpus-per-task": cluster.cores,
-            "mem": cluster.memory,
-            "time": cluster.time,
-            "signal": self._signal,
         }
         path = str(self.directory / CLUSTER / "token")
         begin = [
@@ -125,13 +115,12 @@ class BatchScripts:
 
     def join(self) -> str:
         """Write the script that joins the slices."""
-        cluster = self.config.cluster
         directives = {
             "job-name": f"throwcollect-{self.config.name}-join",
             "output": self._name_output("%j_join.log"),
             "cpus-per-task": 1,
-            "mem": cluster.memory and _JOIN_MEMORY,
-            "time": cluster.time,
+            "mem": self.config.cluster.memory and _JOIN_MEMORY,
+            "signal": None,
         }
         step = self._write_step(["join", str(self.directory)], cores=1)
         return self._write("Joins the slices of a dataset of throwcollect.", directives, ("--requeue",), step)
@@ -150,16 +139,12 @@ class BatchScripts:
     def _requeue_flag(self) -> str:
         return "--requeue" if self.config.cluster.requeue else "--no-requeue"
 
-    @property
-    def _signal(self) -> str:
-        # Without the letter B, Slurm signals the step alone: the script lives on, and can have the task queued again.
-        return f"TERM@{math.ceil(self.config.run.grace_s) + _ENDING_S}"
-
     def _name_output(self, name: str) -> str:
         # Slurm replaces patterns such as %j in names of logs, and takes %% for a percent sign.
         return f"{str(self.logs).replace('%', '%%')}/{name}"
 
     def _list_directives(self, own: dict[str, object]) -> Iterator[str]:
+        """List the options for Slurm: those that all scripts have, unless a script has its own, and further ones."""
         cluster = self.config.cluster
         shared = {
             "partition": cluster.partition,
@@ -170,8 +155,17 @@ class BatchScripts:
             "open-mode": "append",
             "nodes": 1,
             "ntasks": 1,
+            "job-name": f"throwcollect-{self.config.name}",
         }
-        for name, value in {**shared, **own}.items():
+        resources = {
+            "cpus-per-task": cluster.cores,
+            "mem": cluster.memory,
+            "time": cluster.time,
+            # Without the letter B, Slurm signals the step alone: the script lives on, and can queue the task again.
+            "signal": f"TERM@{math.ceil(self.config.run.grace_s) + _ENDING_S}",
+        }
+        # What a script has of its own wins, wherever it stands.
+        for name, value in {**shared, **own, **resources, **own}.items():
             if value is not None:
                 text = str(value)
                 yield f"#SBATCH --{name}={text if _is_plain(text) else _quote(text)}"
