@@ -11,6 +11,7 @@ from throwcollect.config.containers import ContainerSpec
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
+from throwcollect.runs.launcher import launch_host
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin
@@ -40,9 +41,6 @@ def check_request(spec: ContainerSpec, origin: Origin) -> None:
 
 def launch_container(run: Run, spec: ContainerSpec, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run."""
-    # `serve` imports this module for `check_request`, and should not wait for the launcher's imports.
-    from throwcollect.runs.launcher import launch_host
-
     origin = cast(Origin, run.record.origin)
 
     def host(context: RunContext) -> Host:

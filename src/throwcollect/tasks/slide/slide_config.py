@@ -151,11 +151,8 @@ class SlideConfig(TaskConfig):
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         yield from super()._find_contradictions()
         for axis in "xy":
-            place, middle, half = (
-                getattr(self.puck, f"{axis}_m"),
-                getattr(self.table, f"{axis}_m"),
-                getattr(self.table, f"size_{axis}_m") / 2,
-            )
+            place, middle = getattr(self.puck, f"{axis}_m"), getattr(self.table, f"{axis}_m")
+            half = getattr(self.table, f"size_{axis}_m") / 2
             if abs(place - middle) > half:
                 between = f"{middle - half:g} to {middle + half:g}"
                 yield f"puck.{axis}_m", f"should be on the table, {between}, got {place:g}"
