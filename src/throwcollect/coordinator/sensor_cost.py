@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from time import process_time
 from typing import NamedTuple
 
@@ -46,7 +45,7 @@ def measure_sensors(plan: Plan) -> SensorCost:
         alone, stride = config.model_copy(update={"sensors": {name: section}}), config.record.rate_hz // section.rate_hz
         recorder = SensorRecorder(Channels(alone, simulator.channels.robot))
         first = recorder.record(alone, trial.number, samples[:1])
-        seen[name] = SensorFrames(name, alone, replace(episode.header, samples=1), first)
+        seen[name] = SensorFrames(name, alone, episode.header, samples[:1], first)
         some, began = samples[len(samples) // 2 :][: stride * _TIMED], process_time()
         more = recorder.record(alone, trial.number, some)
         count, timed = -(-len(samples) // stride), -(-len(some) // stride)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,16 +17,26 @@ from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig
 from throwcollect.episode import frames
 from throwcollect.episode.chunk import Chunk, count_indexed
 from throwcollect.episode.message_table import MessageTable, read_frames
-from throwcollect.episode.record import EpisodeHeader
-from throwcollect.episode.sensor_topics import POINT, intrinsics_of, label_names, sensor_topics
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.sensor_topics import POINT, frame_of, intrinsics_of, label_names, sensor_topics
 from throwcollect.episode.topics import Rows, read_stamps
 from throwcollect.errors import DatasetError
-from throwcollect.robots.description import full_description
+from throwcollect.robots.description import full_description, robot_of
+from throwcollect.robots.surroundings import moving_bodies_of
+from throwcollect.sensing.drawn_robot import DrawnRobot
 from throwcollect.sensing.noise import Noise
+from throwcollect.sensing.pose import OPTICAL, Pose
+from throwcollect.sensing.scene import Scene
 from throwcollect.units import NS_PER_S
 
 FRAMES = {"color": "images", "depth": "depth_m", "segmentation": "labels", "scan": "ranges", "points": "points"}
 """What `SensorFrames` calls the frames of each stream."""
+
+
+@lru_cache(maxsize=8)
+def _make_skeleton(description: str, joints: tuple[str, ...], base_height_m: float, moving: tuple[str, ...]) -> Scene:
+    """Make a scene of links and bodies without their shapes."""
+    return Scene(DrawnRobot(description, (), Path), joints, base_height_m, moving=moving)
 
 
 class Frames:
@@ -59,18 +70,20 @@ class SensorFrames:
         noise: Whether frames get the noise of the configuration when they are read; set it to False for clean ones.
     """
 
-    def __init__(self, name: str, config: Config, header: EpisodeHeader, chunks: Sequence[Chunk]) -> None:
+    def __init__(
+        self, name: str, config: Config, header: EpisodeHeader, samples: Samples, chunks: Sequence[Chunk]
+    ) -> None:
         self.name, self.config = name, config.sensors[name]
         self.noise = not self.config.noise.recorded
         self._whole, self._header = config, header
+        self._samples = samples[:: config.record.rate_hz // self.config.rate_hz]
         topics = sensor_topics(config)[name]
         self._topics = {topic.stream: (number, topic) for number, topic in topics.items()}
         self._chunks = [chunk for chunk in chunks if topics.keys() == chunk.indexes.keys()]
         counts = (count_indexed(next(iter(chunk.indexes.values()))) for chunk in self._chunks)
         self._starts = [*accumulate(counts, initial=0)]
-        expected = len(range(0, header.samples, config.record.rate_hz // self.config.rate_hz))
-        if len(self) != expected:
-            raise DatasetError(f"chunk: {len(self)} frames of {name}", expected=str(expected))
+        if len(self) != len(self._samples):
+            raise DatasetError(f"chunk: {len(self)} frames of {name}", expected=str(len(self._samples)))
         self._table: tuple[int, MessageTable] | None = None
 
     def __len__(self) -> int:
@@ -139,6 +152,23 @@ class SensorFrames:
         if not isinstance(self.config, PictureConfig):
             raise DatasetError(f"{self.name} is a {self.config.kind}, and has no intrinsics")
         return np.asarray(intrinsics_of(self.config)["k"]).reshape(3, 3)
+
+    @property
+    def poses(self) -> Frames:
+        """Where the sensor is: matrices of shape ``(4, 4)`` that take points [m] from its frame to the world.
+
+        The frame of a camera is the optical one (x right, y down, z forward), which `intrinsics` projects; that of a
+        lidar has x forward, y left and z up. Column 3 is the position.
+        """
+        return Frames(len(self), self._find_pose)
+
+    def _find_pose(self, number: int) -> NDArray[np.float64]:
+        config, frame = self._whole, frame_of(self.name, self.config)
+        robot = full_description(config), tuple(robot_of(config).joints), config.robot.base_height_m
+        link = _make_skeleton(*robot, moving_bodies_of(config)).place_sample(self._samples, number).find(frame.parent)
+        pose = link * Pose.of(frame.translation, frame.rotation_xyzw)
+        rows, origin = pose * OPTICAL if isinstance(self.config, PictureConfig) else pose
+        return np.array([(*row, part) for row, part in zip(rows, origin, strict=True)] + [(0.0, 0.0, 0.0, 1.0)])
 
     def _frames(self, stream: str) -> Frames:
         if stream not in self._topics:

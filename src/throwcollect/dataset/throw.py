@@ -291,8 +291,7 @@ class Throw:
         return SensorRecorder(Channels(config, full_description(config))).record(config, header.trial, samples)
 
     def _open_sensors(self, config: Config, chunks: Sequence[Chunk]) -> dict[str, SensorFrames]:
-        header = self._recording[0]
-        return {name: SensorFrames(name, config, header, chunks) for name in config.sensors}
+        return {name: SensorFrames(name, config, *self._recording, chunks) for name in config.sensors}
 
     @cached_property
     def _recording(self) -> tuple[EpisodeHeader, Samples]:

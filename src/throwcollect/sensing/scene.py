@@ -101,7 +101,7 @@ class Scene:
         files = robot.meshes | {shape.mesh: Path(shape.mesh) for shape in bodies if shape.mesh}
         made = surfaces_of([shape for _, shape in drawn], files, triangles)
         surfaces = [surface.place(pose) for ((_, pose), _), surface in zip(drawn, made, strict=True)]
-        self._join(surfaces, np.array([part for (part, _), _ in drawn]), 1 + len(self._joints) + len(moving))
+        self._join(surfaces, np.array([part for (part, _), _ in drawn], np.int64), 1 + len(self._joints) + len(moving))
         many = [surface.faces.shape[1] for surface in surfaces]
         numbers = np.array([self.labels.index(shape.name) for _, shape in drawn], np.uint16)
         colors = np.array([shape.rgba[:3] for _, shape in drawn], np.float32).reshape(-1, 3).T

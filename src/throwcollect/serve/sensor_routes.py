@@ -58,8 +58,9 @@ def make_sensor_routes(instances: Instances) -> APIRouter:
     def open_throw(instance: str, trial: int, _changed_ns: int) -> tuple[Config, Samples, dict[str, SensorFrames]]:
         plan, episode = find_throw(instances, instance, trial)
         config = plan.config_of(plan.trial(trial))
-        frames = {name: SensorFrames(name, config, episode.header, episode.sensors) for name in config.sensors}
-        return config, episode.samples(robot_of(config).joints), frames
+        recorded = episode.header, episode.samples(robot_of(config).joints)
+        frames = {name: SensorFrames(name, config, *recorded, episode.sensors) for name in config.sensors}
+        return config, recorded[1], frames
 
     @lru_cache(maxsize=1)
     def make_scene(instance: str, trial: int, changed_ns: int) -> Scene:

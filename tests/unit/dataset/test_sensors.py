@@ -109,22 +109,35 @@ def test_streams_are_arrays_with_stamps_of_samples(seen: Path) -> None:
         _ = side.images[8]
 
 
-def test_intrinsics_and_transforms_put_the_ball_where_the_segmentation_has_it(seen: Path) -> None:
+def test_intrinsics_and_poses_put_the_ball_where_the_segmentation_has_it(seen: Path) -> None:
     throw = throwcollect.load(seen)[0]
     side = throw.sensors["side"]
     ball = side.label_names.index("ball")
-    position, forward = np.array([1.0, -3.2, 1.5]), np.array([0.0, 3.2, -0.6])
-    z = forward / np.linalg.norm(forward)
-    x = np.cross(z, [0, 0, 1])
-    x /= np.linalg.norm(x)
-    optical = np.stack([x, np.cross(z, x), z])
     for number in (5, 6):
         rows, columns = np.nonzero(side.labels[number] == ball)
-        at = throw.ball.position[number * 50] - position
-        u, v, depth = side.intrinsics @ (optical @ at)
+        x, y, z, _ = np.linalg.inv(side.poses[number]) @ (*throw.ball.position[number * 50], 1)
+        u, v, depth = side.intrinsics @ (x, y, z)
         assert abs(columns.mean() - u / depth) < 0.7
         assert abs(rows.mean() - v / depth) < 0.7
         assert abs(side.depth_m[number][rows[0], columns[0]] - depth) < 0.03
+
+
+def test_poses_of_sensors_on_a_link_follow_it(seen: Path) -> None:
+    throw = throwcollect.load(seen)[0]
+    hand = {"link": "arm_right_7_link", "position_m": [0.3, 0, 0], "rate_hz": 5}
+    lidar = {"kind": "lidar_3d", "layers": 8, "rays": 64, "vertical_rad": [-1.5, 1.5], **hand}
+    camera, cloud = throw.render({"eye": {"kind": "camera", **hand}, "cloud": lidar}).values()
+    ground = cloud.label_names.index("ground")
+    for number in (0, 4, 5):
+        points = cloud.points[number][cloud.points[number]["intensity"] == ground]
+        assert len(points) > 10
+        at = cloud.poses[number] @ (points["x"], points["y"], points["z"], np.ones(len(points)))
+        assert np.abs(at[2]).max() < 1e-5
+    # The lens looks along x of the link, with y to its left and z upwards.
+    assert np.array_equal(camera.poses[4][:3, :3], cloud.poses[4][:3, :3] @ [[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    assert np.array_equal(camera.poses[:][..., 3], cloud.poses[:][..., 3])
+    assert camera.poses[:].shape == (len(camera), 4, 4)
+    assert np.ptp(camera.poses[:][:, 0, 3]) > 0.1
 
 
 def test_noise_is_added_on_reading_and_the_same_each_time(seen: Path, tmp_path: Path) -> None:
