@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         WorkerError,
     )
     from throwcollect.export.export import export as export_dataset
+    from throwcollect.export.frame_dataset import FrameDataset
     from throwcollect.extras import MissingExtraError
     from throwcollect.learning.aiming import Aim
     from throwcollect.learning.fitting import fit
@@ -44,6 +45,7 @@ __all__ = [
     "ConflictError",
     "Dataset",
     "DatasetError",
+    "FrameDataset",
     "MissingExtraError",
     "Model",
     "NotFoundError",
@@ -77,6 +79,7 @@ _PLACES = {
     "ConflictError": "errors:ConflictError",
     "Dataset": "dataset.reader:Dataset",
     "DatasetError": "errors:DatasetError",
+    "FrameDataset": "export.frame_dataset:FrameDataset",
     "MissingExtraError": "extras:MissingExtraError",
     "Model": "learning.model:Model",
     "NotFoundError": "errors:NotFoundError",

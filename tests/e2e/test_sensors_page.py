@@ -56,9 +56,11 @@ def test_the_page_is_right(tmp_path: Path) -> None:
     assert list(front[0].sensors) == ["front"]
     eyes = throwcollect.load(tmp_path / "data" / "random")
     assert len({throw.sensors["eye"].intrinsics[0, 0] for throw in eyes}) == 4
-    words = [sys.executable, "-c", blocks("python")[0]]
+    words = [sys.executable, "-c", "\n".join(blocks("python"))]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "SensorFrames(side: 1" in done.stdout
     assert "(96, 96, 3) uint8" in done.stdout
     assert "(360,) (16, 180)" in done.stdout
+    assert "'side_depth': ((96, 96, 1), 'float32')" in done.stdout
+    assert "'action': ((8, 5), 'float32')" in done.stdout

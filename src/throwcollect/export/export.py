@@ -9,9 +9,10 @@ from pathlib import Path
 from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.directory import CARD, CONFIG, TRIALS
+from throwcollect.dataset.reader import Dataset
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
-from throwcollect.export.throw_source import NO_IMAGES, ExportSource
+from throwcollect.export.throw_source import NO_IMAGES, ExportSource, choose_streams
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, write_file
 from throwcollect.members import explain_failure, load_member, names_of
@@ -64,7 +65,9 @@ def export(
     way = next(iter(chosen.images)) if images is None else images
     if way not in chosen.images:
         raise refuse_argument("images", f"{to} has no {way!r}", expected=" or ".join(chosen.images))
-    source = ExportSource.open(directory, rate_hz=rate_hz, images=way, streams=chosen.images[way])
+    dataset = Dataset.open(directory)
+    streams = choose_streams(dataset.config, chosen.images[way])
+    source = ExportSource.of(dataset, streams, rate_hz=rate_hz, images=way)
     if images not in (None, NO_IMAGES) and not source.streams:
         raise refuse_argument("images", f"{directory} has no sensors that {to} has images of", expected=NO_IMAGES)
     with new_directory(output) as beside:

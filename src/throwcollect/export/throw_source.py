@@ -186,26 +186,29 @@ class ExportSource:
     progress: ProgressLog
 
     @classmethod
-    def open(
-        cls, directory: Path, *, rate_hz: int | None = None, images: str = NO_IMAGES, streams: Container[str] = ()
+    def of(
+        cls,
+        dataset: Dataset,
+        streams: Mapping[str, tuple[str, ...]],
+        *,
+        rate_hz: int | None = None,
+        images: str = NO_IMAGES,
     ) -> ExportSource:
-        """Open a dataset to export it, with some streams of sensors, at a number of samples per second.
+        """Take a dataset to export it, with some streams of its sensors, at a number of samples per second.
 
         Without a number it is the recorded one, or the largest at which each sample has a frame of each sensor.
         """
-        dataset = Dataset.open(directory)
-        recorded_hz = dataset.config.record.rate_hz
+        directory, recorded_hz = dataset.directory, dataset.config.record.rate_hz
         if rate_hz is not None and not 1 <= index(rate_hz) <= recorded_hz:
             expected = f"1 to {recorded_hz}, at which {directory} was recorded"
             raise refuse_argument("rate_hz", f"{rate_hz} samples per second", expected=expected)
         throws = dataset.recorded
         if not len(throws):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
-        stored = choose_streams(dataset.config, streams)
-        rates = {name: dataset.config.sensors[name].rate_hz for name in stored}
+        rates = {name: dataset.config.sensors[name].rate_hz for name in streams}
         if rate_hz is not None and any(rate % rate_hz for rate in rates.values()):
             seen = ", ".join(f"{name} at {rate} Hz" for name, rate in rates.items())
-            expected = f"a divisor of {gcd(*rates.values())}, or --images {NO_IMAGES}"
+            expected = f"a divisor of {gcd(*rates.values())}" + f", or --images {NO_IMAGES}" * (images != NO_IMAGES)
             raise refuse_argument("rate_hz", f"{rate_hz} samples per second, and images of {seen}", expected=expected)
         rate_hz = rate_hz or gcd(*rates.values()) or recorded_hz
         targets = _list_targets(throws)
@@ -217,7 +220,7 @@ class ExportSource:
             throws,
             dataset.throws.drop_columns(list(_PLACES)),
             images,
-            stored,
+            streams,
             ProgressLog(len(dataset.throws), "trial", "exported"),
         )
 
@@ -242,20 +245,23 @@ class ExportSource:
 
     def read(self, throws: Iterable[Throw]) -> Iterator[ThrowSeries]:
         """Read the time series of throws, one throw at a time, as all of them may not fit into memory."""
-        config = self.dataset.config
         for throw in throws:
-            header, recorded = throw.read_samples()
-            samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
-            trajectory = commanded_trajectory(self.dataset.config_of(throw), recorded)
-            time_s = samples.seconds_since(header.start_ns)
-            joints = (samples.position, samples.velocity, samples.effort, *sample_quintic(trajectory, time_s))
-            signals = {"time_s": time_s, **dict(zip(_JOINT_SIGNALS, joints, strict=True))}
-            for number, body in enumerate(moving_bodies_of(config)):
-                names = (f"{body}_{ending}" for ending in _BODY_SIGNALS)
-                signals |= dict(zip(names, samples.parts_of(number), strict=True))
-            signals |= {each.name: np.full((len(samples), 1), throw[each.name]) for each in self.targets}
-            yield ThrowSeries(throw, throw.outcome == config.task.success, signals, trajectory)
+            yield self.read_throw(throw)
             self.progress.note(throw.trial + 1)
+
+    def read_throw(self, throw: Throw) -> ThrowSeries:
+        """Read the time series of a throw."""
+        config, (header, recorded) = self.dataset.config, throw.read_samples()
+        samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
+        trajectory = commanded_trajectory(self.dataset.config_of(throw), recorded)
+        time_s = samples.seconds_since(header.start_ns)
+        joints = (samples.position, samples.velocity, samples.effort, *sample_quintic(trajectory, time_s))
+        signals = {"time_s": time_s, **dict(zip(_JOINT_SIGNALS, joints, strict=True))}
+        for number, body in enumerate(moving_bodies_of(config)):
+            names = (f"{body}_{ending}" for ending in _BODY_SIGNALS)
+            signals |= dict(zip(names, samples.parts_of(number), strict=True))
+        signals |= {each.name: np.full((len(samples), 1), throw[each.name]) for each in self.targets}
+        return ThrowSeries(throw, throw.outcome == config.task.success, signals, trajectory)
 
 
 def choose_streams(config: Config, streams: Container[str]) -> dict[str, tuple[str, ...]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from tests.unit.export.conftest import actions_of
 
 import throwcollect
 from throwcollect.config.loader import load
@@ -191,3 +193,36 @@ def test_a_throw_that_lacks_frames_is_found(seen: Path, tmp_path: Path, monkeypa
     monkeypatch.setattr(SensorFrames, "stamps_ns", property(lambda self: stamps(self)[:-5]))
     with pytest.raises(DatasetError, match=r"trial 0: front has \d+ frames, and there are more or fewer samples"):
         export(seen, tmp_path / "out", to="hdf5")
+
+
+def test_frames_for_training_are_those_of_throws_with_their_signals_and_actions(seen: Path) -> None:
+    frames = pickle.loads(pickle.dumps(throwcollect.FrameDataset(seen, horizon=3)))  # noqa: S301
+    throws = throwcollect.load(seen)
+    lengths = [len(throw.sensors["head"].images[::2]) for throw in throws]
+    assert len(frames) == sum(lengths)
+    number = 0
+    for throw, length, actions in zip(throws, lengths, actions_of(seen, 50), strict=True):
+        for at in range(length):
+            frame = frames[number]
+            number += 1
+            assert np.array_equal(frame["side_image"], throw.sensors["side"].images[at * 5])
+            assert np.array_equal(frame["front_depth"][:, :, 0], throw.sensors["front"].depth_m[at * 2])
+            assert np.array_equal(frame["joint_velocity_radps"], throw.joints.velocity[at * 50].astype(np.float32))
+            expected = actions[[at, min(at + 1, length - 1), min(at + 2, length - 1)]]
+            np.testing.assert_allclose(frame["action"], expected, atol=1e-6)
+            assert (frame["trial"], frame["time_s"].shape) == (throw.trial, (1,))
+    assert number == len(list(frames))
+    assert frames[-1]["trial"] == 2
+
+
+def test_frames_for_training_have_what_is_observed_at_the_rate_of_its_cameras(seen: Path) -> None:
+    throws = throwcollect.load(seen)[1:]
+    frames = throwcollect.FrameDataset(throws, observation=["side_image", "ball_position_m"])
+    assert frames[7].keys() == {"side_image", "ball_position_m", "action", "trial"}
+    assert np.array_equal(frames[7]["side_image"], throws[0].sensors["side"].images[7])
+    assert np.array_equal(frames[7]["ball_position_m"], throws[0].ball.position[70].astype(np.float32))
+    assert frames[7]["side_image"].flags.writeable
+    with pytest.raises(ConfigError, match=r"observation: there is no 'side_imag'; did you mean 'side_image'\?"):
+        throwcollect.FrameDataset(seen, observation=["side_imag"])
+    with pytest.raises(ConfigError, match=r"images of side at 25 Hz\n  expected: a divisor of 25$"):
+        throwcollect.FrameDataset(seen, observation=["side_image"], rate_hz=10)
