@@ -25,7 +25,7 @@ from pathlib import Path
 
 import psutil
 
-from tests.e2e.collection import Running, collect_here, fingerprints, launch, start, words_of, write_config
+from tests.e2e.collection import SEEING, Running, collect_here, fingerprints, launch, start, words_of, write_config
 from throwcollect.dataset.manifest import list_promised_names
 from throwcollect.dataset.verify import find_damage, verify
 
@@ -82,7 +82,7 @@ def kills(config: Path, reference: Path, scratch: Path, count: int, source: rand
         directory = scratch / f"killed-{collections}"
         collections += 1
         said: list[str] = []
-        running = start(config, directory, 2)
+        running = start(config, directory, 4)
         code = -1
         while code != 0 and len(said) < _MOST_DISTURBANCES:
             for done in _disturbances(running, source):
@@ -136,7 +136,7 @@ def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
 def run(*, seed: int, flip_count: int, kill_count: int, scratch: Path, sim: str = "") -> dict[str, Count]:
     """Collect a dataset with these keys of ``sim``, attack it and its like, and count."""
     source = random.Random(seed)
-    config = write_config(scratch, trials=TRIALS, sim=sim)
+    config = write_config(scratch, trials=TRIALS, text=SEEING, sim=sim)
     reference = scratch / "reference"
     collect_here(config, reference)
     return {

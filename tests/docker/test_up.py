@@ -14,7 +14,7 @@ import docker
 import pytest
 
 from tests.docker.collection import pause
-from tests.e2e.collection import FAST, Running, call, call_here, collect_here, fingerprints, start, write_config
+from tests.e2e.collection import FAST, SEEING, Running, call, call_here, collect_here, fingerprints, start, write_config
 from throwcollect.runtimes.docker.container_options import DIRECTORY_LABEL
 from throwcollect.runtimes.docker.docker_engine import default_tag
 
@@ -46,9 +46,12 @@ def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, doc
 def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
     engine: docker.DockerClient, tmp_path: Path
 ) -> None:
-    """Nodes of each kind are killed, a simulation is paused; then the launcher dies, and leaves its containers."""
+    """Nodes of each kind are killed, a simulation is paused; then the launcher dies, and leaves its containers.
+
+    What sensors saw is the same, too.
+    """
     # Slow enough that the collection outlives all kills even on a fast machine.
-    config = write_config(tmp_path, trials=30, sim=f"{FAST}, real_time_factor: 2")
+    config = write_config(tmp_path, trials=30, text=SEEING, sim=f"{FAST}, real_time_factor: 2")
     directory = tmp_path / "data"
     collect_here(config, tmp_path / "undisturbed")
     running = start(config, directory, 3, "--runtime", "docker")

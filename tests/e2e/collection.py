@@ -38,6 +38,36 @@ run: {{runtime: local, replay: 0}}
 """The uniform sampler needs no library that would take each command a second to import."""
 
 
+SENSORS = """\
+sensors:
+  eye:
+    kind: camera
+    width: 24
+    height: 16
+    rate_hz: 2
+    streams: [color, depth, segmentation]
+    noise: {{color_std: 2, recorded: true}}
+  near: {{kind: depth, link: {link}, position_m: [0.1, 0, 0], width: 16, height: 12, rate_hz: 1}}
+  scan: {{kind: lidar_2d, link: base_link, position_m: [0.4, 0, 0.3], rays: 36, rate_hz: 1}}
+  cloud: {{kind: lidar_3d, position_m: [1, -1, 1], layers: 4, rays: 36, rate_hz: 1}}
+"""
+"""Sensors of each kind, with few frames, the depth camera on a link of the robot that moves."""
+SEEING = """\
+name: small
+trials: {trials}
+seed: 7
+robot: {{name: xarm7}}
+task:
+  duration_s: 0.72
+  start:
+    {{joint1: -0.989, joint2: -1.962, joint3: 2.71, joint4: 2.733, joint5: 0.592, joint6: -0.826, joint7: 0.179}}
+  end: {{joint1: -0.0091, joint4: 3.645, joint5: -0.4363}}
+sweep: {{sampler: uniform, parameters: {{task.duration_s: {{min: 0.72, max: 0.828}}}}}}
+run: {{runtime: local, replay: 0}}
+""" + SENSORS.replace("{link}", "link7").replace("base_link", "link_base")
+"""An arm with sensors; a simulation reads its meshes in a fifth of the time of those of Talos."""
+
+
 def call(
     *arguments: str | Path, cwd: Path | None = None, restrictions: Restrictions = FREE, **environment: str
 ) -> subprocess.CompletedProcess[str]:

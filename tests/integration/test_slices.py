@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
+import throwcollect
+from tests.e2e.collection import CONFIG, FAST, SENSORS, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import prepare
@@ -28,6 +29,7 @@ from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.slice import Slice
 
 INPROCESS = ["run.runtime=inprocess"]
+TEXT = CONFIG + "record: {{trials_per_shard: 2}}\n"
 KILLED_ANYWHERE = """
 import os, shutil, signal, sys
 from pathlib import Path
@@ -74,8 +76,7 @@ class Listener(runs.Onlooker):
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    text = CONFIG + "record: {{trials_per_shard: 2}}\n"
-    return write_config(tmp_path_factory.mktemp("config"), trials=11, text=text, sim=FAST)
+    return write_config(tmp_path_factory.mktemp("config"), trials=11, text=TEXT, sim=FAST)
 
 
 @pytest.fixture(scope="module")
@@ -127,13 +128,19 @@ def test_joined_slices_give_the_files_of_one_collection(frozen: Path, whole: Pat
     assert not (frozen / SLICES).exists()
 
 
-def test_an_interrupted_slice_goes_on_with_its_recordings(frozen: Path, whole: Path) -> None:
+def test_an_interrupted_slice_goes_on_with_its_recordings_and_what_sensors_saw(tmp_path: Path) -> None:
+    seeing = write_config(tmp_path, trials=6, text=TEXT + SENSORS.replace("{link}", "head_2_link"), sim=FAST)
+    with runs.prepare(seeing, overrides=INPROCESS, output=tmp_path / "whole") as run:
+        run.collect()
+    frozen = tmp_path / "data"
+    prepare(load(seeing), frozen, sweep_directory=tmp_path)
     interrupt_after(frozen, "0/2", 50_000)
     assert not find_finished(frozen)
     assert count_kept(frozen, Slice(0, 2)) > 0
     collect(frozen, "1/2")
     join(frozen)
-    assert fingerprints(frozen) == fingerprints(whole)
+    assert fingerprints(frozen) == fingerprints(tmp_path / "whole")
+    assert len(throwcollect.load(frozen)[5].sensors["eye"].images) == 3
 
 
 def test_a_repeated_attempt_takes_over_the_largest_stopped_one(frozen: Path, whole: Path) -> None:
