@@ -45,9 +45,9 @@ def export(
     The format is ``parquet``, ``npz``, ``lerobot``, ``hdf5``, ``mat``, or one of another package. The directory to
     write must be new or empty, and nothing is left there on failure.
 
-    What sensors saw is stored as `images` says: as ``av1``, ``h264`` or ``png`` in ``lerobot``, as ``arrays`` in
-    ``hdf5`` and ``npz``, or not at all (``none``, which is usual but in ``lerobot`` and ``hdf5``). Each sample then has
-    a frame of each sensor, so that the rate is that of the sensors.
+    What sensors saw is stored as `images` says: as ``av1``, ``h264``, ``png`` or, with depths, ``depth`` in
+    ``lerobot``, as ``arrays`` in ``hdf5`` and ``npz``, or not at all (``none``, which is usual but in ``lerobot`` and
+    ``hdf5``). Each sample then has a frame of each sensor, so that the rate is that of the sensors.
 
     Raises:
         ConfigError: If there is no such format, it has no such images, the rate is above the recorded one or not one

@@ -36,34 +36,38 @@ CODECS: Mapping[str, Mapping[str, Any]] = {
 _ENCODERS = {"av1": "libsvtav1", "h264": "libx264"}
 _PNG = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
 
-Pictures = NDArray[np.uint8]
-"""Pictures of one episode, shape ``(n_frames, height, width, 3)``."""
+Pictures = NDArray[np.uint8] | NDArray[np.uint16]
+"""Pictures of one episode, shape ``(n_frames, height, width, 3)``, or depths [mm], 0 for none, with 1 instead of 3."""
 
 
 class ImageSeries:
-    """The images of one camera, which are written episode after episode, until it is closed.
+    """The images or the depths of one camera, which are written episode after episode, until it is closed.
 
     Attributes:
         key: Name of the feature.
         in_table: Whether its images are a column of the table of frames.
     """
 
-    def __init__(self, name: str, camera: PictureConfig, images: str, directory: Path, rate_hz: int) -> None:
-        self.key, self.in_table = f"observation.images.{name}", images not in CODECS
+    def __init__(
+        self, name: str, stream: str, camera: PictureConfig, images: str, directory: Path, rate_hz: int
+    ) -> None:
+        ending, shape = ("_depth", (1, 2**16)) if stream == "depth" else ("", (3, 2**8))
+        self.key, self.in_table = f"observation.images.{name}{ending}", images not in CODECS
         if not self.in_table and (camera.width % 2 or camera.height % 2):
             problem = f"{images} of the {camera.width} x {camera.height} pixels of {name}"
             raise refuse_argument("images", problem, expected="even numbers of pixels, or png")
         self._camera, self._images, self._directory, self._rate_hz = camera, images, directory, rate_hz
-        self._levels = np.zeros((3, 256), np.int64)
+        self._levels = np.zeros(shape, np.int64)
         self._frames = self._videos = self._frames_of_video = 0
         self._file: IO[bytes] | None = None
 
     def as_feature(self) -> dict[str, object]:
         """Make its entry in ``meta/info.json``."""
-        shape = [self._camera.height, self._camera.width, 3]
+        shape = [self._camera.height, self._camera.width, len(self._levels)]
         names = ["height", "width", "channels"]
         if self.in_table:
-            return {"dtype": "image", "shape": shape, "names": names}
+            depth: dict[str, object] = {"info": {"is_depth_map": True, "depth_unit": "mm"}}
+            return {"dtype": "image", "shape": shape, "names": names} | (depth if shape[2] == 1 else {})
         about = {**dict(zip(names, shape, strict=True)), "codec": self._images, "pix_fmt": "yuv420p"}
         settings = {**about, "fps": self._rate_hz, **CODECS[self._images]}
         info = {f"video.{key}": value for key, value in settings.items()} | {"has_audio": False, "is_depth_map": False}
@@ -71,7 +75,8 @@ class ImageSeries:
 
     def append(self, pictures: Pictures) -> dict[str, Any]:
         """Write the pictures of an episode, unless they are in the table, and return what the episode has of them."""
-        levels = np.array([np.bincount(pictures[..., channel].ravel(), minlength=256) for channel in range(3)])
+        channels, most = self._levels.shape
+        levels = np.array([np.bincount(pictures[..., each].ravel(), minlength=most) for each in range(channels)])
         self._levels += levels
         self._frames += len(pictures)
         row = {f"stats/{self.key}/{name}": values for name, values in _summarise(levels, len(pictures)).items()}
@@ -123,11 +128,13 @@ def encode_pictures(pictures: Pictures) -> pa.Array:
 
 
 def _encode_png(picture: Pictures) -> bytes:
-    height, width, _ = picture.shape
+    height, width, channels = picture.shape
+    size, kind_of_color = picture.itemsize, 2 if channels == 3 else 0
+    levels = np.ascontiguousarray(picture, f">u{size}").view(np.uint8).reshape(height, -1)
     # Each row begins with the number of its filter; rows with 0 are as they are.
-    rows = np.pad(picture.reshape(height, -1), ((0, 0), (1, 0)))
+    rows = np.pad(levels, ((0, 0), (1, 0)))
     chunks = {
-        b"IHDR": struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0),
+        b"IHDR": struct.pack(">IIBBBBB", width, height, 8 * size, kind_of_color, 0, 0, 0),
         b"IDAT": zlib.compress(rows.tobytes(), 6),
         b"IEND": b"",
     }
@@ -138,12 +145,13 @@ def _encode_png(picture: Pictures) -> bytes:
 
 
 def _summarise(levels: NDArray[np.int64], frames: int) -> dict[str, Any]:
-    """Compute LeRobot's statistics of colors between 0 and 1 from how often each channel has each of 256 levels."""
-    colors = np.arange(256) / 255
+    """Compute LeRobot's statistics of colors from 0 to 1, or depths [mm], from how often a channel has each level."""
+    channels, count = levels.shape
+    colors = np.arange(count) / (255 if channels == 3 else 1)
     pixels, below = levels[0].sum(), levels.cumsum(axis=1)
     mean = levels @ colors / pixels
     deviation = np.sqrt((levels * (colors - mean[:, np.newaxis]) ** 2).sum(axis=1) / pixels)
     ranks = {"min": 1, "max": pixels} | {name: share * pixels for name, share in QUANTILES.items()}
     found = {name: colors[(below < rank).sum(axis=1)] for name, rank in ranks.items()}
     every = {**found, "mean": mean, "std": deviation}
-    return {**{name: values.reshape(3, 1, 1).tolist() for name, values in every.items()}, "count": [frames]}
+    return {**{name: values.reshape(channels, 1, 1).tolist() for name, values in every.items()}, "count": [frames]}

@@ -23,13 +23,15 @@ from throwcollect.export.exporter import Exporter
 from throwcollect.export.images import CODECS, MEGABYTES_PER_VIDEO, QUANTILES, VIDEOS, ImageSeries, encode_pictures
 from throwcollect.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
-from throwcollect.export.throw_source import NO_IMAGES, ExportSource, ThrowSeries, unit_of
+from throwcollect.export.throw_source import FRAMES, NO_IMAGES, ExportSource, ThrowSeries, unit_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sweep.parquet_file import encode_table
 
 _VERSION = "v3.0"
 _EPISODES_PER_GROUP = 100
 _BINS = 5000
+_FARTHEST_M = 65.535
+"""No depth beyond has a number of millimetres."""
 
 Frames = NDArray[np.float64]
 """Values of one feature, shape ``(n_frames, n_components)``."""
@@ -121,9 +123,10 @@ def write(source: ExportSource, directory: Path) -> None:
     (directory / THROWS).write_bytes(encode_table(table))
     moments: dict[str, Moments] = {}
     images = {
-        name: ImageSeries(name, camera, source.images, directory, source.rate_hz)
+        (name, stream): ImageSeries(name, stream, camera, source.images, directory, source.rate_hz)
         for name, camera in source.dataset.config.sensors.items()
-        if name in source.streams and isinstance(camera, PictureConfig)
+        if isinstance(camera, PictureConfig)
+        for stream in source.streams.get(name, ())
     }
     with ExitStack() as stack:
         data, meta = (
@@ -145,8 +148,12 @@ def write(source: ExportSource, directory: Path) -> None:
                 columns = {name: feature.as_column() for name, feature in features.items()}
                 table_of_frames = pa.table(columns, metadata={"throwcollect.digest": source.dataset.digest})
                 rows.append(_describe_episode(features, task, number=number, first=first, chunk=chunk, file=file))
-                for name, series in images.items():
-                    pictures = source.look(throw.throw, name)["images"]
+                seen = {name: source.look(throw.throw, name) for name in source.streams}
+                for (name, stream), series in images.items():
+                    pictures = seen[name][FRAMES[stream]]
+                    if stream == "depth":
+                        depth_mm = np.rint(np.where(pictures < _FARTHEST_M, pictures, 0) * 1000)
+                        pictures = depth_mm.astype(np.uint16)[..., np.newaxis]
                     rows[-1] |= series.append(pictures)
                     if series.in_table:
                         table_of_frames = table_of_frames.append_column(series.key, encode_pictures(pictures))
@@ -343,4 +350,6 @@ def _write_json(path: Path, value: object) -> None:
     path.write_text(json.dumps(value, indent=4) + "\n", encoding="utf-8")
 
 
-LEROBOT = Exporter(describe, write, images={**dict.fromkeys((*CODECS, "png"), ("color",)), NO_IMAGES: ()})
+LEROBOT = Exporter(
+    describe, write, images={**dict.fromkeys((*CODECS, "png"), ("color",)), "depth": ("color", "depth"), NO_IMAGES: ()}
+)

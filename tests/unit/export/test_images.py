@@ -87,6 +87,29 @@ def test_pictures_in_tables_are_exact_and_say_what_is_left_out(seen: Path, tmp_p
     assert "here is: `head` color; `side` color; named `observation.images.<sensor>`." in card
 
 
+def test_depths_in_tables_are_those_of_throws_in_mm(seen: Path, tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    export(seen, tmp_path / "out", to="lerobot", images="depth")
+    info = json.loads((tmp_path / "out" / "meta" / "info.json").read_text())["features"]
+    statistics = json.loads((tmp_path / "out" / "meta" / "stats.json").read_text())
+    table = pq.read_table(tmp_path / "out" / "data")
+    assert [name for name in info if "images" in name] == [
+        f"observation.images.{name}" for name in ("side", "side_depth", "head", "front_depth")
+    ]
+    for name, shape in (("side", [48, 64, 1]), ("front", [12, 16, 1])):
+        key = f"observation.images.{name}_depth"
+        assert (info[key]["shape"], info[key]["info"]) == (shape, {"is_depth_map": True, "depth_unit": "mm"})
+        opened = [image.open(BytesIO(each["bytes"])) for each in table[key].to_pylist()]
+        assert {each.mode for each in opened} == {"I;16"}
+        stored = np.array([*map(np.array, opened)])
+        depth_m = np.concatenate([frames_of(throw, name, 5, "depth_m") for throw in throwcollect.load(seen)])
+        assert np.array_equal(stored == 0, np.isinf(depth_m))
+        assert np.abs(stored / 1000 - np.where(stored, depth_m, 0)).max() < 0.00051
+        for measure in ("min", "max", "mean", "std"):
+            found = np.array(statistics[key][measure])
+            np.testing.assert_allclose(found, getattr(np, measure)(stored).reshape(1, 1, 1), rtol=1e-12)
+
+
 def test_statistics_of_images_are_those_of_all_pixels(seen: Path, tmp_path: Path) -> None:
     export(seen, tmp_path / "out", to="lerobot", images="png")
     statistics = json.loads((tmp_path / "out" / "meta" / "stats.json").read_text())["observation.images.side"]

@@ -264,7 +264,7 @@ def test_the_lerobot_library_reads_the_export(
     assert landed.num_episodes == 3
 
 
-@pytest.mark.parametrize(("way", "most"), [("av1", 4.0), ("h264", 4.0), ("png", 0.01)])
+@pytest.mark.parametrize(("way", "most"), [("av1", 4.0), ("h264", 4.0), ("png", 0.01), ("depth", 0.01)])
 def test_the_lerobot_library_reads_each_image_at_its_time(
     way: str, most: float, seen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -272,7 +272,9 @@ def test_the_lerobot_library_reads_each_image_at_its_time(
     library = pytest.importorskip("lerobot.datasets.lerobot_dataset")
     export(seen, tmp_path / "out", to="lerobot", images=way)
     dataset = library.LeRobotDataset("me/throws", root=tmp_path / "out")
-    assert set(dataset.meta.camera_keys) == {"observation.images.head", "observation.images.side"}
+    depths = {"observation.images.side_depth", "observation.images.front_depth"} if way == "depth" else set()
+    assert set(dataset.meta.camera_keys) == {"observation.images.head", "observation.images.side"} | depths
+    assert set(dataset.meta.depth_keys) == depths
     first = 0
     for throw in throwcollect.load(seen):
         for name, step in (("head", 2), ("side", 5)):
@@ -283,6 +285,10 @@ def test_the_lerobot_library_reads_each_image_at_its_time(
                 image = item[f"observation.images.{name}"].numpy().transpose(1, 2, 0) * 255
                 assert image.shape == picture.shape
                 assert np.abs(image - picture).mean() < most
+                if depths and name == "side":
+                    depth_m = throw.sensors[name].depth_m[number * step]
+                    read_mm = item["observation.images.side_depth"].numpy()
+                    assert np.abs(read_mm - np.where(np.isinf(depth_m), 0, depth_m * 1000)).max() < 0.51
         first += len(pictures)
     assert len(dataset) == first
     assert dataset.meta.stats["observation.images.side"]["mean"].shape == (3, 1, 1)

@@ -26,7 +26,7 @@ def export(
     Options:
         to (FORMAT): parquet, npz, lerobot, hdf5, mat, or one of another package.
         rate (HZ): Samples per second; as recorded, or as sensors have frames, if not given.
-        images (WAY): How to store what sensors saw: av1, h264 or png (lerobot), arrays (hdf5, npz), or none.
+        images (WAY): How to store what sensors saw: av1, h264, png or depth (lerobot), arrays (hdf5, npz), or none.
     """
     from throwcollect.export.export import export as export_dataset
 
