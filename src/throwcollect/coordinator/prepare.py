@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.oddities import find_placeholders
+from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sensing.sensor import check_sensors
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sim.policy import find_policy
@@ -30,12 +33,10 @@ from throwcollect.sweep.samplers import draw_points
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.wording import format_count
 
-_MANY_TRIALS = 500
+_MANY_TRIALS = 2000
 """From this number of trials on, starting processes that check them side by side saves time."""
-_TRIALS_A_PIECE = 100
-_MOST_PIECES = 10_000
-"""Most pieces of a plan: handing over many more takes a minute, in which no trial is checked and Ctrl-C does
-nothing."""
+_TRIALS_A_PIECE, _MOST_A_PIECE = 100, 1000
+"""Similar trials share work, so large plans are cut into larger pieces; to hand over many pieces takes time, too."""
 _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
 
@@ -73,7 +74,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     check_sensors(config)
     refuse_many_files(config, len(points.values))
     count = count_first(config, len(points.values))
-    size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
+    size = max(_TRIALS_A_PIECE, min(_MOST_A_PIECE, count // 10))
     # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
     pieces = [points[first:stop] for first, stop in pairwise([*firsts, count])]
@@ -97,24 +98,40 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
 
 def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:
     """Make a function that says for each of some points why the robot cannot do its trial; None if it can."""
-    check = feasibility_check(config)
+    feasibility = Feasibility(config)
 
     def find_reasons(points: Points) -> list[str | None]:
         rows = (dict(zip(points.keys, row, strict=True)) for row in points.values.tolist())
-        return [refusal(with_values(config, values), check) for values in rows]
+        trials = [with_values(config, values) for values in rows]
+        planned = {}
+        for number, trial in enumerate(trials):
+            # The check, which comes to the same error, makes it the reason of a refusal.
+            with suppress(ConfigError):
+                planned[number] = _plan_motion(trial)
+        sure = dict(zip(planned, feasibility.find_feasible([*planned.values()]), strict=True))
+        return [
+            None if sure.get(number) else refusal(trial, partial(_check, feasibility))
+            for number, trial in enumerate(trials)
+        ]
 
     return find_reasons
 
 
 def feasibility_check(config: Config) -> Check:
-    """Make a function that says why the robot cannot do a trial, in 1 to 5 ms each.
+    """Make a function that says why the robot cannot do a trial, in 2 to 5 ms each.
 
     With `sweep.feasibility: nominal`, the function checks the robot as its owner believes it to be.
     """
-    feasibility = Feasibility(config)
-    if config.sweep.feasibility == "nominal":
-        return lambda trial: feasibility.check(_replace_by_nominal_robot(trial), trajectory_of(trial))
-    return lambda trial: feasibility.check(trial, trajectory_of(trial))
+    return partial(_check, Feasibility(config))
+
+
+def _check(feasibility: Feasibility, trial: Config) -> str | None:
+    return feasibility.check(*_plan_motion(trial))
+
+
+def _plan_motion(trial: Config) -> tuple[Config, JointTrajectory]:
+    """Return the configuration by which a trial is checked, and its trajectory."""
+    return _replace_by_nominal_robot(trial) if trial.sweep.feasibility == "nominal" else trial, trajectory_of(trial)
 
 
 def _replace_by_nominal_robot(config: Config) -> Config:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -21,6 +22,8 @@ from throwcollect.tools.tool import Tool
 MARGIN_M = 0.002
 """Least distance between links. On a path between two checked postures, which are 0.02 rad apart, the spoon, 1 m from
 the torso's axis, could cut by this much into a body as curved as the head."""
+_ROUNDING_M = 1e-5
+"""Computed distances are right to a tenth of this."""
 _TOUCHING_M = 1e-3
 """Bodies that touch may reach into each other by this much."""
 
@@ -98,6 +101,74 @@ class Clearance:
                     distance_m=distances[closest],
                 )
         return None
+
+    def find_clear(
+        self,
+        rest: NDArray[np.float64],
+        moving: NDArray[np.intp],
+        ways: NDArray[np.float64],
+        trials: NDArray[np.intp],
+        n_trials: int,
+    ) -> NDArray[np.bool_]:
+        """Find the trials in all of whose postures links surely stay `MARGIN_M` apart, shape ``(n_trials,)``.
+
+        Links that are farther apart, in the middle of a box of postures, than they can approach each other within the
+        box, need no further look; a box with other links is cut in two. So similar trials share most of the work.
+
+        Args:
+            rest: A posture in the order of the model [rad], shape ``(n_joints,)``.
+            moving: Columns of joints that move, shape ``(n_moving,)``.
+            ways: Their positions in each posture, shape ``(n_moving, n)``.
+            trials: The trial of each posture, shape ``(n,)``.
+            n_trials: Number of trials.
+        """
+        clear, posture, reaches = np.ones(n_trials, np.bool_), rest.copy(), self._reaches[:, moving]
+        boxes = [(ways, trials, np.arange(len(reaches)))]
+        while boxes:
+            inside, owners, pairs = boxes.pop()
+            if not len(owners):
+                continue
+            low, high = inside.min(axis=1), inside.max(axis=1)
+            posture[moving] = middle = (low + high) / 2
+            approaches = reaches[pairs] * ((high - low) / 2)
+            pinocchio.updateGeometryPlacements(self._model, self._data, self.geometry, self._distances, posture)
+            of_pair = (pinocchio.computeDistance(self.geometry, self._distances, pair) for pair in pairs.tolist())
+            gaps = np.array([found.min_distance for found in of_pair])
+            near = gaps - approaches.sum(axis=1) <= MARGIN_M + _ROUNDING_M
+            if near.any():
+                joint = int(approaches[near].max(axis=0).argmax())
+                if approaches[near, joint].max() <= _ROUNDING_M:
+                    clear[owners] = False
+                    continue
+                lower, left = inside[joint] <= middle[joint], clear[owners]
+                boxes += [
+                    (inside.compress(half, axis=1), owners.compress(half), pairs[near])
+                    for half in (lower & left, ~lower & left)
+                ]
+        return clear
+
+    @cached_property
+    def _reaches(self) -> NDArray[np.float64]:
+        """How far links of a pair can approach each other by a joint [m/rad; m/m], shape ``(n_pairs, n_joints)``."""
+        model, shapes = self._model, self.geometry.geometryObjects
+        reaches = np.zeros((len(shapes), model.nq))
+        for shape, reach in zip(shapes, reaches, strict=True):
+            shape.geometry.computeLocalAABB()
+            # In the worst case, the arm is stretched from the joint to the farthest point of the shape.
+            length, joint = math.hypot(*shape.placement.act(shape.geometry.aabb_center)), shape.parentJoint
+            length += shape.geometry.aabb_radius
+            while joint:
+                column = model.idx_qs[joint]
+                slides = model.names[joint] in self._robot.sliding
+                reach[column] = 1.0 if slides else length
+                length += math.hypot(*model.jointPlacements[joint].translation)
+                if slides:
+                    length += max(abs(model.lowerPositionLimit[column]), abs(model.upperPositionLimit[column]))
+                joint = model.parents[joint]
+        # A joint that moves both links does not change their distance.
+        pairs = np.array([(pair.first, pair.second) for pair in self.geometry.collisionPairs]).reshape(-1, 2)
+        one, other = reaches[pairs].transpose(1, 0, 2)
+        return np.where((one > 0) & (other > 0), 0.0, one + other)
 
     def _add_tool(self, tool: Tool) -> None:
         frame = self._model.getFrameId(self._robot.hand, pinocchio.BODY)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import Placement
 from throwcollect.engines.engine import SceneBody
+from throwcollect.errors import ConfigError
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance, find_overlap
 from throwcollect.robots.description import (
@@ -21,10 +24,10 @@ from throwcollect.robots.description import (
     robot_of,
     start_posture,
 )
-from throwcollect.robots.joint_model import joint_model, lock_joints, mount_of
+from throwcollect.robots.dynamics import Dynamics
+from throwcollect.robots.joint_model import joint_model, mount_of
 from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import bodies_of, object_of, starts_in_tool
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tools.tool import Tool, tool_of
@@ -36,7 +39,10 @@ _POSITION_SLACK_RAD = 1e-6
 _LOWEST_WAY_OUT_RAD = -0.02
 """A way out that goes down by less than this counts as level, because a ball takes a second or more to leave on it."""
 _SURELY = 1 - 1e-6
-"""A torque below this share of its limit is within the limit by any model: results of models agree to 1e-12."""
+"""A value below this share of its limit is within the limit however it is computed: ways to do so agree to 1e-8."""
+_TRIALS_AT_ONCE = 25
+"""Number of trials whose arrays stay in the processor's cache."""
+_Trial = tuple[Config, JointTrajectory]
 
 
 Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -64,7 +70,10 @@ class Feasibility:
         self._hand_placement = hand.placement
         chain = list(self._model.supports[self._hand])[1:]
         self._carrying = [self._robot.joints.index(self._model.names[joint]) for joint in chain]
-        self._limits = joint_limits(self._robot)
+        self._limits = limits = joint_limits(self._robot)
+        # About the middle of its range, a joint has one limit in both directions.
+        self._middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
+        self._half = half + _POSITION_SLACK_RAD
         self._dynamics = Dynamics(self._robot, self._model, {})
         self._locked: Mapping[str, float] = {}
         self._free_dynamics = self._dynamics
@@ -94,7 +103,8 @@ class Feasibility:
         joints, tool = self._robot.joints, self._tool_of(config)
         instants = max(_CHECKED_LEAST, math.ceil(trajectory.times[-1] * _CHECKED_HZ)) + 1
         times = np.linspace(0.0, trajectory.times[-1], instants)
-        motion = _sample_whole_body(self._robot, trajectory, times, posture, config)
+        rest, offsets = np.tile(posture, (instants, 1)), joint_offsets(config)
+        motion = _sample(self._robot.joints, trajectory, times, rest, offsets, config.robot.speed_scale)
         if violation := self._find_violation(config, times, motion):
             return violation
         positions = motion[0]
@@ -116,17 +126,91 @@ class Feasibility:
             return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
         return self._explain_loss(config, posture)
 
+    def find_feasible(self, trials: Sequence[_Trial]) -> NDArray[np.bool_]:
+        """Find trials of a sweep that `check` surely accepts, in a fraction of its time; shape ``(n_trials,)``.
+
+        Curves, limits and torques of many trials are arrays, and trials share the postures in which links are compared.
+        What is too close to a limit to be sure is left to `check`, so nothing depends on how sums are rounded here.
+        """
+        sure = np.zeros(len(trials), np.bool_)
+        for _, group in groupby(enumerate(trials), lambda numbered: _describe_shapes(numbered[1][0])):
+            numbers, alike = zip(*group, strict=True)
+            with suppress(ConfigError):
+                sure[[*numbers]] = self._find_feasible_alike(alike)
+        return sure
+
+    def _find_feasible_alike(self, trials: Sequence[_Trial]) -> NDArray[np.bool_]:
+        """Find trials that `check` surely accepts among some whose tool and bodies have the same shapes and places."""
+        config = trials[0][0]
+        tool, bodies, free = self._tool_of(config), bodies_of(config), self._dynamics_of_free_joints(config).columns
+        offsets = np.array([joint_offsets(each) for each, _ in trials])
+        postures = np.array([[*start_posture(each).values()] for each, _ in trials]) + offsets
+        keys = [(posture.tobytes(), object_of(each)) for posture, (each, _) in zip(postures, trials, strict=True)]
+        starts = {key: number for number, key in enumerate(keys)}
+        for key, number in starts.items():
+            each, posture = trials[number][0], postures[number]
+            overlap = self._find_overlap(each, tool, bodies, self._model_order(posture[None]))
+            starts[key] = not (overlap or self._explain_loss(each, posture))
+        sure = np.array([starts[key] for key in keys])
+        # Joints that are locked rest at the same angles in all trials of a sweep.
+        sure &= (np.delete(postures == postures[0], free, axis=1)).all(axis=1)
+        sure &= (shares_of(postures - self._middle, self._half) <= _SURELY).all(axis=1)
+        ways, counts = [], []
+        for first in range(0, len(trials), _TRIALS_AT_ONCE):
+            some = slice(first, first + _TRIALS_AT_ONCE)
+            within, way, count = self._find_within_limits(trials[some], postures[some], offsets[some])
+            sure[some] &= within
+            ways.append(way.T)
+            counts.append(count)
+        numbers = np.repeat(np.arange(len(trials)), np.concatenate(counts))
+        there = sure[numbers]
+        way, numbers = np.concatenate(ways, axis=1).compress(there, axis=1), numbers[there]
+        for clearance in filter(None, (self._clearance, self._find_around(config, tool, bodies))):
+            sure &= clearance.find_clear(self._model_order(postures[0]), self._columns[free], way, numbers, len(trials))
+        return sure
+
+    def _find_within_limits(
+        self, trials: Sequence[_Trial], postures: NDArray[np.float64], offsets: NDArray[np.float64]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.intp]]:
+        """Find trials whose free joints surely keep their limits, and move the tool where they have to.
+
+        Returns:
+            Whether each does; the free joints at the instants of one trial after the other; numbers of these instants.
+        """
+        config, dynamics = trials[0][0], self._dynamics_of_free_joints(trials[0][0])
+        free, limits = dynamics.columns, self._limits
+        joined, times, counts = _join([trajectory for _, trajectory in trials])
+        firsts, numbers = np.cumsum(counts) - counts, np.repeat(np.arange(len(trials)), counts)
+        speeds = np.array([[each.robot.speed_scale] for each, _ in trials])[numbers]
+        names = [self._robot.joints[column] for column in free]
+        motion = _sample(names, joined, times, postures[numbers][:, free], offsets[numbers][:, free], speeds)
+        efforts = np.empty_like(motion[0])
+        worlds = [(object_of(each), each.scene.gravity_mps2, each.robot.effort_scale) for each, _ in trials]
+        for world, group in groupby(range(len(trials)), worlds.__getitem__):
+            one, *_ = alike = [*group]
+            rows = slice(firsts[one], firsts[alike[-1]] + counts[alike[-1]])
+            efforts[rows] = dynamics.efforts(trials[one][0], self._tool, [array[rows] for array in motion]) / world[-1]
+        within = np.ones(len(times), np.bool_)
+        for values, limit in (
+            (motion[0] - self._middle[free], self._half),
+            (motion[1], limits.velocity),
+            (efforts, limits.effort),
+        ):
+            within &= (shares_of(values, limit[free]) <= _SURELY).all(axis=1)
+        sure: NDArray[np.bool_] = np.logical_and.reduceat(within, firsts)
+        if config.task.tool_acts and config.task.policy is None:
+            moved = np.abs(motion[0][firsts + counts - 1] - motion[0][firsts])[:, np.isin(free, self._carrying)]
+            sure &= moved.max(axis=1, initial=0.0) > _POSITION_SLACK_RAD
+        return sure, motion[0], counts
+
     def _find_violation(self, config: Config, times: NDArray[np.float64], motion: Motion) -> str | None:
         """Find the first kind of limit that a motion violates, and the worst violation of it."""
-        joints, locked = self._robot.joints, find_locked_joints(config)
+        joints, limits = self._robot.joints, self._limits
         positions, velocities, _ = motion
-        limits = self._limits
-        # About the middle of its range, a joint has one limit in both directions.
-        middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
-        if worst := _find_worst(positions - middle, half + _POSITION_SLACK_RAD):
+        if worst := _find_worst(positions - self._middle, self._half):
             row, joint = worst
             unit = self._robot.unit_of(joints[joint])
-            side, limit = ("upper", limits.upper) if positions[worst] > middle[joint] else ("lower", limits.lower)
+            side, limit = ("upper", limits.upper) if positions[worst] > self._middle[joint] else ("lower", limits.lower)
             return (
                 f"{joints[joint]} is at {positions[worst]:.4g} {unit} at {times[row]:.3f} s; "
                 f"its {side} limit is {limit[joint]:.4g} {unit}"
@@ -138,14 +222,12 @@ class Feasibility:
                 f"{joints[joint]} moves at {abs(velocities[worst]):.4g} {unit}/s at {times[row]:.3f} s; "
                 f"its limit is {limits.velocity[joint]:.4g} {unit}/s"
             )
+        locked, columns = find_locked_joints(config), self._dynamics.columns
         limit = np.where([joint in locked for joint in joints], np.inf, limits.effort * config.robot.effort_scale)
-        # The model without locked joints is faster and decides most trials. A trial near a limit is computed again
-        # with all joints, so that its numbers do not depend on which joints are locked.
+        # All joints are computed, so that the numbers do not depend on which joints are locked.
+        efforts = np.empty_like(positions)
         tool = self._tool_of(config)
-        efforts = self._dynamics_of_free_joints(locked).efforts(config, tool, motion)
-        if (shares_of(efforts, limit) <= _SURELY).all():
-            return None
-        efforts = self._dynamics.efforts(config, tool, motion)
+        efforts[:, columns] = self._dynamics.efforts(config, tool, [array[:, columns] for array in motion])
         if worst := _find_worst(efforts, limit):
             row, joint = worst
             unit = "N" if joints[joint] in self._robot.sliding else "Nm"
@@ -173,8 +255,9 @@ class Feasibility:
             f"out, {-slope:.3g} rad downwards; up to {safe:.3g} rad, a tilt in any direction is safe"
         )
 
-    def _dynamics_of_free_joints(self, locked: Mapping[str, float]) -> Dynamics:
+    def _dynamics_of_free_joints(self, config: Config) -> Dynamics:
         """Return the dynamics of all joints but locked ones."""
+        locked = find_locked_joints(config)
         if locked != self._locked:
             self._locked, self._free_dynamics = dict(locked), Dynamics(self._robot, self._model, locked)
         return self._free_dynamics
@@ -221,18 +304,43 @@ class Feasibility:
         return ordered
 
 
-def _sample_whole_body(
-    robot: Robot, trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64], config: Config
+def _describe_shapes(config: Config) -> object:
+    """Make what is equal for trials whose tool and bodies have the same shapes and places."""
+    return config.tool.without_release(), config.scene.bodies, config.task.bodies, config.robot.base_height_m
+
+
+def _join(trajectories: Sequence[JointTrajectory]) -> tuple[JointTrajectory, NDArray[np.float64], NDArray[np.intp]]:
+    """Join trajectories to one, with a pause of a second after each; list all instants to check, and their numbers."""
+    ends = np.array([each.times[-1] for each in trajectories])
+    counts = np.maximum(_CHECKED_LEAST, np.ceil(ends * _CHECKED_HZ)).astype(np.intp) + 1
+    begins, steps = np.cumsum(ends + 1) - ends, ends / (counts - 1)
+    times = np.concatenate([np.arange(n) * step + begin for n, step, begin in zip(counts, steps, begins, strict=True)])
+    knots = np.concatenate([each.times + begin for each, begin in zip(trajectories, begins, strict=True)])
+    points = ([getattr(each, name) for each in trajectories] for name in ("positions", "velocities", "accelerations"))
+    return JointTrajectory(trajectories[0].joints, knots, *map(np.concatenate, points)), times, counts
+
+
+def _sample(
+    joints: Sequence[str],
+    trajectory: JointTrajectory,
+    times: NDArray[np.float64],
+    rest: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    speed: NDArray[np.float64] | float,
 ) -> Motion:
-    """Sample the motion of all joints, each array of shape ``(n, n_joints)``, in the order of `Robot.joints`."""
-    columns = [robot.joints.index(joint) for joint in trajectory.joints]
-    offsets, speed = joint_offsets(config)[columns], config.robot.speed_scale
-    whole = tuple(np.tile(rest, (len(times), 1)) for rest in (posture, np.zeros_like(posture), np.zeros_like(posture)))
+    """Sample the motion of joints, each array of shape ``(n, n_joints)``; the trajectory moves all or some of them.
+
+    The others stay where they are in `rest`, which is overwritten. True angles are larger than those of the trajectory
+    by `offsets`, ``(n_joints,)`` or a row for each instant, and true speeds by the factor `speed`.
+    """
+    columns = [joints.index(joint) for joint in trajectory.joints]
+    whole = rest, np.zeros_like(rest), np.zeros_like(rest)
     position, velocity, acceleration = sample_quintic(trajectory, times)
     # At another speed, the joints pass the same angles, so each derivative by time has one more factor of the speed.
-    for array, sampled in zip(whole, (position + offsets, velocity * speed, acceleration * speed**2), strict=True):
-        array[:, columns] = sampled
-    return whole[0], whole[1], whole[2]
+    sampled = position + offsets[..., columns], velocity * speed, acceleration * speed**2
+    for array, values in zip(whole, sampled, strict=True):
+        array[:, columns] = values
+    return whole
 
 
 def _choose_rows(positions: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -253,51 +361,3 @@ def _find_worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tup
 
 def _describe_gap(distance_m: float) -> str:
     return "overlap" if distance_m < 0 else f"are {distance_m * 1000:.1f} mm apart"
-
-
-class Dynamics:
-    """Inverse dynamics of a robot.
-
-    Args:
-        robot: The robot.
-        model: Model of all its joints, without a tool.
-        locked: Angle [rad] of each joint that is locked, which makes computing faster; empty if none is.
-    """
-
-    def __init__(self, robot: Robot, model: pinocchio.Model, locked: Mapping[str, float]) -> None:
-        self._model = lock_joints(model, locked) if locked else model.copy()
-        self._data = self._model.createData()
-        # Columns of `Robot.joints` that are not locked, in the order of the model.
-        self._columns = np.array([robot.joints.index(name) for name in list(self._model.names)[1:]], dtype=np.intp)
-        hand = self._model.frames[self._model.getFrameId(robot.hand, pinocchio.BODY)]
-        self._robot = robot
-        self._hand, self._hand_placement = hand.parentJoint, hand.placement.copy()
-        self._bare_hand = self._model.inertias[self._hand].copy()
-        self._damping = joint_limits(robot).damping[self._columns]
-
-    def efforts(self, config: Config, tool: Tool, motion: Motion) -> NDArray[np.float64]:
-        """Compute the torques that a motion of all joints needs, with tool and ball of a trial in the hand.
-
-        In the motion, locked joints must rest at the angles at which they are locked.
-
-        Returns:
-            [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`; 0 for locked joints.
-        """
-        load = tool.inertia
-        if starts_in_tool(config):
-            thing = object_of(config)
-            seat, inertia = np.array(tool.ball_seat(thing.radius_m)), thing.inertia
-            held = pinocchio.Inertia(inertia.mass_kg, np.zeros(3), np.diag(inertia.diagonal))
-            load += pinocchio.SE3(np.eye(3), seat).act(held)
-        # The sum begins with the bare hand, because the model still holds the load of the previous trial.
-        self._model.inertias[self._hand] = self._bare_hand + (self._hand_placement * mount_of(self._robot, tool)).act(
-            load
-        )
-        self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
-        positions, velocities, accelerations = (np.ascontiguousarray(array[:, self._columns]) for array in motion)
-        rows = zip(positions, velocities, accelerations, strict=True)
-        torques = np.array([pinocchio.rnea(self._model, self._data, *row) for row in rows])
-        needed = np.zeros_like(motion[0])
-        # Pinocchio's inverse dynamics leave out friction.
-        needed[:, self._columns] = torques + self._damping * velocities
-        return needed

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.scene import BALL, AnyBody, BoxConfig, CylinderConfig, FileBodyConfig, SphereConfig
+from throwcollect.config.scene import BALL, AnyBody, BallConfig, BoxConfig, CylinderConfig, FileBodyConfig, SphereConfig
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import (
     HERE,
@@ -38,7 +38,8 @@ _BALL_COLOR = "#ff7300"
 
 def object_of(config: Config) -> SceneBody:
     """Make the object that the robot acts on in a trial: the ball, or a body of the scene or of the task."""
-    return _make_body(config.acted_on, _list_sections(config))
+    name = config.acted_on
+    return _make_ball(config.ball) if name == BALL else _make_body(name, config.bodies)
 
 
 def bodies_of(config: Config) -> tuple[SceneBody, ...]:
@@ -63,8 +64,17 @@ def _list_sections(config: Config) -> Mapping[str, AnyBody]:
     """List the sections of all bodies by name; the ball, if there is one, is a sphere."""
     if config.acted_on != BALL:
         return config.bodies
-    ball = config.ball
-    sphere = SphereConfig.model_construct(
+    return {**config.bodies, BALL: _describe_ball(config.ball)}
+
+
+@lru_cache(maxsize=64)
+def _make_ball(ball: BallConfig) -> SceneBody:
+    return _make_body(BALL, {BALL: _describe_ball(ball)})
+
+
+@lru_cache(maxsize=64)
+def _describe_ball(ball: BallConfig) -> SphereConfig:
+    return SphereConfig.model_construct(
         shape="sphere",
         radius_m=ball.radius_m,
         mass_kg=ball.mass_kg,
@@ -73,7 +83,6 @@ def _list_sections(config: Config) -> Mapping[str, AnyBody]:
         rolling_friction_m=ball.rolling_friction_m,
         color=_BALL_COLOR,
     )
-    return {**config.bodies, BALL: sphere}
 
 
 @dataclass(frozen=True)

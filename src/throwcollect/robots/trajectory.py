@@ -41,7 +41,7 @@ class JointTrajectory:
                 raise ValueError(f"{name} of a trajectory should have the shape {shape}, have {np.shape(values)}")
             if not np.isfinite(values).all():
                 raise ValueError(f"{name} of a trajectory hold numbers that are not finite")
-        if not points or (np.diff(self.times) <= 0).any():
+        if not points or (self.times[1:] <= self.times[:-1]).any():
             raise ValueError("times of a trajectory should increase")
 
     @cached_property

@@ -75,9 +75,7 @@ def _make_plan(config: Config, sweep_directory: Path, processes: int, onlooker: 
     from throwcollect.coordinator.prepare import prepare as prepare_plan
 
     if (config.trials or 0) >= MANY_TRIALS and config.until is None:
-        onlooker.say(
-            f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms for each on one core"
-        )
+        onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, 0.3 to 3 ms for each")
     return prepare_plan(config, directory, sweep_directory=sweep_directory, processes=processes, onlooker=onlooker)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -60,4 +61,6 @@ def point_times(duration_s: float, *, points_hz: float) -> NDArray[np.float64]:
     Returns:
         Times [s] from 0 to exactly `duration_s`, strictly increasing, shape ``(n_points,)`` with at least two.
     """
-    return np.append(np.arange(max(1, np.ceil(duration_s * points_hz - 0.1))) / points_hz, duration_s)
+    times = np.arange(max(1, math.ceil(duration_s * points_hz - 0.1)) + 1) / points_hz
+    times[-1] = duration_s
+    return times

@@ -9,7 +9,8 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import joint_model
-from throwcollect.robots.feasibility import Dynamics, Feasibility
+from throwcollect.robots.dynamics import Dynamics
+from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
@@ -46,7 +47,9 @@ def reason(feasibility):
 
 
 def efforts_of(config, motion):
-    return Dynamics(TALOS, joint_model(TALOS), {}).efforts(config, tool_of(config), motion)
+    dynamics = Dynamics(TALOS, joint_model(TALOS), {})
+    efforts = dynamics.efforts(config, tool_of(config), [array[:, dynamics.columns] for array in motion])
+    return efforts[:, np.argsort(dynamics.columns)]
 
 
 def shares(config):
@@ -222,24 +225,63 @@ def test_the_clearance_check_agrees_with_the_distances_of_all_pairs():
     assert found > 10
 
 
-def test_dynamics_of_only_the_free_joints_give_the_same_refusals():
-    feasibility, whole = Feasibility(Config()), Feasibility(Config())
-    whole._dynamics_of_free_joints = lambda _: whole._dynamics
-    draw = np.random.default_rng(3)
-    reasons = []
-    for _ in range(60):
-        elbow, wrist, duration_s, gamma = draw.uniform([-0.5, 0.4, 0.85, 1.0], [-0.2, 0.6, 1.0, 1.3])
-        config = throw(
-            {"arm_right_4_joint": elbow, "arm_right_7_joint": wrist},
-            duration_s=duration_s,
-            gamma=gamma,
-            ball={"mass_kg": draw.uniform(0.03, 0.1)},
-            robot={"posture": {"head_1_joint": draw.uniform(0.0, 0.1)}},
-        )
-        trajectory = task_of(config).trajectory()
-        reasons.append(whole.check(config, trajectory))
-        assert feasibility.check(config, trajectory) == reasons[-1]
-    assert 0.2 < np.mean([reason is None for reason in reasons]) < 0.8
+WALL = {"shape": "box", "size_m": [0.1, 2.0, 2.0], "position_m": [0.5, 0.0, 1.0]}
+
+
+def draw_trial(draw, case):
+    """Draw a trial; about half of them are feasible."""
+    elbow, wrist, duration_s, gamma = draw.uniform([-0.6, 0.3, 0.85, 1.0], [-0.2, 0.72, 1.05, 1.3])
+    end, start, sections = {"arm_right_4_joint": elbow, "arm_right_7_joint": wrist}, {}, {}
+    if case == "world":
+        sections["ball"] = {"mass_kg": draw.uniform(0.03, 0.1)}
+        offsets = {"arm_right_7_joint": draw.uniform(-0.2, 0.2)}
+        sections["robot"] = {
+            "joint_offsets": offsets,
+            "speed_scale": draw.uniform(0.6, 1.6),
+            "effort_scale": draw.uniform(1.0, 3.0),
+        }
+    elif case == "collision":
+        start["arm_right_7_joint"] = draw.uniform(-0.5, 0.3)
+        angles = draw.uniform([-2.6, -1.5, 0.0, -0.6], [-2.1, 1.95, 2.33, 0.0])
+        end |= {f"arm_right_{number}_joint": angle for number, angle in zip((2, 3, 5, 6), angles, strict=True)}
+        duration_s *= 6
+        sections["robot"] = {"effort_scale": 2.0}
+    elif case == "wall":
+        sections["scene"] = {"bodies": {"wall": WALL}}
+        end["torso_1_joint"] = draw.uniform(-0.5, 0.5)
+        duration_s *= 1.5
+    elif case == "tool":
+        sections["tool"] = {"handle_length_m": draw.choice([0.15, 0.3])}
+    return throw(end, start, duration_s, gamma, **sections)
+
+
+@pytest.mark.parametrize("case", ["limits", "world", "collision", "wall", "tool"])
+def test_trials_that_are_found_feasible_together_are_accepted_one_by_one(case):
+    draw, together, single = np.random.default_rng(3), Feasibility(Config()), Feasibility(Config())
+    configs = [draw_trial(draw, case) for _ in range(60)]
+    trials = [(config, task_of(config).trajectory()) for config in configs]
+    accepted = np.array([single.check(*trial) is None for trial in trials])
+    sure = together.find_feasible(trials)
+    assert not (sure & ~accepted).any()
+    # Only what is closer to a limit than all ways to compute agree is left to the check.
+    assert sure.sum() >= accepted.sum() - 2
+    assert 0.1 < accepted.mean() < 0.9
+
+
+def test_what_is_as_close_as_it_may_be_is_left_to_the_check():
+    """The last joint of the arm goes a little beyond its limit, and in the second trial just to it."""
+    limit = joint_limits(TALOS).upper[JOINTS.index("arm_right_7_joint")]
+    trials = [throw({"arm_right_7_joint": end}, duration_s=1.5) for end in (limit + 9e-7, limit)]
+    feasibility = Feasibility(Config())
+    planned = [(config, task_of(config).trajectory()) for config in trials]
+    assert [feasibility.check(*each) for each in planned] == [None, None]
+    assert feasibility.find_feasible(planned).tolist() == [False, True]
+
+
+def test_a_tool_that_rests_is_left_to_the_check(reason, feasibility):
+    config = throw({joint: TASK.start[joint] for joint in TASK.end})
+    assert reason(config).startswith("task.end moves no joint")
+    assert not feasibility.find_feasible([(config, task_of(config).trajectory())]).any()
 
 
 @pytest.fixture
