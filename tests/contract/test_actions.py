@@ -75,7 +75,7 @@ def controller(rig):
 @pytest.fixture
 def client(rig, controller):
     client = ActionClient(rig.node("client"), FJT, "/arm/follow_joint_trajectory")
-    assert client.wait_for_server(timeout_sec=5)
+    assert client.wait_for_server(timeout_sec=30)
     return client
 
 
@@ -129,7 +129,7 @@ def test_the_result_of_an_unknown_goal_is_unknown(rig, controller, client):
     send(rig, controller, client, "a")
     get_result = FJT.Impl.GetResultService
     service = rig.node("curious").create_client(get_result, "/arm/follow_joint_trajectory/_action/get_result")
-    assert service.wait_for_service(5)
+    assert service.wait_for_service(30)
     request = get_result.Request(goal_id=Uuid(uuid=UNKNOWN))
     assert rig.result(service.call_async(request)).status == GoalStatus.STATUS_UNKNOWN
 
@@ -158,7 +158,7 @@ def test_an_empty_request_cancels_all_goals_and_an_unknown_id_is_an_error(rig, c
     handles = [send(rig, controller, client, "a")[0] for _ in range(3)]
     node = rig.node("canceler")
     service = node.create_client(CancelGoal, "/arm/follow_joint_trajectory/_action/cancel_goal")
-    assert service.wait_for_service(5)
+    assert service.wait_for_service(30)
     unknown = CancelGoal.Request()
     unknown.goal_info.goal_id.uuid = UNKNOWN
     assert rig.result(service.call_async(unknown)).return_code == CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID
@@ -169,7 +169,7 @@ def test_an_empty_request_cancels_all_goals_and_an_unknown_id_is_an_error(rig, c
 def test_a_result_is_forgotten_after_its_timeout(rig):
     controller = Controller(rig.node("server"), result_timeout=0.05)
     client = ActionClient(rig.node("client"), FJT, "/arm/follow_joint_trajectory")
-    assert client.wait_for_server(timeout_sec=5)
+    assert client.wait_for_server(timeout_sec=30)
     theirs, ours = send(rig, controller, client, "a")
     controller.end(ours, "succeed")
     assert rig.result(theirs.get_result_async()).status == GoalStatus.STATUS_SUCCEEDED
@@ -194,7 +194,7 @@ def test_a_late_subscriber_gets_the_status_of_all_goals(rig, controller, client)
 def test_an_execute_callback_that_forgets_the_end_aborts_the_goal(rig):
     server = ActionServer(rig.node("server"), FJT, "/act", lambda _handle: FJT.Result(error_string="forgot"))
     client = ActionClient(rig.node("client"), FJT, "/act")
-    assert client.wait_for_server(5)
+    assert client.wait_for_server(30)
     handle = rig.result(client.send_goal_async(goal("a")))
     response = rig.result(handle.get_result_async())
     assert (response.status, response.result.error_string) == (GoalStatus.STATUS_ABORTED, "forgot")
@@ -208,7 +208,7 @@ def test_an_execute_callback_that_fails_aborts_the_goal(rig):
 
     ActionServer(rig.node("server"), FJT, "/act", fail)
     client = ActionClient(rig.node("client"), FJT, "/act")
-    assert client.wait_for_server(5)
+    assert client.wait_for_server(30)
     future = client.send_goal_async(goal("a"))
     if not ON_RCLPY:
         # rclpy logs the exception and goes on; the embedded backend raises it, as for every callback.

@@ -176,7 +176,7 @@ class Remote:
         service_type = get_service(f"{SRV}/{service}")
         snake = "".join(f"_{c.lower()}" if c.isupper() else c for c in service).strip("_")
         client = self.node.create_client(service_type, f"/node/{snake}")
-        assert client.wait_for_service(5)
+        assert client.wait_for_service(30)
         return self.rig.result(client.call_async(service_type.Request(**fields)))
 
 

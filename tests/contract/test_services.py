@@ -24,14 +24,14 @@ def test_a_service_answers_a_request(rig, pair):
     server, _, client = pair
     assert not client.wait_for_service(timeout_sec=0.05)
     server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(timeout_sec=5)
+    assert client.wait_for_service(timeout_sec=30)
     assert rig.result(client.call_async(SetBool.Request(data=True))) == SetBool.Response(success=True, message="done")
 
 
 def test_many_requests_at_once_get_their_own_answers(rig, pair):
     server, _, client = pair
     server.create_service(SetBool, "~/set", answer)
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     # Ten requests are as many as the queue of the service holds.
     futures = [client.call_async(SetBool.Request(data=bool(i % 3))) for i in range(10)]
     assert [rig.result(future).success for future in futures] == [bool(i % 3) for i in range(10)]
@@ -48,7 +48,7 @@ def test_a_waiting_coroutine_callback_blocks_others_only_on_rclpy(rig, pair):
         return response
 
     server.create_service(SetBool, "~/set", wait)
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     slow, fast = (client.call_async(SetBool.Request(data=data)) for data in (True, False))
     if ON_RCLPY:
         # On rclpy, it blocks: both callbacks are in the node's group, which runs one at a time.
@@ -73,8 +73,8 @@ def test_a_service_may_call_another_service_in_a_coroutine(rig, pair):
         return response
 
     server.create_service(SetBool, "~/set", relay)
-    assert client.wait_for_service(5)
-    assert inner.wait_for_service(5)
+    assert client.wait_for_service(30)
+    assert inner.wait_for_service(30)
     answer = client.call_async(SetBool.Request())
     if ON_RCLPY:
         # The answer is never taken: its callback is in the same group as the service that waits for it.
@@ -91,7 +91,7 @@ def test_an_error_in_a_callback_ends_spinning(rig, pair):
         raise LookupError("callback failed")
 
     server.create_service(SetBool, "~/set", fail)
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     client.call_async(SetBool.Request())
     with pytest.raises(LookupError, match="callback failed"):
         rig.rest(5)
@@ -100,7 +100,7 @@ def test_an_error_in_a_callback_ends_spinning(rig, pair):
 def test_a_callback_that_returns_no_response_is_a_type_error(rig, pair):
     server, _, client = pair
     server.create_service(SetBool, "~/set", lambda _request, _response: None)
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     client.call_async(SetBool.Request())
     with pytest.raises(
         TypeError, match=choose_words(embedded="must return std_srvs/srv/SetBool.Response, got None", rclpy="^$")
@@ -123,6 +123,6 @@ def test_a_destroyed_client_sends_nothing(rig, pair):
 def test_clients_do_not_find_a_destroyed_service(rig, pair):
     server, _, client = pair
     service = server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(30)
     server.destroy_service(service)
     assert rig.spin(lambda: not client.service_is_ready())

@@ -252,7 +252,7 @@ def read_factor(name: str) -> float:
         executor = ros.SingleThreadedExecutor(context=context)
         executor.add_node(node)
         client = node.create_client(GetParameters, "/sim_0/sim_0/get_parameters")
-        assert client.wait_for_service(20)
+        assert client.wait_for_service(30)
         future = client.call_async(GetParameters.Request(names=["sim.real_time_factor"]))
         executor.spin_until_future_complete(future, timeout_sec=20)
         return float(future.result().values[0].double_value)

@@ -18,7 +18,7 @@ def test_a_node_in_another_process_answers_and_leaves_the_graph_at_its_end(rig):
     assert process.stdout.readline() == "ready\n"
     node = rig.node("client")
     client = node.create_client(Trigger, "trigger")
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(30)
     assert rig.result(client.call_async(Trigger.Request())).success
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=60)

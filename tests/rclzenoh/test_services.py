@@ -30,7 +30,7 @@ def test_a_discovered_service_answers_the_first_request(rig, pair):
         client = node.create_client(SetBool, f"/set{number}")
         thread = threading.Thread(target=server.create_service, args=(SetBool, f"/set{number}", answer))
         thread.start()
-        assert client.wait_for_service(10)
+        assert client.wait_for_service(30)
         future = client.call_async(SetBool.Request(data=True))
         thread.join()
         assert rig.spin(future.done), f"the first request to {client.service_name} is lost"
@@ -39,7 +39,7 @@ def test_a_discovered_service_answers_the_first_request(rig, pair):
 def test_a_service_answers_on_the_wire_as_rmw_zenoh_does(rig, pair):
     server, node, client = pair
     server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(30)
     key = data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
     attachment = Attachment(7, 5, bytes(range(16))).pack()
     replies = []
@@ -62,7 +62,7 @@ def test_a_service_answers_on_the_wire_as_rmw_zenoh_does(rig, pair):
 def test_garbage_is_answered_with_an_error_and_does_not_stop_the_service(rig, pair, capsys):
     server, node, client = pair
     server.create_service(SetBool, "~/set", answer)
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     key = data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
     random = np.random.default_rng(2)
     ended = []
@@ -84,7 +84,7 @@ def test_a_request_to_another_key_is_answered_with_an_error(rig, pair):
     asked = []
     server.create_service(SetBool, "~/set", lambda request, response: asked.append(request) or response)
     other = node.create_client(SetBool, "/server/other")
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     replies = []
     # A router that numbers keys as for an earlier link delivers requests to other services of the same session.
     node.context.session.get(
@@ -102,7 +102,7 @@ def test_a_request_to_another_key_is_answered_with_an_error(rig, pair):
 def test_a_response_to_another_client_is_not_taken_for_its_own(rig, pair, monkeypatch, capsys):
     server, _, client = pair
     server.create_service(SetBool, "~/set", answer)
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     monkeypatch.setattr(
         "rclzenoh.service.Attachment", lambda number, sent_at, _gid: Attachment(number, sent_at, bytes(16))
     )
@@ -119,7 +119,7 @@ def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
         raise LookupError("callback failed")
 
     server.create_service(SetBool, "~/set", fail)
-    client.wait_for_service(5)
+    client.wait_for_service(30)
     key = data_key(server.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE))
     replies = []
     rig.context().session.get(
@@ -138,7 +138,7 @@ def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
 def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(rig, pair, monkeypatch):
     server, node, client = pair
     service = server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(30)
 
     def destroy_meanwhile(payload, kind):
         # Another thread may destroy the service just after the spinning thread has taken a request.
@@ -160,7 +160,7 @@ def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(
 def test_each_of_many_requests_at_once_is_answered(rig, pair):
     server, _, client = pair
     server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(30)
     # Nobody spins meanwhile, so all of them wait, ten times as many as the announced quality of service says.
     futures = [client.call_async(SetBool.Request(data=number % 2 == 0)) for number in range(100)]
     assert rig.spin(lambda: all(future.done() for future in futures))

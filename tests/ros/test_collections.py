@@ -57,7 +57,7 @@ node = rclpy.create_node("guest")
 heard = []
 node.create_subscription(JointState, "/sim_0/joint_states", heard.append, 10)
 client = node.create_client(GetParameters, "/sim_0/sim_0/get_parameters")
-assert client.wait_for_service(20)
+assert client.wait_for_service(30)
 for _ in range(10):
     # A service of rclpy may answer before it knows the client.
     answer = client.call_async(GetParameters.Request(names=["ball.mass_kg"]))

@@ -57,7 +57,7 @@ def execute(handle):
 
 server = rclpy.action.ActionServer(node, Follow, "follow", execute)
 client = rclpy.action.ActionClient(node, Follow, "follow")
-assert client.wait_for_server(10)
+assert client.wait_for_server(30)
 goal = Follow.Goal()
 goal.trajectory.points = [trajectory_msgs.msg.JointTrajectoryPoint(positions=[1.0, 2.0])]
 sent = client.send_goal_async(goal)

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from tests.integration.robot import FOUND_BY_OTHERS_S, ON_DDS, discovery_server
-from tests.unit.serve.rosbridge.conftest import Party, wait_for
+from tests.unit.serve.rosbridge.conftest import Party, wait_for, wait_for_robot
 from tests.unit.serve.rosbridge.robot import Robot
 from throwcollect.ros import Context, ExternalShutdownException, Node, SingleThreadedExecutor, init
 from throwcollect.ros.connection import Connection
@@ -45,9 +45,7 @@ def test_rosbridge_passes_topics_services_and_actions_both_ways() -> None:
 
 
 def _try_everything(party: Party, robot: Robot) -> None:
-    wait_for(lambda: party.call("rosapi/action_servers") == {"action_servers": ["/follow"]})
-    wait_for(lambda: {"/words", "/orders"} <= set(party.call("rosapi/topics")["topics"]))
-    time.sleep(FOUND_BY_OTHERS_S)
+    wait_for_robot(party)
     party.ask(op="subscribe", id="w", topic="words")
     assert party.next(op="publish")["msg"] == {"data": "hello"}
     party.ask(op="unsubscribe", topic="words")

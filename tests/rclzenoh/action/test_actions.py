@@ -19,7 +19,7 @@ def test_a_client_subscribes_only_to_topics_that_it_uses(rig):
 
     ActionServer(rig.node("server"), FJT, "/arm/follow_joint_trajectory", execute)
     client = ActionClient(rig.node("client"), FJT, "/arm/follow_joint_trajectory")
-    assert client.wait_for_server(timeout_sec=5)
+    assert client.wait_for_server(timeout_sec=30)
     node = rig.node("observer")
     feedback, status = ("/arm/follow_joint_trajectory/_action/" + topic for topic in ("feedback", "status"))
     _, theirs = rig.result(client.send_goal_async(goal("a"))), rig.result(client.send_goal_async(goal("b")))

@@ -17,6 +17,7 @@ from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 from tests.integration.robot import FOUND_BY_OTHERS_S, ON_DDS, discovery_server
+from tests.unit.serve.rosbridge.robot import Robot
 
 from throwcollect.ros import Context, ExternalShutdownException, Node, SingleThreadedExecutor, init
 from throwcollect.ros.connection import Connection
@@ -82,6 +83,23 @@ class Party:
         """Fields of the response of a service; or why it failed."""
         self.ask(op="call_service", id=f"call {service}", service=service, args=arguments)
         return self.next(op="service_response", id=f"call {service}")["values"]
+
+
+def wait_for_robot(party: Party) -> None:
+    """Wait until the bridge sees all that a `Robot` offers: clients ask for it only once."""
+
+    def sees_all() -> bool:
+        seen = party.call("rosapi/node_details", node="/other")
+        return (
+            {"/words", "/states", "/rosout"} <= set(seen["publishing"])
+            and "/orders" in seen["subscribing"]
+            and {"/lamp", "/other/get_parameters"} <= set(seen["services"])
+            and party.call("rosapi/action_servers") == {"action_servers": ["/follow"]}
+        )
+
+    wait_for(sees_all, "the bridge sees all of the robot")
+    if ON_DDS:
+        time.sleep(FOUND_BY_OTHERS_S)
 
 
 @pytest.fixture(scope="session")
@@ -177,3 +195,11 @@ def node(context: Context, bridge: Bridge) -> Iterator[Node]:
     observer = Party(bridge)
     wait_for(lambda: "/other" not in observer.call("rosapi/nodes")["nodes"], "the node is seen no more")
     observer.client.close()
+
+
+@pytest.fixture
+def robot(node: Node, party: Party) -> Robot:
+    """A node that has one of everything, all of which the bridge sees."""
+    robot = Robot(node)
+    wait_for_robot(party)
+    return robot

@@ -109,7 +109,7 @@ def offer(party: Party, node: Node) -> Callable[[], Any]:
     # The client of an earlier test may still be leaving, and a goal to its action would be lost.
     wait_for(lambda: not client.server_is_ready(), "the action of an earlier test is seen no more")
     party.ask(op="advertise_action", action="swing", type=KIND)
-    assert client.wait_for_server(5)
+    assert client.wait_for_server(30)
 
     class Sent:
         def __init__(self) -> None:

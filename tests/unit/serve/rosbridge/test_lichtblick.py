@@ -12,8 +12,6 @@ from tests.npm import install
 from tests.unit.serve.rosbridge.conftest import wait_for
 from tests.unit.serve.rosbridge.robot import Robot
 
-from throwcollect.ros import Node
-
 HERE = Path(__file__).parent
 PACKAGES = {
     "@foxglove/roslibjs": "0.0.3",
@@ -36,8 +34,7 @@ def program() -> Path:
     return Path(shutil.copy(HERE / "lichtblick_client.mjs", install("lichtblick", PACKAGES)))
 
 
-def test_lichtblick_hears_publishes_calls_and_draws_the_graph(program: Path, url: str, node: Node) -> None:
-    robot = Robot(node)
+def test_lichtblick_hears_publishes_calls_and_draws_the_graph(program: Path, url: str, robot: Robot) -> None:
     found = subprocess.run(
         ["node", "--experimental-websocket", str(program), url],
         capture_output=True,

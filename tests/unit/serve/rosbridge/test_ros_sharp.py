@@ -140,7 +140,7 @@ def test_ros_sharp_calls_and_offers_services(party: Party, node: Node) -> None:
     node.create_service(SetBool, "/sharp/call_my_lamp", ask_back)
     party.client.receive(OFFER)
     wait_for(lambda: "/sharp/call_my_lamp" in party.call("rosapi/services")["services"])
-    assert lamp.wait_for_service(10)
+    assert lamp.wait_for_service(30)
     party.client.receive(CALL)
     asked = hear(party, "call_service")
     assert (asked["service"], asked["args"]) == ("/sharp/lamp", {"data": True})
@@ -174,7 +174,7 @@ def test_ros_sharp_offers_an_action_whose_goals_succeed_or_are_cancelled(
 ) -> None:
     party.client.receive(OFFER_ACTION)
     client = ActionClient(node, FJT, "/sharp/follow")
-    assert client.wait_for_server(10)
+    assert client.wait_for_server(30)
     feedback: list[Any] = []
     sent = client.send_goal_async(FJT.Goal(), feedback_callback=feedback.append)
     goal = hear(party, "send_action_goal")

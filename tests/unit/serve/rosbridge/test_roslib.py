@@ -12,8 +12,6 @@ from tests.npm import install
 from tests.unit.serve.rosbridge.conftest import wait_for
 from tests.unit.serve.rosbridge.robot import Robot, SetBool
 
-from throwcollect.ros import Node
-
 HERE = Path(__file__).parent
 
 
@@ -25,8 +23,7 @@ def program() -> Path:
     return Path(shutil.copy(HERE / "roslib_client.mjs", install("roslib", {"roslib": "2.1.0"})))
 
 
-def test_roslib_hears_speaks_calls_offers_and_sends_goals(program: Path, url: str, node: Node) -> None:
-    robot = Robot(node)
+def test_roslib_hears_speaks_calls_offers_and_sends_goals(program: Path, url: str, robot: Robot) -> None:
     found = subprocess.run(
         ["node", str(program), url], capture_output=True, text=True, check=False, timeout=60, cwd=program.parent
     )

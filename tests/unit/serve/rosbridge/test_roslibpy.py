@@ -10,8 +10,6 @@ import roslibpy
 from tests.unit.serve.rosbridge.conftest import wait_for
 from tests.unit.serve.rosbridge.robot import Robot, SetBool
 
-from throwcollect.ros import Node
-
 
 @pytest.fixture
 def ros(url: str) -> Iterator[Any]:
@@ -22,9 +20,7 @@ def ros(url: str) -> Iterator[Any]:
     ros.close()
 
 
-def test_roslibpy_hears_speaks_calls_offers_and_sends_goals(ros: Any, node: Node) -> None:
-    robot = Robot(node)
-    wait_for(lambda: {"/words", "/orders"} <= set(ros.get_topics()))
+def test_roslibpy_hears_speaks_calls_offers_and_sends_goals(ros: Any, robot: Robot) -> None:
     assert ros.get_topic_type("/words") == "std_msgs/msg/String"
     assert ros.get_nodes() == ["/other"]
     assert roslibpy.Param(ros, "/other:mass").get(timeout=10) == 0.5

@@ -87,7 +87,7 @@ def test_a_call_fails_after_its_timeout_or_when_its_service_disappears(party: Pa
 
 def call(node: Node, service: str = "/clock") -> Future:
     client = node.create_client(SetBool, service)
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(30)
     return client.call_async(SetBool.Request(data=True))
 
 
