@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 import time
@@ -115,3 +116,8 @@ class Rig:
             node.destroy_node()
         for context in self.contexts:
             context.try_shutdown()
+        if ON_DDS:
+            # An action refers to itself, so its node would stay in its domain, where a later test would see it.
+            del executor, node
+            self.executors.clear()
+            gc.collect()
