@@ -2,10 +2,12 @@
 
 import os
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +15,14 @@ import pyarrow.parquet as pq
 import pytest
 
 import throwcollect
-from tests.e2e.collection import INPROCESS, call
+from tests.e2e.collection import INPROCESS, call, call_here
 
 pytest.importorskip("mujoco")
 
 pytestmark = pytest.mark.e2e
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
-FEW = ("--set", "sim.engine=mujoco", "--set", "run.replay=2")
+FEW = ("--set", "sim.engine=mujoco", "--set", "run.replay=0")
 LAB = """\
 import numpy as np
 
@@ -52,9 +54,10 @@ class Fails(Swing):
 """
 CONFIG = """\
 name: lab
-trials: 6
+trials: 4
 task: {policy: {use: "lab:Swing"}}
 sim: {engine: mujoco}
+run: {replay: 0}
 sweep: {parameters: {ball.mass_kg: {min: 0.04, max: 0.05}}}
 """
 
@@ -63,19 +66,26 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
 
 
-def collect(directory: Path, name: str, *options: str) -> subprocess.CompletedProcess[str]:
-    return call("up", "lab.yaml", "-o", name, *options, cwd=directory, PYTHONPATH=str(directory))
+def collect(name: str, *options: str) -> subprocess.CompletedProcess[str]:
+    return call_here("up", "lab.yaml", "-o", name, *INPROCESS, *options)
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The present directory, which has a package and a configuration; this process finds its modules."""
     directory = tmp_path_factory.mktemp("lab")
     (directory / "lab.py").write_text(LAB, encoding="utf-8")
     (directory / "lab.yaml").write_text(CONFIG, encoding="utf-8")
-    return directory
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(directory)
+        patch.setenv("PYTHONPATH", str(directory), prepend=os.pathsep)
+        patch.chdir(directory)
+        yield directory
 
 
-def test_the_page_is_right(tmp_path: Path) -> None:
+def test_the_page_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     own, rolling, learning = blocks("python")
     (tmp_path / "my_lab.py").write_text(own, encoding="utf-8")
@@ -83,17 +93,14 @@ def test_the_page_is_right(tmp_path: Path) -> None:
         (tmp_path / name).write_text(*blocks(language), encoding="utf-8")
 
     def run(program: str) -> str:
-        path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-        environment, words = {**os.environ, "PYTHONPATH": path}, [sys.executable, "-c", program]
-        done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+        exec(program, {})  # noqa: S102
+        return capsys.readouterr().out
 
     printed = []
-    for line in "".join(blocks("sh")).replace("up -n 2 ", "up ").splitlines():
+    for line in "".join(blocks("sh")).replace("up -n 2 ", "up ").replace("--targets 20", "--targets 5").splitlines():
         words = [word for word in shlex.split(line) if word not in ("PYTHONPATH=.", "throwcollect")]
         few = {"up": (*INPROCESS, *FEW, *(("--set", "trials=60") if "quick" in line else ()))}.get(words[0], ())
-        done = call(*words, *few, cwd=tmp_path, PYTHONPATH=str(tmp_path))
+        done = call_here(*words, *few)
         assert done.returncode == 0, (line, done.stderr)
         printed.append(done.stdout)
     dataset = throwcollect.load(tmp_path / "data" / "policy")
@@ -112,29 +119,28 @@ def test_the_page_is_right(tmp_path: Path) -> None:
 
 
 def test_the_dataset_depends_neither_on_the_processes_nor_on_where_it_is_collected(lab: Path) -> None:
-    one, two = collect(lab, "one", *INPROCESS), collect(lab, "two", "-n", "2", "--runtime", "local")
+    one, two = collect("one"), call("up", "lab.yaml", "-o", "two", "-n", "2", "--runtime", "local", cwd=lab)
     assert (one.returncode, two.returncode) == (0, 0), (one.stderr, two.stderr)
     datasets = [throwcollect.load(lab / name) for name in ("one", "two")]
     assert datasets[0].digest == datasets[1].digest
-    checked = call("dataset", "verify", "one", "--replay", "2", cwd=lab, PYTHONPATH=str(lab))
-    assert "2 of 6 throws, the same bit for bit" in checked.stdout + checked.stderr
+    checked = call_here("dataset", "verify", "one", "--replay", "2")
+    assert "2 of 4 throws, the same bit for bit" in checked.stdout + checked.stderr
     assert "The policy `lab:Swing` commanded the joints at 50 Hz." in (lab / "one" / "README.md").read_text()
 
 
 def test_a_policy_that_is_no_function_of_its_observations_is_found(lab: Path) -> None:
-    done = collect(lab, "noisy", *INPROCESS, "--set", "task.policy.use=lab:Noisy")
+    done = collect("noisy", "--set", "task.policy.use=lab:Noisy", "--set", "run.replay=1")
     assert done.returncode != 0
     assert "the policy lab:Noisy is not a function of its seed and its observations" in done.stderr
-    options = ("--set", "task.policy.use=lab:Noisy", "--set", "task.policy.reproducible=false")
-    done = collect(lab, "kept", *INPROCESS, *options)
+    done = collect("kept", "--set", "task.policy.use=lab:Noisy", "--set", "task.policy.reproducible=false")
     assert done.returncode == 0, done.stderr
     assert "It is not reproducible" in (lab / "kept" / "README.md").read_text()
 
 
 def test_trials_in_which_a_policy_fails_are_lost_and_all_others_are_kept(lab: Path) -> None:
-    done = collect(lab, "fails", *INPROCESS, "--set", "task.policy.use=lab:Fails", "--set", "trials=12")
+    done = collect("fails", "--set", "task.policy.use=lab:Fails", "--set", "trials=8")
     outcomes = throwcollect.load(lab / "fails").throws["outcome"].to_pylist()
-    assert 0 < outcomes.count("lost") < 12
+    assert 0 < outcomes.count("lost") < 8
     assert re.search(r"lab:Fails cannot act at 0\.3\d\d s of trial \d+: RuntimeError: the network is lost", done.stderr)
 
 

@@ -28,10 +28,12 @@ trials: {trials}
 sweep:
   sampler: uniform
   parameters: {{task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}, task.duration_s: {{min: 1.0, max: 1.2}}}}
+run: {{replay: 0}}
 """
 OF_A_FILE = """\
 name: drawn
 task: {{trajectory: {{family: file, file: points/motions}}}}
+run: {{replay: 0}}
 """
 
 
@@ -76,6 +78,7 @@ task:
     weights:
       arm_right_4_joint: [-758, -994, -1122, -1231, -1231, -1114, -858, -509, -156, 74, 58, -57]
 sweep: {{parameters: {{task.end.arm_right_4_joint: {{min: -0.55, max: -0.5}}}}}}
+run: {{replay: 0}}
 """
 
 

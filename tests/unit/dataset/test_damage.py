@@ -23,7 +23,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "merge": lambda dataset: merge([dataset], dataset / "merged"),
     "export": lambda dataset: export(dataset, dataset / "npz", to="npz"),
     "view": lambda dataset: view(dataset, dataset / "view"),
-    "render": lambda dataset: render(dataset, dataset / "throw.webp", trials=[4]),
+    "render": lambda dataset: render(dataset, dataset / "throw.png", trials=[4]),
     "report": lambda dataset: report_dataset(Dataset.open(dataset)),
     "replay": lambda dataset: list(replay_throws(dataset, [4])),
 }

@@ -1,13 +1,12 @@
 """Datasets that grow by what clients of a session do."""
 
-import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.commands import command
+from tests.e2e.collection import call_here
 
 import throwcollect
 from throwcollect.config.loader import load
@@ -113,7 +112,7 @@ def test_commands_say_that_nothing_can_be_simulated_again(
     session.append(*recorded)
     session.close()
     for words, code in (("dataset verify", 0), ("dataset replay --all", 2), ("resume", 4)):
-        done = subprocess.run(command(*words.split(), session.directory), capture_output=True, text=True, check=False)
+        done = call_here(*words.split(), session.directory)
         assert done.returncode == code
         assert "can be simulated again" in (done.stdout + done.stderr).replace("cannot", "can")
 

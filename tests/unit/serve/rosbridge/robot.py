@@ -50,7 +50,7 @@ class Robot:
     def _obey(self, message: Any) -> None:
         self.orders.append(message.data)
         client = self._node.create_client(SetBool, "/clock")
-        if client.wait_for_service(30):
+        if "time" in message.data and client.wait_for_service(30):
             client.call_async(SetBool.Request(data=True)).add_done_callback(
                 lambda future: self.clock.append(future.result())
             )
