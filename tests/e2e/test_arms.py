@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.collection import call, collect_here, fingerprints, start
+from tests.e2e.collection import INPROCESS, call_here, collect_here, fingerprints, start
 from throwcollect.robots.imported import hash_files
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
 
-TRIALS = 6
+TRIALS = 4
 KINOVA = """\
 name: kinova
 seed: 1
@@ -69,7 +69,7 @@ def test_a_dataset_of_an_arm_is_the_same_after_a_kill_and_from_its_own_files(tmp
         process.kill()
     running.finish()
     assert not (tmp_path / "killed" / "throws.parquet").exists()
-    resumed = call("resume", tmp_path / "killed", "-n", "1", "--runtime", "local")
+    resumed = call_here("resume", tmp_path / "killed", *INPROCESS)
     assert resumed.returncode == 0, resumed.stderr
     assert describe_files(tmp_path / "killed") == expected
 

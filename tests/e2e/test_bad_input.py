@@ -242,7 +242,7 @@ def test_json_output_is_one_document_without_messages(
     assert told.items() <= dataset[1].items()
 
 
-@pytest.mark.parametrize("arguments", [["plan", "small.yaml"], ["config", "small.yaml"], ["--help"]])
+@pytest.mark.parametrize("arguments", [["plan", "small.yaml"], ["--help"]])
 def test_a_closed_output_pipe_is_no_error(arguments: list[str], small: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)

@@ -96,17 +96,13 @@ def episodes(part: Path, *, cut: bool = False) -> Counter[str]:
     return found
 
 
-def assert_goes_on(directory: Path, reference: Path, *, untold: int = 0) -> None:
-    """Resuming ends with the files of an undisturbed collection, and runs no trial twice.
-
-    The journal may lack the lines of up to `untold` trials.
-    """
+def assert_goes_on(directory: Path, reference: Path) -> None:
+    """Resuming ends with the files of an undisturbed collection, and runs no trial twice."""
     said = call_here("resume", directory, *INPROCESS)
     assert said.returncode == 0, said.stderr
     assert fingerprints(directory) == fingerprints(reference)
     written = Counter(event["trial"] for event in events(directory) if event["event"] == "commit")
-    assert set(written.values()) == {1}
-    assert len(set(range(TRIALS)) - set(written)) <= untold
+    assert written == dict.fromkeys(range(TRIALS), 1)
 
 
 def events(directory: Path) -> list[dict[str, Any]]:
@@ -167,18 +163,6 @@ def test_a_second_ctrl_c_does_not_wait_for_trials(
     assert len(episodes(tmp_path / "data" / "small_00000.mcap.part")) > 0
 
 
-def test_a_killed_launcher_ends_its_nodes_and_the_dataset_can_be_resumed(
-    config: Path, reference: Path, tmp_path: Path, started: list[Running]
-) -> None:
-    running, nodes = begin(started, config, tmp_path / "data")
-    in_the_middle(running, whole=reference)
-    running.process.send_signal(signal.SIGKILL)
-    running.finish()
-    assert_gone(nodes)
-    # The coordinator may be killed between an episode and its line in the journal.
-    assert_goes_on(tmp_path / "data", reference, untold=1)
-
-
 def test_a_restarted_coordinator_recovers_the_recorded_episodes(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
@@ -207,13 +191,12 @@ def test_a_finished_dataset_whose_recording_was_cut_goes_on_to_the_same_files(
     assert fingerprints(directory) == fingerprints(reference)
 
 
-def test_resuming_after_a_power_cut_keeps_the_episodes_on_the_disk(
+def test_a_killed_launcher_ends_its_nodes_and_resuming_after_a_power_cut_keeps_the_episodes_on_the_disk(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
     in_the_middle(running, 0.6, whole=reference)
-    for process in (*nodes, running.process):
-        process.kill()
+    running.process.kill()
     running.finish()
     assert_gone(nodes)
     part = tmp_path / "data" / "small_00000.mcap.part"

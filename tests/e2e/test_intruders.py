@@ -74,7 +74,7 @@ for name, override in json.loads(sys.argv[1]).items():
 """An intruder that subscribes, publishes and calls services wherever it gets a session."""
 
 POSE = f"""
-import os, sys
+import json, os, sys
 import concurrent.futures.process, concurrent.futures.thread, email.parser, mmap, multiprocessing.pool
 import pinocchio, pyarrow.parquet, scipy.stats
 import throwcollect.ros.nodes.coordinator.node, throwcollect.coordinator.resume, throwcollect.dataset.reader
@@ -84,9 +84,13 @@ from throwcollect.cli.main import main
 from rclzenoh import context
 context._PATIENCE_S = 0.5
 {BECOME_NOBODY}
-main()
+for words in json.loads(sys.argv[1]):
+    if (node := os.fork()) == 0:
+        sys.argv[1:] = words
+        main()
+    print(os.waitstatus_to_exitcode(os.waitpid(node, 0)[1]), flush=True)
 """
-"""An intruder that starts a node."""
+"""An intruder that starts nodes."""
 
 LOOK = f"""
 import os, pathlib, sys
@@ -216,10 +220,10 @@ def test_a_client_with_the_key_can_listen_publish_and_call(scene: Scene) -> None
 def test_another_user_cannot_start_a_node_in_the_run(scene: Scene) -> None:
     """Neither a simulation nor a coordinator of another user connects to the router."""
     (scene.home / "other.yaml").write_text((scene.running.directory.parent / "small.yaml").read_text())
-    for node in (["sim", "other.yaml", "--name", "evil"], ["coordinator", "data", "--config", "other.yaml"]):
-        said = scene.as_nobody(POSE, *node)
-        assert said.returncode == UnreachableError.exit_code, said
-        assert re.search(r"no Zenoh session within [\d.]+ s; connecting to", said.stderr), said
+    nodes = ["sim", "other.yaml", "--name", "evil"], ["coordinator", "data", "--config", "other.yaml"]
+    said = scene.as_nobody(POSE, json.dumps(nodes))
+    assert re.findall(r"^\d+$", said.stdout, re.MULTILINE) == [str(UnreachableError.exit_code)] * 2, said
+    assert len(re.findall(r"no Zenoh session within [\d.]+ s; connecting to", said.stderr)) == 2, said
 
 
 def test_another_user_cannot_read_the_key_or_list_the_runs(scene: Scene) -> None:

@@ -58,7 +58,7 @@ def test_the_commands_of_the_page_work_in_their_order(tmp_path: Path, monkeypatc
     text = (ROOT / "configs" / "quickstart.yaml").read_text(encoding="utf-8")
     Path("configs").mkdir()
     Path("configs", "quickstart.yaml").write_text(text + "\nsim: {engine: ballistic}\nrun: {replay: 0}\n")
-    fewer = PAGE.replace("--trials 1024", "--trials 200").replace("--targets 20  ", "--targets 3 --seeds 1  ")
+    fewer = PAGE.replace("--trials 1024", "--trials 80").replace("--targets 20  ", "--targets 3 --seeds 1  ")
     # The runtime `inprocess` has only one simulation.
     fewer = fewer.replace("up -n 2 ", "up ")
     # The ballistic engine throws to other places.

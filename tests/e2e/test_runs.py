@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import psutil
 import pytest
 
+from tests.commands import start_command
 from tests.e2e.collection import (
     FAST,
     call,
@@ -25,7 +27,7 @@ from throwcollect.runs.records import Records
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
-TRIALS = 40
+TRIALS = 16
 SLOWLY = ("--set", "sim.real_time_factor=1")
 """Makes a run last long enough for commands to look at it."""
 MANY = 100
@@ -65,11 +67,18 @@ def say(*arguments: str | Path) -> tuple[int, str, str]:
     return said.returncode, said.stdout, said.stderr
 
 
-def detach(config: Path, directory: Path, *options: str) -> str:
-    """Start a detached run; returns its id."""
-    said = call_here("up", "-d", config, "--output", directory, *options)
-    assert said.returncode == 0, said.stderr
-    return said.stdout.strip()
+def begin(records: Records, config: Path, directory: Path, *options: str) -> str:
+    """Start a run in a process of its own, which is forked in no time; returns its id."""
+    words = ("up", config, "--output", directory, "-n", "1", *options)
+    start_command(*words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    found: list[str] = []
+
+    def runs() -> bool:
+        found[:] = [run for run in records.ids() if status(records, run, "coordinator") == "running"]
+        return bool(found)
+
+    until(runs)
+    return found[0]
 
 
 def list_runs(*options: str) -> list[dict[str, Any]]:
@@ -139,7 +148,7 @@ def test_another_command_can_wait_for_a_detached_run(
 def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Records, tmp_path: Path) -> None:
     few = ("--trials", "24", *SLOWLY)
     collect_here(config, tmp_path / "reference", *few)
-    run = detach(config, tmp_path / "data", "-n", "1", *few)
+    run = begin(records, config, tmp_path / "data", *few)
     assert call_here("scale", "3").stdout == f"{run}: 1 -> 3 simulations\n"
     until(lambda: status(records, run, "sim_2") == "running")
     assert records.get(run).record.simulations == 3
@@ -169,7 +178,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
 
 
 def test_stop_ends_a_run_as_ctrl_c_does(config: Path, records: Records, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
+    run = begin(records, config, tmp_path / "data", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
     stopped = call("stop")
@@ -186,7 +195,7 @@ def test_stop_ends_a_run_as_ctrl_c_does(config: Path, records: Records, tmp_path
 
 
 def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Records, tmp_path: Path) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
+    run = begin(records, config, tmp_path / "data", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
     said = call_here("down")
@@ -200,7 +209,7 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
 def test_a_killed_launcher_ends_its_nodes_and_commands_report_its_death(
     config: Path, records: Records, tmp_path: Path
 ) -> None:
-    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
+    run = begin(records, config, tmp_path / "data", *UNTIL_STOPPED)
     in_the_middle(records, run, 1)
     processes = nodes(records, run)
     os.kill(records.get(run).record.launcher, signal.SIGKILL)
@@ -278,14 +287,14 @@ def viewed() -> Iterator[str]:
 
 
 def test_ps_lists_the_server_that_view_begins_and_stop_ends_it_if_no_run_lives(
-    config: Path, viewed: str, tmp_path: Path
+    config: Path, records: Records, viewed: str, tmp_path: Path
 ) -> None:
     (listed,) = list_runs()
     assert json.loads(call_here("view", "--json").stdout)["url"] == viewed
     assert listed == {"run": "server", "kind": "server", "status": "running", "url": viewed, "pid": listed["pid"]}
     row = ("server", "-", "-", "-", "running", "at", f"{viewed},", "pid", str(listed["pid"]), "-")
     assert tuple(say("ps")[1].splitlines()[1].split()) == row
-    run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
+    run = begin(records, config, tmp_path / "data", *UNTIL_STOPPED)
     assert [each["run"] for each in list_runs()] == [run, "server"]
     assert say("stop")[1].startswith(f"{run}: stopped")
     assert list_runs() == [listed]

@@ -10,7 +10,7 @@ from tests.e2e.collection import INPROCESS, call, call_here, fingerprints, inter
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
-LANDED = 40
+LANDED = 20
 YAML = f"""\
 name: until
 until: {{landed: {LANDED}}}
@@ -21,6 +21,7 @@ sweep:
     task.duration_s: {{min: 0.7, max: 1.35}}
 sim: {{physics_hz: 250, engine: ballistic}}
 record: {{rate_hz: 125}}
+run: {{replay: 0}}
 """
 
 

@@ -16,10 +16,10 @@ import pytest
 
 from tests.e2e.collection import (
     FAST,
-    INPROCESS,
     Running,
     call,
     collect,
+    collect_here,
     fingerprints,
     journal,
     start,
@@ -105,7 +105,7 @@ def entries(running: Running, event: str) -> list[dict[str, Any]]:
 def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     directory = tmp_path_factory.mktemp("reference")
     config = write_config(directory, trials=TRIALS, sim=FAST)
-    collect(config, directory / "data", 1, *INPROCESS, THROWCOLLECT_ROS="embedded")
+    collect_here(config, directory / "data")
     return fingerprints(directory / "data")
 
 

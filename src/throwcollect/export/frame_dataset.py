@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.reader import Dataset, load
 from throwcollect.dataset.sensors import Frames
-from throwcollect.export.throw_source import FRAMES, ExportSource, choose_streams
+from throwcollect.dataset.sensors import FRAMES
+from throwcollect.export.throw_source import ExportSource, choose_streams
 from throwcollect.files import StrPath
 from throwcollect.wording import suggest
 

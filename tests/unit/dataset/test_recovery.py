@@ -152,7 +152,7 @@ def test_recovery_by_several_processes_keeps_the_same_episodes(
 
 
 @settings(
-    max_examples=15,
+    max_examples=8,
     deadline=None,
     derandomize=True,
     phases=[Phase.generate],
@@ -185,7 +185,7 @@ def test_resuming_after_any_crashes_and_power_cuts_gives_the_same_files(
 
 
 @settings(
-    max_examples=15,
+    max_examples=8,
     deadline=None,
     derandomize=True,
     phases=[Phase.generate],

@@ -35,9 +35,7 @@ def ros(monkeypatch, tmp_path):
     for name in ("rmw_fastrtps_cpp", "rmw_implementation"):
         (index / name).touch()
     # Only this installation is found, even if the machine has another ROS 2.
-    monkeypatch.setattr(
-        "throwcollect.extras.find_spec", lambda name: PathFinder.find_spec(name, [str(tmp_path)])
-    )
+    monkeypatch.setattr("throwcollect.extras.find_spec", lambda name: PathFinder.find_spec(name, [str(tmp_path)]))
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
     monkeypatch.setattr("sys.prefix", str(tmp_path))
     monkeypatch.delenv(VARIABLE, raising=False)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.e2e.collection import call_here
+from tests.e2e.plugins import PLUGINS, process_with_plugins
 
 from throwcollect.config.default_path import DEFAULT_CONFIG
 
-PLUGINS = Path(__file__).parents[2] / "plugins"
 LIMIT = 'lower="-2.5" upper="2.5" velocity="20"'
 
 
@@ -29,17 +29,11 @@ def limit_joints(directory: Path, *limits: str) -> Path:
     return path
 
 
-def call_in(directory: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run throwcollect where that package is installed."""
-    paths = os.pathsep.join([str(directory / "plugins"), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, "-m", "throwcollect", *arguments],
-        cwd=directory,
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def call_in(directory: Path, *commands: str) -> list[subprocess.CompletedProcess[str]]:
+    """Run commands of throwcollect where that package is installed, in one process."""
+    with process_with_plugins(directory / "plugins") as process:
+        process.submit(os.chdir, directory).result()
+        return [process.submit(call_here, *words.split()).result() for words in commands]
 
 
 @pytest.mark.parametrize(
@@ -53,15 +47,14 @@ def call_in(directory: Path, *arguments: str) -> subprocess.CompletedProcess[str
 )
 def test_no_trial_of_a_robot_with_narrow_limits_is_refused(shoulder: str, elbow: str, tmp_path: Path) -> None:
     limit_joints(tmp_path, shoulder, elbow)
-    written = call_in(tmp_path, "init", "--robot", "planar_arm", "--task", "reach")
+    written, planned = call_in(tmp_path, "init --robot planar_arm --task reach", "plan --trials 50")
     assert written.returncode == 0, written.stderr
-    planned = call_in(tmp_path, "plan", "--trials", "50")
     assert "50 trials; 0 refused" in planned.stderr, (tmp_path / DEFAULT_CONFIG).read_text() + planned.stderr
 
 
 def test_a_robot_whose_joints_cannot_move_is_refused(tmp_path: Path) -> None:
     path = limit_joints(tmp_path, 'lower="0.5" upper="0.5" velocity="20"', 'lower="-2.5" upper="2.5" velocity="0"')
-    done = call_in(tmp_path, "init", "--robot", "planar_arm", "--task", "reach")
+    (done,) = call_in(tmp_path, "init --robot planar_arm --task reach")
     said = (
         f"throwcollect: {path}: no joint of the planar arm may move by 0.02 rad, by its limits of position and velocity"
     )
@@ -70,14 +63,13 @@ def test_a_robot_whose_joints_cannot_move_is_refused(tmp_path: Path) -> None:
 
 def test_a_robot_whose_joints_cannot_move_throws_nothing(tmp_path: Path) -> None:
     limit_joints(tmp_path, 'lower="0" upper="0" velocity="20"', 'lower="-2.5" upper="2.5" velocity="0"')
-    done = call_in(tmp_path, "init", "--robot", "planar_arm")
+    (done,) = call_in(tmp_path, "init --robot planar_arm")
     said = "throwcollect: the planar arm: no joint that carries the hand can move by 0.3 rad"
     assert (done.returncode, done.stderr.strip()) == (2, said)
 
 
 def test_a_narrow_joint_of_a_throw_keeps_its_limits(tmp_path: Path) -> None:
     limit_joints(tmp_path, 'lower="-0.02" upper="0.02" velocity="20"', LIMIT)
-    written = call_in(tmp_path, "init", "--robot", "planar_arm")
+    written, planned = call_in(tmp_path, "init --robot planar_arm", "plan --trials 20")
     assert written.returncode == 0, written.stderr
-    planned = call_in(tmp_path, "plan", "--trials", "20")
     assert "20 trials; 0 refused" in planned.stderr, planned.stderr

@@ -31,18 +31,19 @@ def count_flight(pixels: NDArray[np.int_]) -> int:
 
 @pytest.fixture(scope="module")
 def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Rendering:
-    return render(collected, tmp_path_factory.mktemp("render") / "throw.webp", trials=[4])
+    """An animation at twice the speed, which has half of the pictures to draw."""
+    return render(collected, tmp_path_factory.mktemp("render") / "throw.webp", trials=[4], slow=0.5)
 
 
 @pytest.fixture(scope="module")
 def fast(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Rendering:
     """A faster animation of the same throw, which has fewer pictures to draw."""
-    return render(collected, tmp_path_factory.mktemp("fast") / "throw.GIF", trials=[4], slow=0.2)
+    return render(collected, tmp_path_factory.mktemp("fast") / "throw.GIF", trials=[4], slow=0.1)
 
 
 def test_an_animation_lasts_as_long_as_its_throw(collected: Path, written: Rendering) -> None:
     throw = Dataset.open(collected).throws.to_pylist()[4]
-    assert written.duration_s == pytest.approx(throw["landing_time_s"], abs=0.06)
+    assert 2 * written.duration_s == pytest.approx(throw["landing_time_s"], abs=0.12)
     with Image.open(written.file) as file:
         assert file.format == "WEBP"
         assert file.n_frames == written.pictures
@@ -58,7 +59,7 @@ def test_the_robot_moves_and_the_path_grows(written: Rendering) -> None:
 
 def test_a_faster_animation_is_shorter_and_has_fewer_pictures(written: Rendering, fast: Rendering) -> None:
     assert fast.duration_s == pytest.approx(0.2 * written.duration_s, abs=0.11)
-    assert fast.pictures < written.pictures / 4
+    assert fast.pictures < written.pictures / 3
     assert fast.file.read_bytes()[:6] == b"GIF89a"
 
 
