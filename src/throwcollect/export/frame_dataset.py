@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.reader import Dataset, load
-from throwcollect.dataset.sensors import Frames
-from throwcollect.dataset.sensors import FRAMES
+from throwcollect.dataset.sensors import FRAMES, Frames
 from throwcollect.export.throw_source import ExportSource, choose_streams
 from throwcollect.files import StrPath
 from throwcollect.wording import suggest

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from throwcollect.config.sensors import PictureConfig
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
+from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.images import CODECS, MEGABYTES_PER_VIDEO, QUANTILES, VIDEOS, ImageSeries, encode_pictures
 from throwcollect.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
-from throwcollect.dataset.sensors import FRAMES
 from throwcollect.export.throw_source import NO_IMAGES, ExportSource, ThrowSeries, unit_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sweep.parquet_file import encode_table
