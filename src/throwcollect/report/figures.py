@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,6 @@ from plotly.subplots import make_subplots
 
 from throwcollect.report.contents import Tile
 from throwcollect.report.measured import (
-    JointPeaks,
     Outcomes,
     SweptKey,
     Throughput,
@@ -138,13 +137,15 @@ def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:
     return figure.update_layout(barmode="stack", bargap=0, showlegend=False, height=230)
 
 
-def draw_limit_boxes(peaks: Sequence[JointPeaks]) -> go.Figure:
-    """Draw the peaks of each joint over their limit, the first joint on top."""
-    rows = list(reversed(peaks))
-    low, first, median, third, high = zip(*(each.quartiles for each in rows), strict=True)
+def draw_limit_boxes(peaks: Mapping[str, NDArray[np.float64]]) -> go.Figure:
+    """Draw the peaks of each joint over their limit, as `summarise_peaks` finds them, the first joint on top."""
+    rows = list(reversed(peaks.items()))
+    low, first, median, third, high = np.transpose(
+        [np.percentile(shares, [0, 25, 50, 75, 100]) for _, shares in rows]
+    ).tolist()
     figure = go.Figure(
         go.Box(
-            y=[f"{each.joint}<br>{each.count} trial{'s' if each.count > 1 else ''}" for each in rows],
+            y=[f"{joint}<br>{len(shares)} trial{'s' if len(shares) > 1 else ''}" for joint, shares in rows],
             lowerfence=low,
             q1=first,
             median=median,

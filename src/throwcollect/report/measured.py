@@ -39,12 +39,12 @@ class Outcomes:
     Attributes:
         names: Outcomes that occur, in the same order in all reports, the success first.
         codes: Index into `names` of each trial, shape ``(n_trials,)``.
-        declared: All outcomes of the task, the success first.
+        success: Outcome of a trial that succeeded.
     """
 
     names: tuple[str, ...]
     codes: NDArray[np.intp]
-    declared: tuple[str, ...]
+    success: str
 
     @classmethod
     def of(cls, outcomes: Iterable[str], declared: Sequence[str] = (LANDED,)) -> Outcomes:
@@ -53,12 +53,7 @@ class Outcomes:
         order = {name: place for place, name in enumerate(dict.fromkeys((*declared, *STYLES)))}
         names = sorted(set(listed), key=lambda name: (order.get(name, len(order)), name))
         index = {name: code for code, name in enumerate(names)}
-        return cls(tuple(names), np.array([index[name] for name in listed], dtype=np.intp), tuple(order))
-
-    @property
-    def success(self) -> str:
-        """Outcome of a trial that succeeded."""
-        return self.declared[0]
+        return cls(tuple(names), np.array([index[name] for name in listed], dtype=np.intp), declared[0])
 
     @property
     def counts(self) -> dict[str, int]:
@@ -173,34 +168,16 @@ def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:
 KINDS = ("position", "velocity", "effort")
 
 
-@dataclass(frozen=True)
-class JointPeaks:
-    """Peaks of one kind in the trials in which one joint came closest to its limit.
+def summarise_peaks(throws: pa.Table, kind: str) -> dict[str, NDArray[np.float64]]:
+    """Find the peaks of one of `KINDS`, divided by their limit [-], by the joint that came closest to its limit.
 
-    Attributes:
-        joint: The joint.
-        count: In how many trials it was this joint.
-        quartiles: Lowest, first quartile, median, third quartile and highest of its peaks, divided by the limit [-].
-        reached: In how many of them the limit was reached or passed.
+    Each joint has an array with a number for each of these trials; the joint with the largest peak comes first.
     """
-
-    joint: str
-    count: int
-    quartiles: tuple[float, float, float, float, float]
-    reached: int
-
-
-def summarise_peaks(throws: pa.Table, kind: str) -> tuple[JointPeaks, ...]:
-    """Summarise the peaks of one of `KINDS` by joint; the joint that came closest to its limit comes first."""
     shares = read_numbers(throws, f"{kind}_peak_share")
     joints = np.array(throws[f"{kind}_peak_joint"].to_pylist(), dtype=object)
     measured = np.isfinite(shares)
-    peaks = []
-    for joint in sorted({str(name) for name in joints[measured]}):
-        own = shares[measured & (joints == joint)]
-        low, first, median, third, high = np.percentile(own, [0, 25, 50, 75, 100]).tolist()
-        peaks.append(JointPeaks(joint, len(own), (low, first, median, third, high), int((own >= 1).sum())))
-    return tuple(sorted(peaks, key=lambda each: (-each.quartiles[-1], each.joint)))
+    peaks = {joint: shares[measured & (joints == joint)] for joint in sorted({str(name) for name in joints[measured]})}
+    return dict(sorted(peaks.items(), key=lambda each: -each[1].max()))
 
 
 _INTERVALS = 40

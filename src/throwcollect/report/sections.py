@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
 from throwcollect.dataset.directory import CONFIG, FORMAT, JOURNAL, PROVENANCE
@@ -38,7 +40,6 @@ from throwcollect.report.contents import (
 )
 from throwcollect.report.measured import (
     KINDS,
-    JointPeaks,
     Outcomes,
     SweptKey,
     Throughput,
@@ -214,7 +215,7 @@ def _show_outcomes(
     return ReportSection("outcomes", "Outcomes", title, text, tuple(blocks))
 
 
-def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> ReportSection:
+def _show_limits(peaks: dict[str, dict[str, NDArray[np.float64]]], noun: str) -> ReportSection:
     title = "How close the joints come to their limits"
     panels = tuple(
         Panel(
@@ -228,7 +229,9 @@ def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> ReportS
     )
     if not panels:
         return ReportSection("limits", "Limits", title, f"No {noun} was measured.")
-    reached = (f"{sum(each.reached for each in joints):,} of {kind}" for kind, joints in peaks.items())
+    reached = (
+        f"{sum(int((each >= 1).sum()) for each in joints.values()):,} of {kind}" for kind, joints in peaks.items()
+    )
     text = (
         f"Of each {noun}, the joint that came closest; 1 is at the limit. Boxes span the quartiles, whiskers all "
         f"{noun}s. {noun.capitalize()}s that reached a limit: {', '.join(reached)}."

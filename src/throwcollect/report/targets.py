@@ -83,7 +83,13 @@ def _show_miss_map(
         )
         line = {"color": LIMIT_LINE["color"], "width": 1.5}
         figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {times}" if times > 1 else "misses")
-    first, second = [*(_title_column(column, task) for column in columns), ""][:2]
+    # The title of an axis is the word that the task has for a column, or its own name, and the unit.
+    words, units = {each.of: each.word for each in task.target_columns}, [unit_of_name(each) for each in columns]
+    titles = [
+        f"{words.get(column, column.removesuffix(f'_{unit}'))} [{unit}]" if unit else column
+        for column, unit in zip(columns, units, strict=True)
+    ]
+    first, second = [*titles, ""][:2]
     figure.update_xaxes(title=first).update_yaxes(title=second, scaleanchor="x")
     title = f"{shown}, and misses drawn {times:,} times as long" if times > 1 else f"{shown} and misses"
     return Panel(key, title, figure.update_layout(height=420, legend=LEGEND_ABOVE))
@@ -92,13 +98,6 @@ def _show_miss_map(
 def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """The first two columns; if there is only one, a column of zeros after it."""
     return np.column_stack([points, np.zeros(len(points))])[:, :2]
-
-
-def _title_column(column: str, task: TaskConfig) -> str:
-    """Title of an axis for a column of places: the word that the task has for it, or its own name, and the unit."""
-    words = {each.of: each.word for each in task.target_columns}
-    unit = unit_of_name(column)
-    return f"{words.get(column, column.removesuffix(f'_{unit}'))} [{unit}]" if unit else column
 
 
 def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:

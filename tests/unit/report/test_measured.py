@@ -11,6 +11,7 @@ import pytest
 
 from throwcollect.dataset.journal import JournalLine
 from throwcollect.dataset.reader import Dataset
+from throwcollect.report.figures import draw_limit_boxes
 from throwcollect.report.measured import (
     Outcomes,
     SweptKey,
@@ -54,10 +55,13 @@ def test_peaks_are_grouped_by_the_joint_that_had_them() -> None:
     throws = pa.table(
         {"effort_peak_share": [0.5, 0.7, 1.0, None, 0.9], "effort_peak_joint": ["a", "a", "b", None, "a"]}
     )
-    first, second = summarise_peaks(throws, "effort")
-    assert (first.joint, first.count, first.quartiles, first.reached) == ("b", 1, (1.0,) * 5, 1)
-    assert (second.joint, second.count, second.reached) == ("a", 3, 0)
-    assert second.quartiles == pytest.approx((0.5, 0.6, 0.7, 0.8, 0.9))
+    peaks = summarise_peaks(throws, "effort")
+    assert {joint: shares.tolist() for joint, shares in peaks.items()} == {"b": [1.0], "a": [0.5, 0.7, 0.9]}
+    assert list(peaks) == ["b", "a"]
+    (boxes,) = draw_limit_boxes(peaks).data
+    quartiles = zip(boxes.lowerfence, boxes.q1, boxes.median, boxes.q3, boxes.upperfence, strict=True)
+    assert boxes.y == ("a<br>3 trials", "b<br>1 trial")
+    assert [each for box in quartiles for each in box] == pytest.approx([0.5, 0.6, 0.7, 0.8, 0.9, *[1.0] * 5])
 
 
 def test_the_chosen_points_are_reproducible_and_irregularly_spaced() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from throwcollect.config.values import column_of, leaves
@@ -61,7 +60,14 @@ def _show_distances(slides: Points, braking: NDArray[np.float64], outcomes: Outc
     )
     speeds = np.linspace(0.0, float(slides.speed_mps.max()), 50)
     for braking_mps2 in {float(braking.min()), float(braking.max())}:
-        figure.add_trace(_draw_law(speeds, braking_mps2))
+        figure.add_scatter(
+            x=single_precision(speeds),
+            y=single_precision(speeds**2 / (2 * braking_mps2)),
+            mode="lines",
+            line=LIMIT_LINE,
+            showlegend=False,
+            hovertemplate=f"µ g = {braking_mps2:.2f} m/s²<extra></extra>",
+        )
     figure.update_xaxes(title="speed after the push [m/s]").update_yaxes(title="slide distance [m]")
     off = np.abs(slides.distance_m - predicted)
     varies = "; they vary, so these are the lines of the least and the greatest" if np.ptp(braking) else ""
@@ -72,11 +78,3 @@ def _show_distances(slides: Points, braking: NDArray[np.float64], outcomes: Outc
     )
     panel = Panel("law", "Distance over speed", figure.update_layout(height=420))
     return ReportSection("distance", "Distances", title, text, ((panel,),))
-
-
-def _draw_law(speeds: NDArray[np.float64], braking_mps2: float) -> go.Scatter:
-    distances = single_precision(speeds**2 / (2 * braking_mps2))
-    hover = f"µ g = {braking_mps2:.2f} m/s²<extra></extra>"
-    return go.Scatter(
-        x=single_precision(speeds), y=distances, mode="lines", line=LIMIT_LINE, showlegend=False, hovertemplate=hover
-    )

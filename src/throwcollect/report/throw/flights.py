@@ -58,12 +58,6 @@ def choose_examples(dataset: Dataset, landed: Points, outcomes: Outcomes) -> tup
     return (*(usable[pick] for pick in picks), *[trial for trial in others if trial is not None][:_MOST_OTHERS])
 
 
-def _choose_middle(throws: Sequence[Throw], success: str) -> Throw:
-    """Choose, of the throws that succeeded, the one in the middle; the first of all if none did."""
-    landed = [throw for throw in throws if throw.outcome == success]
-    return landed[len(landed) // 2] if landed else throws[0]
-
-
 def show_examples(
     dataset: Dataset,
     throws: Sequence[Throw],
@@ -77,13 +71,13 @@ def show_examples(
     if not throws:
         return ReportSection("throws", "Throws", title, "No trial has an episode.")
     text = f"Dotted while the {dataset.config.tool.name} holds the ball; a ring marks the release."
-    if (succeeded := sum(throw.outcome == outcomes.success for throw in throws)) > 1:
-        text = f"{succeeded} throws that {outcomes.verbs[1]}, from the nearest to the farthest. {text}"
+    if len(succeeded := [throw for throw in throws if throw.outcome == outcomes.success]) > 1:
+        text = f"{len(succeeded)} throws that {outcomes.verbs[1]}, from the nearest to the farthest. {text}"
     side, above = _draw_paths(throws, outcomes, 2, bodies), _draw_paths(throws, outcomes, 1, bodies)
     if height_m is not None:
         side.add_hline(y=height_m, line={"color": NEUTRAL, "width": 1})
     views = (Panel("side", "The ball from the side", side), Panel("above", "The ball from above", above))
-    middle = _choose_middle(throws, outcomes.success)
+    middle = succeeded[len(succeeded) // 2] if succeeded else throws[0]
     release = middle.events.release
     trajectory = commanded_trajectory(dataset.config_of(middle), middle.read_samples()[1])
     note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
