@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.arguments import refuse_argument
-from throwcollect.config.schema import Config, DynamicMovementPrimitive
+from throwcollect.config.schema import DynamicMovementPrimitive
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throw import Throw
 from throwcollect.errors import DatasetError
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
@@ -142,13 +141,20 @@ def _gather_throws(source: ExportSource, throws: Dataset) -> dict[str, Any]:
     paths, motions, targets, measured, balls = [], [], [], [], []
     for throw in source.read(throws):
         config = source.dataset.config_of(throw.throw)
-        paths.append(_sample_path(throw.trajectory, source.rate_hz))
+        # The last time is the first one at which the motion is over.
+        times = np.arange(int(np.ceil(throw.trajectory.times[-1] * source.rate_hz - 1e-9)) + 1) / source.rate_hz
+        paths.append(np.column_stack([times, *sample_quintic(throw.trajectory, times)]))
         motions.append((throw.trajectory, config.task))
-        targets.append(_measure_target(throw.throw, config))
+        landing = (throw.throw["landing_x_m"], throw.throw["landing_y_m"], throw.throw["hit_angle_rad"])
+        x, y, angle = (np.nan if value is None else value for value in landing)
+        targets.append((float(np.hypot(x, y)), config.scene.landing_height_m, angle))
         measured.append(
             _stack_signals(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving)
         )
         balls.append(_stack_signals(throw, "ball_position_m", "ball_velocity_mps", of=[0, 1, 2]))
+    wanted: dict[str, Any] = {}
+    if names := [each.name for each in source.targets]:
+        wanted = {"wanted": np.column_stack([throws[name] for name in names]), "wanted_names": _make_cell(names)}
     return {
         "robot_data": {
             "joints": _make_cell(source.dataset.moving_joints),
@@ -157,7 +163,7 @@ def _gather_throws(source: ExportSource, throws: Dataset) -> dict[str, Any]:
         },
         "qPath": _make_cell(paths),
         "targets": np.array(targets),
-        **_list_goals(source, throws),
+        **wanted,
         "DMP": _make_cell(_describe_primitives(motions, source.rate_hz)),
         "trial": throws["trial"].astype(np.float64)[:, np.newaxis],
         "measured": _make_cell(measured),
@@ -165,28 +171,8 @@ def _gather_throws(source: ExportSource, throws: Dataset) -> dict[str, Any]:
     }
 
 
-def _list_goals(source: ExportSource, throws: Dataset) -> dict[str, Any]:
-    """List the fields with the targets that throws were aimed at; none if they were aimed at none."""
-    if not source.targets:
-        return {}
-    names = [each.name for each in source.targets]
-    return {"wanted": np.column_stack([throws[name] for name in names]), "wanted_names": _make_cell(names)}
-
-
-def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:
-    # The last time is the first one at which the motion is over.
-    times = np.arange(int(np.ceil(trajectory.times[-1] * rate_hz - 1e-9)) + 1) / rate_hz
-    return np.column_stack([times, *sample_quintic(trajectory, times)])
-
-
 def _stack_signals(throw: ThrowSeries, *names: str, of: Sequence[int]) -> NDArray[np.float64]:
     return np.column_stack([throw.signals["time_s"], *(throw.signals[name][:, of] for name in names)])
-
-
-def _measure_target(throw: Throw, config: Config) -> tuple[float, ...]:
-    landing = (throw["landing_x_m"], throw["landing_y_m"], throw["hit_angle_rad"])
-    x, y, angle = (np.nan if value is None else value for value in landing)
-    return float(np.hypot(x, y)), config.scene.landing_height_m, angle
 
 
 def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], rate_hz: int) -> list[dict[str, Any]]:

@@ -71,11 +71,6 @@ class Signal:
         return unit_of(self.name)
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of one sample."""
-        return (len(self.components),) if self.components else ()
-
-    @property
     def columns(self) -> tuple[str, ...]:
         """Names of its columns in a table."""
         return self.components or (self.name,)
