@@ -120,18 +120,19 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     table = ThrowsTable.of(plan)
     tables, recordings = [], []
     progress = log_progress(copies, len(copies), "trial", "written")
-    throws_of = (sources[copy.source].throw(copy.trial) for copy in copies)
+    taken = [sources[copy.source].throw(copy.trial) for copy in copies]
     configs = map(replace(plan, config=placed).config_of, (plan.trial(copy.number) for copy in copies))
     # Episodes are read in order, one after the other, as they are written; pictures are rendered by all cores.
     episodes = work_side_by_side(
-        [*zip(throws_of, configs, strict=True)],
+        [*zip(taken, configs, strict=True)],
         _begin_reading,
         (None if sensors is None else channels,),
         processes=1 if sensors is None else limit_processes(count_cores(), len(copies)),
         doing="renders",
     )
-    for name, members in groupby(progress, key=lambda copy: shard_of(plan, copy.number)):
-        held = [(copy.number, sources[copy.source].throw(copy.trial)) for copy in members]
+    numbered = ((copy.number, throw) for copy, throw in zip(progress, taken, strict=True))
+    for name, members in groupby(numbered, key=lambda each: shard_of(plan, each[0])):
+        held = list(members)
         runs = ((number, episode_run(next(episodes))) for number, _ in held)
         with replacing(directory / name) as descriptor:
             write = partial(write_all, descriptor)
@@ -147,7 +148,10 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     provenance = Provenance.of_this_machine(
         simulations=None, wall_s=time.monotonic() - began, was_open=False, robot=channels.robot
     )
-    write_file(directory / SOURCES, encode_table(_tabulate_sources(copies, sources)))
+    facts = [(source.config.name, str(source.directory), source.digest) for source in sources]
+    origins = [(copy.number, *facts[copy.source], copy.trial) for copy in copies]
+    columns = [pa.array(column, field.type) for field, column in zip(_SOURCES, zip(*origins, strict=True), strict=True)]
+    write_file(directory / SOURCES, encode_table(pa.table(columns, _SOURCES)))
     write_file(directory / CARD, (data_card(plan.config, throws, provenance) + _describe_sources(sources)).encode())
     write_provenance(directory, provenance)
     write_description(directory, plan.config.name, throws, channels, recordings)
@@ -204,13 +208,6 @@ def _make_row(plan: Plan, number: int, row: Row) -> Row:
     trial = plan.trial(number)
     values = {column_of(key): value for key, value in trial.values.items()}
     return {**row, **values, **trial.target, "trial": number}
-
-
-def _tabulate_sources(copies: Sequence[Copy], sources: Sequence[Dataset]) -> pa.Table:
-    """Make a table with one row a trial: the dataset and trial that it comes from."""
-    facts = [(source.config.name, str(source.directory), source.digest) for source in sources]
-    rows = [(copy.number, *facts[copy.source], copy.trial) for copy in copies]
-    return pa.Table.from_pylist([dict(zip(_SOURCES.names, row, strict=True)) for row in rows], schema=_SOURCES)
 
 
 def _describe_sources(sources: Sequence[Dataset]) -> str:

@@ -8,12 +8,10 @@ from itertools import islice
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import count_outcomes
-from throwcollect.episode.record import Samples
 from throwcollect.files import StrPath
 from throwcollect.progress_log import log_progress
 
@@ -95,7 +93,8 @@ def statistics(directory: StrPath) -> Statistics:
     moments, left_out = None, 0
     recorded = dataset.recorded
     for throw in log_progress(recorded, len(recorded), "episode", "read"):
-        rows = _stack_signals(throw.read_samples()[1])
+        samples = throw.read_samples()[1]
+        rows = np.hstack([getattr(samples, name) for name in (*_JOINT_GROUPS.values(), *_OBJECT_GROUPS.values())])
         finite = rows[np.isfinite(rows).all(axis=1)]
         left_out += len(rows) - len(finite)
         if len(finite):
@@ -135,11 +134,6 @@ def _summarise_columns(throws: pa.Table) -> Iterator[tuple[str, ColumnStatistics
                 quantiles={f"q{round(100 * at):02d}": value for at, value in zip(QUANTILES, quantiles, strict=True)},
             ),
         )
-
-
-def _stack_signals(samples: Samples) -> NDArray[np.float64]:
-    """Stack all signals side by side, shape ``(n_samples, n_signals)``."""
-    return np.hstack([getattr(samples, attribute) for attribute in (*_JOINT_GROUPS.values(), *_OBJECT_GROUPS.values())])
 
 
 def _summarise_signals(
