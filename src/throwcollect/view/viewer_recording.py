@@ -188,17 +188,14 @@ def _make_facts(throw: ShownThrow) -> Any:
     Its only status is OK if the trial succeeded, else a warning.
     """
     row = throw.throw.row
+    texts = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in row.items()}
     status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
     shown = status(
         level=status.OK if row["outcome"] == throw.config.task.success else status.WARN,
         name=FACTS_NAME,
         hardware_id=FACTS_HARDWARE,
         message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),
-        values=[pair(key=key, value=_write_text(value)) for key, value in row.items() if value is not None],
+        values=[pair(key=key, value=text) for key, text in texts.items() if row[key] is not None],
     )
     header = make_header("", throw.start_ns)
     return get_message("diagnostic_msgs/msg/DiagnosticArray")(header=header, status=[shown])
-
-
-def _write_text(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
