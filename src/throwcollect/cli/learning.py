@@ -17,7 +17,6 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
-    from throwcollect.learning.aiming import Aim
     from throwcollect.learning.model import Model
 
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
@@ -101,6 +100,7 @@ def aim(
         choose: Which of several throws: nearest, least-effort or least-sensitive.
     """
     from throwcollect.config.loader import load as load_config
+    from throwcollect.learning.aiming import explain_reach
     from throwcollect.learning.lists import read_targets, write_aims
     from throwcollect.learning.model import CONFIG, load_model
 
@@ -122,7 +122,9 @@ def aim(
         write_aims(output, aims, names, task)
         lines = [f"{output}: {format_count(len(aims), task.noun)}"]
     show([aim.as_dict() for aim in aims], *lines, json=json)
-    _print_out_of_reach(model, aims)
+    for number, aim in enumerate(aims, start=1):
+        if not aim.reachable:
+            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
 
@@ -209,9 +211,7 @@ def score(
             simulator, targets=targets, seed=seed, seeds=seeds, world=other, scatter=scatter, processes=count_cores()
         )
     model.write_score(directory, found)
-    show(
-        found, *_describe_score(f"throws at {_count_targets(found.targets, found.seeds)}", found.list_rows()), json=json
-    )
+    show(found, *_describe_score("throws", targets, seeds, found.list_rows()), json=json)
 
 
 def adapt(
@@ -299,15 +299,6 @@ def _read_dataset(directory: Path, names: Sequence[str], model: Model) -> list[l
     return [list(row) for row in zip(*(throws[column_of(name)].to_pylist() for name in names), strict=True)]
 
 
-def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
-    """Print which targets are out of reach, and why."""
-    from throwcollect.learning.aiming import explain_reach
-
-    for number, aim in enumerate(aims, start=1):
-        if not aim.reachable:
-            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
-
-
 def _score_policy(
     directory: Path, policy: str, worlds: dict[Path, list[str]], count: int, seeds: range, hit: float, *, json: bool
 ) -> None:
@@ -331,15 +322,11 @@ def _score_policy(
             simulators[str(path)] = opened.enter_context(simulator)
         found = score_policy(ends, simulators, count, seeds, hit=hit, processes=count_cores())
     rows = [(each.world, f"{each.hits:.0%}", *each.errors.cells) for each in found]
-    first = f"{policy} throws at {_count_targets(count, len(seeds))}"
-    show(found, *_describe_score(first, rows, "hits"), json=json)
+    show(found, *_describe_score(f"{policy} throws", count, len(seeds), rows, "hits"), json=json)
 
 
-def _count_targets(targets: int, seeds: int) -> str:
-    return f"{format_count(targets, 'target')} for each of {format_count(seeds, 'seed')}"
-
-
-def _describe_score(first: str, rows: Sequence[Sequence[str]], *head: str) -> list[str]:
+def _describe_score(who: str, targets: int, seeds: int, rows: Sequence[Sequence[str]], *head: str) -> list[str]:
     from throwcollect.learning.score import SCORE_HEAD
 
-    return [f"{first}, medians of the seeds, in simulation:", *align([("", *head, *SCORE_HEAD), *rows], numbers=True)]
+    thrown = f"{who} at {format_count(targets, 'target')} for each of {format_count(seeds, 'seed')}"
+    return [f"{thrown}, medians of the seeds, in simulation:", *align([("", *head, *SCORE_HEAD), *rows], numbers=True)]

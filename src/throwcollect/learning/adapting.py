@@ -123,7 +123,9 @@ def adapt(
     """
     throws = (parameters, context, places)
     before = _measure_distances(learned, *throws)
-    chosen = method or _choose(len(places), latents_count=latents_count)
+    chosen = method or (Method.BIAS if len(places) >= _THROWS_FOR_BIAS else Method.OFFSET)
+    if method is None and latents_count:
+        chosen = Method.LATENT
     if chosen is Method.NONE:
         return leave_as_it_is(learned, before, scatter)
     found, deviations = _find(learned, chosen, throws, scatter)
@@ -195,12 +197,6 @@ def leave_as_it_is(learned: LearnedMap, distances: Array, scatter: float) -> tup
     return learned.correction, Adaptation(
         method=Method.NONE, throws=len(before), scatter=scatter, before=before, after=after, found=[]
     )
-
-
-def _choose(throws: int, *, latents_count: bool) -> Method:
-    if latents_count:
-        return Method.LATENT
-    return Method.BIAS if throws >= _THROWS_FOR_BIAS else Method.OFFSET
 
 
 def _predict_by_others(

@@ -98,11 +98,6 @@ class Grid:
         cells[inside] = np.ravel_multi_index(tuple(bins[inside].T), self.shape)
         return cells
 
-    def count(self, places: Array) -> Cells:
-        """Count the places in each cell, shape ``(n_cells,)``."""
-        cells = self.find_cells(places)
-        return np.bincount(cells[cells != _NOWHERE], minlength=math.prod(self.shape))
-
     def find_corners(self, cells: Cells) -> Array:
         """Find the lower corner of each cell, shape ``(n, n_names)``."""
         return np.column_stack(np.unravel_index(cells, self.shape)).astype(np.float64)
@@ -188,13 +183,16 @@ def _aim(
 
     `tried` are all trials so far, and which of them have failed.
     """
-    landed = grid.count(learned.outputs)
+    ends = grid.find_cells(learned.outputs)
+    landed = np.bincount(ends[ends != _NOWHERE], minlength=math.prod(grid.shape))
     # In a cell at the edge, throws may fail that should land there, so their number grows from round to round.
     most = _GROWTH * landed + 2
     planned = landed.copy()
     missed = np.zeros(len(landed), np.int64)
-    near = _find_near_cells(grid, learned.outputs)
-    ends = grid.find_cells(learned.outputs)
+    centres = grid.find_corners(np.arange(len(landed))) + 0.5
+    # Throws at cells that are not near a landing would be wasted.
+    squares = (((learned.outputs - centre) ** 2).sum(axis=1).min() for centre in centres)
+    near = np.array([square <= _NEAR_BINS**2 for square in squares])
     rows_of = {cell: np.flatnonzero(ends == cell) for cell in np.unique(ends).tolist()}
     found: list[Array] = []
     while len(found) < count:
@@ -245,12 +243,6 @@ def _choose_cells(planned: Cells, most: Cells, count: int) -> Cells:
         chosen.append(cell)
         score[cell] += 1
     return np.array(chosen, np.int64)
-
-
-def _find_near_cells(grid: Grid, places: Array) -> NDArray[np.bool_]:
-    """Find the cells that are near enough to a landing; throws at all others would be wasted."""
-    centres = grid.find_corners(np.arange(math.prod(grid.shape))) + 0.5
-    return np.array([((places - centre) ** 2).sum(axis=1).min() <= _NEAR_BINS**2 for centre in centres])
 
 
 def _start_from(learned: LearnedMap, throws: NDArray[np.intp], noise: Array) -> LearnedMap:

@@ -7,6 +7,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import product
 
@@ -133,14 +134,13 @@ class _Search:
             raise ConfigError(f"{self._robot.title}: no joint that carries the hand can move by {_LEAST_RAD:g} rad")
         self._say(f"{format_count(len(starts), 'posture')} hold the ball; tries {len(candidates)} motions")
         config = self._make_config(candidates[0].start, candidates[0].end, 1.0, self._carrying)
-        feasibility, simulator = Feasibility(config), Simulator(config)
         landed: list[tuple[float, _Candidate]] = []
         said = time.monotonic()
-        try:
+        with closing(Simulator(config)) as simulator:
+            feasibility = Feasibility(config)
             for number, candidate in enumerate(candidates):
                 # Joints that do not carry the tool rest where the first candidate has them.
-                values = self._list_values(candidate)
-                distance = self._throw(config, values, feasibility, simulator)
+                distance = self._throw(self._list_values(candidate), feasibility, simulator)
                 if distance is not None:
                     landed.append((distance, candidate))
                 if len(landed) >= _ENOUGH or (waited := time.monotonic() - begin) > _PATIENCE_S:
@@ -148,8 +148,6 @@ class _Search:
                 if time.monotonic() - said > 2:
                     said = time.monotonic()
                     self._say(f"{number + 1} motions tried in {waited:.0f} s, {len(landed)} landed")
-        finally:
-            simulator.close()
         for distance, candidate in landed:
             if (found := self._spread(candidate, distance)) is not None:
                 return found
@@ -207,12 +205,10 @@ class _Search:
         values = {f"task.start.{joint}": start[joint] for joint in names}
         return values | {f"task.end.{joint}": end[joint] for joint in names} | {"task.duration_s": candidate.duration_s}
 
-    def _throw(
-        self, config: Config, values: Mapping[str, float], feasibility: Feasibility, simulator: Simulator
-    ) -> float | None:
+    def _throw(self, values: Mapping[str, float], feasibility: Feasibility, simulator: Simulator) -> float | None:
         """Try a motion; return how far it throws [m] if the throw lands."""
         try:
-            trial = with_values(config, values)
+            trial = with_values(simulator.config, values)
             if (reason := feasibility.check(trial, trajectory_of(trial))) is not None:
                 self._tried[f"refused: {blank_numbers(reason)}"] += 1
                 return None
@@ -222,7 +218,7 @@ class _Search:
             return None
         result = json.loads(episode.result)
         self._tried[str(result["outcome"])] += 1
-        if result["outcome"] != config.task.success:
+        if result["outcome"] != trial.task.success:
             return None
         return math.hypot(float(result["landing_x_m"]), float(result["landing_y_m"]))
 
@@ -230,11 +226,11 @@ class _Search:
         """Find ranges about a throw in which nearly all trials land; None if there are none."""
         moving = [index for index in self._carrying if abs(candidate.end[index] - candidate.start[index]) > 1e-4]
         config = self._make_config(candidate.start, candidate.end, candidate.duration_s, moving)
-        feasibility, simulator = Feasibility(config), Simulator(config)
         widest = max(moving, key=lambda index: abs(candidate.end[index] - candidate.start[index]))
         joint, centre = self._joints[widest], float(candidate.end[widest])
         half, slower = _WIDEST_RAD, _SLOWER
-        try:
+        with closing(Simulator(config)) as simulator:
+            feasibility = Feasibility(config)
             while half >= _NARROWEST_RAD:
                 low, high = max(centre - half, self._lower[widest]), min(centre + half, self._upper[widest])
                 shortest = candidate.duration_s
@@ -242,19 +238,12 @@ class _Search:
                     f"task.end.{joint}": (round(float(low), 3), round(float(high), 3)),
                     "task.duration_s": (shortest, round(slower * shortest, 3)),
                 }
-                grid = list(
-                    product(*(np.linspace(*each, count) for each, count in zip(ranges.values(), _GRID, strict=True)))
-                )
-                throws = [
-                    self._throw(config, dict(zip(ranges, map(float, point), strict=True)), feasibility, simulator)
-                    for point in grid
-                ]
-                share = sum(each is not None for each in throws) / len(grid)
+                axes = (np.linspace(*each, count).tolist() for each, count in zip(ranges.values(), _GRID, strict=True))
+                grid = [dict(zip(ranges, point, strict=True)) for point in product(*axes)]
+                share = sum(self._throw(point, feasibility, simulator) is not None for point in grid) / len(grid)
                 self._say(f"{share:.0%} land with {joint} from {low:.2f} to {high:.2f} rad")
                 if share >= _LEAST_SHARE:
                     task = config.task
                     return FirstThrow(task.start, task.end, task.duration_s, ranges, share, distance)
                 half, slower = half / 2, 1 + (slower - 1) / 2
-        finally:
-            simulator.close()
         return None

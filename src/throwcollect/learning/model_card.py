@@ -11,7 +11,8 @@ from throwcollect.learning.adapting import Adaptation, Method
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.learned_map import Axis, Correction, Kind
 from throwcollect.learning.polynomial import ModelEntry, Polynomial
-from throwcollect.learning.score import SCORE_HEAD, Score, format_length, format_scatter
+from throwcollect.learning.score import SCORE_HEAD, Score, format_length, list_units
+from throwcollect.units import format_distance
 from throwcollect.wording import format_count
 
 PROGRAM = """\
@@ -198,7 +199,8 @@ def _describe_score(score: Score, targets: Sequence[str]) -> Iterator[str]:
     )
     yield from _tabulate(("", *SCORE_HEAD), rows[:here])
     if score.adapted:
-        measured = f", with a scatter of {format_scatter(score.scatter, targets)} of what is measured"
+        scatter = " and ".join(format_distance(score.scatter, unit) for unit in list_units(targets))
+        measured = f", with a scatter of {scatter} of what is measured"
         yield (
             f"In another world{measured if score.scatter else ''}, at those of these targets that can be reached "
             "there, in simulation:\n"

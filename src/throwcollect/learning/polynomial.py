@@ -61,11 +61,6 @@ class Polynomial:
     exponents: Exponents
     coefficients: Matrix
 
-    @property
-    def degree(self) -> int:
-        """Highest sum of the exponents of a term."""
-        return int(self.exponents.sum(axis=1).max())
-
     def predict(self, inputs: Array) -> Array:
         """Values of the outputs, shape ``(n, n_outputs)``, for inputs of shape ``(n, n_inputs)``."""
         return matmul(list_terms(inputs, self.exponents), self.coefficients)

@@ -91,11 +91,6 @@ def format_length(length: float | None, targets: Sequence[str]) -> str:
     return f"{length:.3g} ({' and '.join(units)} together)"
 
 
-def format_scatter(scatter: float, targets: Sequence[str]) -> str:
-    """Write a standard deviation that every target has for people."""
-    return " and ".join(format_distance(scatter, unit) for unit in list_units(targets))
-
-
 def _sum_up(seeds: Sequence[Array], unit: str) -> MissStatistics:
     # A throw that did not succeed has no distance, and counts as farther away than all others.
     misses = [np.nan_to_num(np.linalg.norm(away, axis=1), nan=np.inf, posinf=np.inf) for away in seeds]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 
@@ -39,7 +39,6 @@ Adapts = Callable[[LearnedMap, Array, Array, Array], tuple[Correction, Adaptatio
 """`adapt`, with all that is the same for all throws."""
 
 
-@runtime_checkable
 class Simulates(Protocol):
     """The part of `Simulator` that scoring needs."""
 
@@ -114,6 +113,12 @@ def score_model(
             there.setdefault(number, []).append((each.method, ends - targets))
     errors = [Errors.of(each, learned.targets) for each in zip(*misses, strict=True)]
     numbers = [*sizes, len(learned.values)]
+    adapted = []
+    for number, found_there in sorted(there.items()):
+        # The method is the one that was chosen for most seeds.
+        methods, missed = zip(*found_there, strict=True)
+        method = max(methods, key=methods.count)
+        adapted.append(Adapted(real_throws=number, method=method, errors=Errors.of(missed, learned.targets)))
     return Score(
         targets=count,
         seed=seeds[0],
@@ -123,15 +128,9 @@ def score_model(
         distilled=None if distilled is None else errors[-1],
         throws=throws,
         scatter=scatter,
-        adapted=[_sum_up_adapted(number, there[number], learned.targets) for number in sorted(there)],
+        adapted=adapted,
         adapted_throws=adapted_throws,
     )
-
-
-def _sum_up_adapted(number: int, seeds: Sequence[tuple[Method, Array]], targets: Sequence[str]) -> Adapted:
-    """Sum up seeds after a number of throws in another world: the method that most chose, and all misses."""
-    methods, misses = zip(*seeds, strict=True)
-    return Adapted(real_throws=number, method=max(methods, key=methods.count), errors=Errors.of(misses, targets))
 
 
 def leave_out_correction(learned: LearnedMap) -> LearnedMap:

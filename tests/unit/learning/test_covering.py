@@ -61,9 +61,9 @@ def count_landings(config: Config, datasets: list[Dataset]) -> NDArray[np.int64]
     grid = Grid(config.sweep.target)
     throws = pa.concat_tables([each.throws for each in datasets])
     landed = throws.filter(np.array(throws["outcome"].to_pylist()) == "landed")
-    return grid.count(
-        grid.measure({name: landed[name].to_numpy() for name in landed.column_names if name != "outcome"})
-    )
+    columns = {name: landed[name].to_numpy() for name in landed.column_names if name != "outcome"}
+    cells = grid.find_cells(grid.measure(columns))
+    return np.bincount(cells[cells >= 0], minlength=math.prod(grid.shape))
 
 
 def measure_evenness(counts: NDArray[np.int64]) -> float:
