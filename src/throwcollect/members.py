@@ -109,7 +109,7 @@ def load_member(family: str, name: str) -> Any:
     what, namesakes = _describe(family, name), _find_namesakes(family, name)
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
-    found, kind = _import(entry.value, what), _load(_KINDS[family])
+    found, kind = _import(entry.value, what), import_own(_KINDS[family])
     if not (isinstance(found, kind) if family in _VALUES else isinstance(found, type) and issubclass(found, kind)):
         raise ConfigError(f"{what}: {entry.value} should be of {kind.__module__}.{kind.__name__}, is {found!r}")
     # A section of a configuration has its name as the default of a key; engines, runtimes and exporters have none.
@@ -192,23 +192,18 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
         raise MemberError(f"{what} cannot {doing}: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
 
 
-def _load(path: str) -> Any:
-    """Import an object ``module:name``."""
-    # Unlike `getattr`, an entry point also finds an attribute of an attribute.
-    return EntryPoint("", path, "").load()
-
-
 @cache
 def import_own(path: str) -> Any:
-    """Import an object of our own, only once, because parts are asked for several times in every trial."""
-    return _load(path)
+    """Import an object ``module:name`` of our own once, because parts are asked for several times in every trial."""
+    return EntryPoint("", path, "").load()
 
 
 def _import(path: str, what: str) -> Any:
     """Import ``module:name`` of another package; the message of an error begins with `what`."""
     try:
         with explain_missing():
-            return _load(path)
+            # Unlike `getattr`, an entry point also finds an attribute of an attribute.
+            return EntryPoint("", path, "").load()
     except ThrowcollectError:
         raise
     # `SystemExit` would end the process without a word.
