@@ -56,8 +56,8 @@ class Supervisor:
     def start(self) -> None:
         """Start all nodes."""
         self._start_deadline = time.monotonic() + self._run.start_timeout_s
-        for name in self._roster:
-            self._start(name)
+        for node in self._roster.values():
+            self.host.start(node)
 
     def change(self, roster: Sequence[NodeSpec]) -> None:
         """Change the roster: start the nodes that are new, and end those that are not in it any more."""
@@ -75,9 +75,9 @@ class Supervisor:
         # If no simulation that was ready is left, the new ones need a new deadline: the old one may have passed.
         if not self._has_worked:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
-        for name in self._roster:
+        for name, node in self._roster.items():
             if name not in before:
-                self._start(name)
+                self.host.start(node)
 
     def poll(self) -> tuple[NodeExit | None, list[str]]:
         """Look after the nodes, and start again those that ended.
@@ -103,7 +103,7 @@ class Supervisor:
         now = time.monotonic()
         for name in [name for name, due in self._due.items() if due <= now]:
             del self._due[name]
-            self._start(name)
+            self.host.start(self._roster[name])
         # Once the main node has come to its own end, the run needs no simulation any more.
         if end is None:
             self._check_that_run_can_go_on()
@@ -149,9 +149,6 @@ class Supervisor:
 
     def _list_names(self, role: NodeRole) -> list[str]:
         return [node.name for node in self._roster.values() if node.role is role]
-
-    def _start(self, name: str) -> None:
-        self.host.start(self._roster[name])
 
     def _state(self, name: str) -> NodeState:
         handle = self.host.handle(name)
