@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
@@ -13,11 +14,7 @@ from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.runtimes.docker.address import engine_address
-from throwcollect.runtimes.docker.container_options import (
-    image,
-    mount_source,
-    mount_target,
-)
+from throwcollect.runtimes.docker.container_options import image, read_mount
 from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors, find_image
 from throwcollect.state_directory import state_directory
 
@@ -76,8 +73,8 @@ def _check(
 def _problems(
     key: str, section: NodeContainerConfig, networks: set[str], root: str, *, mounts: str
 ) -> Iterator[Problem]:
-    for index, mount in enumerate(section.mounts):
-        wrong = _wrong_mount(mount_source(mount), root) or _wrong_target(mount_target(mount))
+    for index, mount in enumerate(map(read_mount, section.mounts)):
+        wrong = _wrong_mount(Path(mount["Source"]), root) or _wrong_target(mount["Target"])
         if wrong is not None:
             yield Problem(wrong, f"{key}.{mounts}.{index}")
     for index, device in enumerate(section.options.get("devices", [])):
@@ -89,8 +86,9 @@ def _problems(
             yield Problem(wrong, f"{key}.networks.{index}")
 
 
-def _wrong_target(target: PurePosixPath) -> str | None:
+def _wrong_target(path: str) -> str | None:
     """Why nothing must be mounted at a path in a container; None if it may."""
+    target = PurePosixPath(posixpath.normpath(path))
     first = target.parts[1:2]
     taken = not first or first[0] in ("data", "key")
     return f"{target} is refused, as the dataset, the key or the image is there in the container" if taken else None

@@ -13,7 +13,6 @@ from throwcollect.config.containers import ContainerSpec
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
-from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.checks import check_container
 from throwcollect.runtimes.docker.container_options import (
     API_VERSION,
@@ -62,22 +61,18 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
             f"run {run}: is on Fast DDS, which containers of the catalogue cannot join",
             hint="run.ros: embedded, or RMW_IMPLEMENTATION=rmw_zenoh_cpp for rclpy",
         )
-    key = key_mount(connection.key)
+    endpoint, network = connection.endpoint, None
     if runtime == "docker":
-        endpoint = f"{connection.endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}"
-        return JoinOptions(run, _environment(connection, endpoint), key, network_of(run))
-    if spec.section.ports or spec.section.networks:
+        endpoint, network = f"{endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}", network_of(run)
+    elif spec.section.ports or spec.section.networks:
         raise ConfigError(
             f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",
             expected="a component without ports and networks",
             hint="leave them out in the catalogue, or have the run in containers: run.runtime: docker",
         )
-    return JoinOptions(run, _environment(connection, connection.endpoint), key, None)
-
-
-def _environment(connection: Connection, endpoint: str) -> Mapping[str, str]:
-    inside = Connection(endpoint, RunKey(KEY.directory), connection.domain_id, connection.middleware)
-    return {**inside.environment(), RMW_VARIABLE: connection.middleware.rmw}
+    inside = Connection(endpoint, KEY, connection.domain_id, connection.middleware)
+    environment = {**inside.environment(), RMW_VARIABLE: connection.middleware.rmw}
+    return JoinOptions(run, environment, key_mount(connection.key), network)
 
 
 class ComponentContainer:

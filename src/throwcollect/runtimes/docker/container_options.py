@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import posixpath
 import socket
 from collections.abc import Mapping, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from docker.types import DeviceRequest, EndpointConfig, LogConfig, Mount, Ulimit
@@ -154,7 +153,7 @@ def container_options(
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _with_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
-        "mounts": [*mounts, *map(_bind, section.mounts)],
+        "mounts": [*mounts, *map(read_mount, section.mounts)],
         "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
         "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
         "mem_limit": section.memory,
@@ -164,17 +163,8 @@ def container_options(
     }
 
 
-def mount_source(mount: str) -> Path:
-    """Path on this machine that a mount of the configuration names."""
-    return Path(mount.partition(":")[0])
-
-
-def mount_target(mount: str) -> PurePosixPath:
-    """Path in the container that a mount of the configuration names."""
-    return PurePosixPath(posixpath.normpath(mount.split(":")[1]))
-
-
-def _bind(mount: str) -> Mount:
+def read_mount(mount: str) -> Mount:
+    """Read a mount of the configuration."""
     source, target, *mode = mount.split(":")
     # The only mode that the configuration allows is ``ro``.
     return Mount(target=target, source=source, type="bind", read_only=bool(mode))
