@@ -166,11 +166,10 @@ class ComponentContainer:
         return options
 
     def _state(self) -> NodeState:
-        if (handle := self._containers.handle(CONTAINER)) is None:
+        container = self._containers.by_node[CONTAINER]
+        if container.id is None:
             return NodeState(CONTAINER, "starting", 0, None, None)
-        state = self._containers.state(CONTAINER)
-        frozen = state is not None and state.status == "paused"
-        return NodeState(CONTAINER, "frozen" if frozen else "running", 0, handle[:12], None)
+        return NodeState(CONTAINER, "frozen" if container.paused else "running", 0, container.id[:12], None)
 
     def _has_ended(self, session: Session) -> bool:
         """Whether the container has ended well, or the run that it has joined has ended."""
@@ -181,9 +180,9 @@ class ComponentContainer:
                 f"the Docker engine has not answered for {containers.silent_s:.0f} s",
                 hint=f"once it answers, {command('down', '--run', self._context.run)} ends the container",
             )
-        if (failure := containers.failure(CONTAINER)) is not None:
+        if (failure := containers.by_node[CONTAINER].failure) is not None:
             raise WorkerError(f"the container of {self._spec.image} cannot be started: {failure}")
-        state = containers.state(CONTAINER)
+        state = containers.by_node[CONTAINER].state
         if state is not None and state.ended:
             # The end of the joined run may have made the container fail; the record of that run shows it a bit later.
             deadline = time.monotonic() + _OVER_S

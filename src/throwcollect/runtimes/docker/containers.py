@@ -58,8 +58,14 @@ class ContainerState:
 
 
 @dataclass
-class _Container:
-    """A container of a node; `starting` gives its id, and `printed` is the time of the last line in the log."""
+class Container:
+    """A container of a node.
+
+    Attributes:
+        starting: Gives its id.
+        state: Its last state; None if there is none yet.
+        printed: Time of the last line in the log.
+    """
 
     node: str
     starting: Future[str]
@@ -68,14 +74,28 @@ class _Container:
 
     @property
     def id(self) -> str | None:
+        """Its id; None if it has not been started (yet)."""
         has_started = self.starting.done() and not self.starting.cancelled() and self.starting.exception() is None
         return self.starting.result() if has_started else None
+
+    @property
+    def failure(self) -> str | None:
+        """Reason why it could not be started; None if there is none."""
+        error = self.starting.exception() if self.starting.done() else None
+        return None if error is None else describe_error(error)
+
+    @property
+    def paused(self) -> bool:
+        """Whether it is paused."""
+        return self.state is not None and self.state.status == "paused"
 
 
 class Containers:
     """Starts, watches and removes the containers of one run, each of which belongs to a node.
 
     Attributes:
+        by_node: The containers by the names of their nodes, also those that have ended; the next start of a node, or
+            `close`, removes one that is forgotten here.
         given_up: Whether the engine has not answered for so long that nothing more is asked of it.
         last_error: The reason of the last error of the engine; empty if there was none.
 
@@ -92,7 +112,7 @@ class Containers:
         self._logs = logs
         self._warn = warn
         self._warned = self._unwritable = False
-        self._containers: dict[str, _Container] = {}
+        self.by_node: dict[str, Container] = {}
         self._pool = ThreadPoolExecutor(_AT_ONCE)
         self._copying = threading.Lock()
         self._closed = threading.Event()
@@ -108,45 +128,16 @@ class Containers:
         """Time since the engine last answered [s]."""
         return time.monotonic() - self._answered_at
 
-    @property
-    def nodes(self) -> tuple[str, ...]:
-        """Names of the nodes that have a container, including those whose container has ended."""
-        return tuple(self._containers)
-
     def start(self, node: str, options: dict[str, Any], *, networks: Sequence[str]) -> None:
         """Begin to start a container, and remove an ended container of the same name.
 
         `options` are keywords for `containers.create`. The container joins `networks` besides the network in `options`.
         """
-        self._containers[node] = _Container(node, self._pool.submit(self._start, options, networks))
-
-    def handle(self, node: str) -> str | None:
-        """Id of a node's container; None if it has not been started (yet)."""
-        return self._containers[node].id if node in self._containers else None
-
-    def wait_started(self, node: str) -> str | None:
-        """Wait until a node's container is started, and return its id; None if it cannot be started."""
-        with suppress(KeyError, *ENGINE_ERRORS):
-            return self._containers[node].starting.result()
-        return None
-
-    def failure(self, node: str) -> str | None:
-        """Reason why a node's container could not be started; None if there is none."""
-        starting = self._containers[node].starting
-        error = starting.exception() if starting.done() else None
-        return None if error is None else describe_error(error)
-
-    def state(self, node: str) -> ContainerState | None:
-        """The last state of a node's container; None if there is none yet."""
-        return self._containers[node].state if node in self._containers else None
-
-    def forget(self, node: str) -> None:
-        """Forget a container that has ended; the next start of the node, or `close`, removes it."""
-        del self._containers[node]
+        self.by_node[node] = Container(node, self._pool.submit(self._start, options, networks))
 
     def remove(self, nodes: Sequence[str], *, grace_s: float) -> None:
         """End and remove containers: with SIGTERM, then after `grace_s`, in whole seconds, by force."""
-        ending = [self._containers.pop(node) for node in nodes if node in self._containers]
+        ending = [self.by_node.pop(node) for node in nodes if node in self.by_node]
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             for container in ending:
                 pool.submit(self._remove, container, math.ceil(grace_s))
@@ -159,7 +150,7 @@ class Containers:
         """
         is_clear = False
         if not self.given_up:
-            self.remove([node for node in self._containers if node != ROUTER], grace_s=_GRACE_S)
+            self.remove([node for node in self.by_node if node != ROUTER], grace_s=_GRACE_S)
             self.remove([ROUTER], grace_s=_GRACE_S)
             # The network cannot be removed while a foreign container is in it.
             with suppress(WorkerError):
@@ -184,7 +175,7 @@ class Containers:
             raise
         return str(container.id)
 
-    def _remove(self, container: _Container, grace_s: int) -> None:
+    def _remove(self, container: Container, grace_s: int) -> None:
         if container.starting.cancel():
             return
         with suppress(*ENGINE_ERRORS):
@@ -219,7 +210,7 @@ class Containers:
 
     def _look(self) -> None:
         # A container that is started meanwhile is not in the list, so the ids come first.
-        known = [(container, key) for container in list(self._containers.values()) if (key := container.id)]
+        known = [(container, key) for container in list(self.by_node.values()) if (key := container.id)]
         listed = self._list()
         for container, key in known:
             # What was printed before the end is in the log before the end is known.
@@ -239,7 +230,7 @@ class Containers:
             return ContainerState("removed")
         return ContainerState(details["Status"], details["ExitCode"], details["OOMKilled"])
 
-    def _copy_log(self, container: _Container, key: str) -> None:
+    def _copy_log(self, container: Container, key: str) -> None:
         """Append the lines that a container has printed since the last call to the log of its node."""
         with self._copying, suppress(NotFound):
             new: list[tuple[bytes, bytes]] = []

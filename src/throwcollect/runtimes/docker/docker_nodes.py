@@ -26,7 +26,7 @@ from throwcollect.runtimes.docker.container_options import (
     router_endpoint,
     section_of,
 )
-from throwcollect.runtimes.docker.containers import ANSWER_S, Containers, ContainerState
+from throwcollect.runtimes.docker.containers import ANSWER_S, Container, Containers, ContainerState
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
@@ -114,7 +114,8 @@ class DockerNodes(NodeHost):
     @property
     def endpoint(self) -> str | None:
         """See `NodeHost.endpoint`."""
-        state = self._containers.state(ROUTER)
+        router = self._containers.by_node.get(ROUTER)
+        state = None if router is None else router.state
         if state is None or state.ended:
             return None
         protocol = protocol_of(self.config.run, self.context.middleware)
@@ -135,33 +136,32 @@ class DockerNodes(NodeHost):
 
     def handle(self, name: str) -> str | None:
         """Short id of a running node's container; None if the container does not run (yet)."""
-        handle = self._containers.handle(name)
-        return handle and handle[:12]
+        container = self._containers.by_node.get(name)
+        return container.id[:12] if container is not None and container.id is not None else None
 
     def running(self) -> tuple[str, ...]:
         """See `NodeHost.running`."""
-        return self._containers.nodes
+        return tuple(self._containers.by_node)
 
     def exits(self) -> list[NodeExit]:
         """The nodes that ended, or could not be started, since the last call."""
         self._containers.warn_if_silent()
         if self._containers.given_up:
             raise self._make_silence_error()
-        ends = [end for name in self._containers.nodes if (end := self._find_end(name)) is not None]
+        ends = [end for each in self._containers.by_node.values() if (end := self._find_end(each)) is not None]
         for end in ends:
-            self._containers.forget(end.name)
+            del self._containers.by_node[end.name]
         return ends
 
     def frozen(self) -> frozenset[str]:
         """Names of the nodes whose containers are paused."""
-        states = {name: self._containers.state(name) for name in self._containers.nodes}
-        return frozenset(name for name, state in states.items() if state and state.status == "paused")
+        return frozenset(name for name, container in self._containers.by_node.items() if container.paused)
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node once it runs, unless it has ended."""
-        if (handle := self._containers.wait_started(name)) is not None:
-            with suppress(*ENGINE_ERRORS):
-                self._client.api.kill(handle, int(number))
+        # A node that is not there, or cannot be started, gets none.
+        with suppress(KeyError, *ENGINE_ERRORS):
+            self._client.api.kill(self._containers.by_node[name].starting.result(), int(number))
 
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """End nodes and remove their containers: with SIGTERM, then after `grace_s`, in whole seconds, by force."""
@@ -177,7 +177,7 @@ class DockerNodes(NodeHost):
     def _make_silence_error(self) -> WorkerError:
         """The error of a silent engine, with the containers that may still run there, and how to go on."""
         context = self.context
-        left = ", ".join(container_of(context.run, node) for node in self._containers.nodes) or "none"
+        left = ", ".join(container_of(context.run, node) for node in self._containers.by_node) or "none"
         hint = (
             f"once it answers, {command('down', '--run', context.run)} ends them, "
             f"and {command('resume', context.directory)} goes on without them"
@@ -189,11 +189,11 @@ class DockerNodes(NodeHost):
             hint=hint,
         )
 
-    def _find_end(self, name: str) -> NodeExit | None:
+    def _find_end(self, container: Container) -> NodeExit | None:
         """How a node ended; None while it runs."""
-        if (failure := self._containers.failure(name)) is not None:
+        name, state = container.node, container.state
+        if (failure := container.failure) is not None:
             return NodeExit(name, None, f"cannot be started: {failure}", self.logs.tail(name))
-        state = self._containers.state(name)
         if state is None or not state.ended:
             return None
         reason = describe_container_end(state, section_of(self.config, name).memory)
