@@ -122,10 +122,10 @@ def encode_points(points: Points) -> bytes:
     """Encode points as Parquet for `read_points`; equal points give equal bytes."""
     import pyarrow as pa
 
-    from throwcollect.sweep.arrow_column import make_column, null_where_nan
+    from throwcollect.sweep.arrow_column import make_table, null_where_nan
 
-    columns = [make_column(null_where_nan(each), pa.float64()) for each in points.table.T]
-    return encode_table(pa.table(columns, names=list(points.names)))
+    schema = pa.schema([(name, pa.float64()) for name in points.names])
+    return encode_table(make_table([*map(null_where_nan, points.table.T)], schema))
 
 
 def _check_columns(names: tuple[str, ...], path: Path, config: Config) -> None:
