@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Callable
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
@@ -155,20 +153,16 @@ def _check_disk(directory: Path) -> Check:
 
 def examine(directory: Path) -> list[Check]:
     """Check everything that a collection into a directory needs; the findings come in a fixed order."""
-    machine: list[Callable[[], Check]] = [
-        _check_python,
-        _check_extras,
-        _check_cores,
-        _check_memory,
-        *(partial(_check_engine, name) for name in ENGINE_PACKAGES),
-        *(partial(_check_robot, name) for name in names_of("robots")),
-        _check_rclpy,
-        _check_embedded,
-    ]
-    of_runtimes = [found for name in names_of("runtimes") if (found := _check_runtime(name)) is not None]
     return [
-        *(check() for check in machine),
-        *of_runtimes,
+        _check_python(),
+        _check_extras(),
+        _check_cores(),
+        _check_memory(),
+        *map(_check_engine, ENGINE_PACKAGES),
+        *map(_check_robot, names_of("robots")),
+        _check_rclpy(),
+        _check_embedded(),
+        *filter(None, map(_check_runtime, names_of("runtimes"))),
         _check_state(),
         _check_disk(directory),
     ]
