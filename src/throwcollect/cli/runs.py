@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from throwcollect.cluster.cluster_run import ClusterRun
     from throwcollect.runs.run import Run
     from throwcollect.runs.run_record import RunRecord
-    from throwcollect.runtimes.runtime import NodeState
 
 _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
@@ -262,18 +261,12 @@ def _list_node_lines(run: Run) -> list[tuple[str, ...]]:
     from throwcollect.runtimes.registry import find_runtime
     from throwcollect.runtimes.runtime import Runtime
 
-    handle = (find_runtime(run.record.runtime) or Runtime).handle
-    return [_make_node_line(node, handle) for node in run.nodes]
-
-
-def _make_node_line(node: NodeState, handle: str) -> tuple[str, ...]:
-    again = format_count(node.restarts, "restart") if node.restarts else ""
-    return (
-        node.name,
-        node.status,
-        f"{handle} {node.handle[:12]}" if node.handle else "",
-        ", ".join(filter(None, (again, node.last_end and f"last: {node.last_end}"))),
-    )
+    handle, lines = (find_runtime(run.record.runtime) or Runtime).handle, []
+    for node in run.nodes:
+        again = format_count(node.restarts, "restart") if node.restarts else ""
+        past = ", ".join(filter(None, (again, node.last_end and f"last: {node.last_end}")))
+        lines.append((node.name, node.status, f"{handle} {node.handle[:12]}" if node.handle else "", past))
+    return lines
 
 
 def _make_table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
