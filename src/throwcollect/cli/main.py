@@ -41,7 +41,7 @@ _GROUPS = {
         "dataset.info:info dataset.info:verify dataset.info:digest dataset.writing:export dataset.derive:merge "
         "dataset.derive:filter_ dataset.derive:sample dataset.derive:split dataset.derive:render_sensors "
         "dataset.derive:stats dataset.writing:report dataset.writing:view dataset.writing:render "
-        "dataset.writing:images dataset.replay:replay",
+        "dataset.writing:images dataset.info:replay",
     ),
     "robot": (
         "Import, check and list robots.",

@@ -1,3 +1,5 @@
+"""`throwcollect dataset replay`: which throws it simulates again, and what it prints."""
+
 from __future__ import annotations
 
 import json
@@ -8,7 +10,7 @@ from types import SimpleNamespace
 import pyarrow as pa
 import pytest
 
-from throwcollect.cli.dataset.replay import replay
+from throwcollect.cli.dataset.info import replay
 from throwcollect.dataset import reader
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay import audit
