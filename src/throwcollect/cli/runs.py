@@ -261,7 +261,8 @@ def _list_node_lines(run: Run) -> list[tuple[str, ...]]:
     from throwcollect.runtimes.registry import find_runtime
     from throwcollect.runtimes.runtime import Runtime
 
-    handle, lines = (find_runtime(run.record.runtime) or Runtime).handle, []
+    handle = (find_runtime(run.record.runtime) or Runtime).handle
+    lines: list[tuple[str, ...]] = []
     for node in run.nodes:
         again = format_count(node.restarts, "restart") if node.restarts else ""
         past = ", ".join(filter(None, (again, node.last_end and f"last: {node.last_end}")))
