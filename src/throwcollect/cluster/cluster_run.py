@@ -57,11 +57,6 @@ class ClusterRun:
         """Number of simulations of a task; for one run on several nodes, of all nodes."""
         return self.config.cluster.cores * (self.submission.tasks if self.submission.live else 1)
 
-    @property
-    def jobs(self) -> tuple[str, ...]:
-        """Numbers of all its jobs."""
-        return tuple(job for each in self.submission.jobs for job in (each.array, each.join) if job)
-
     def look(self) -> SlicesState:
         """Look at the queue and the files."""
         # Ask the queue before the files are read: a task puts its slice into place before it leaves the queue.
@@ -77,7 +72,7 @@ class ClusterRun:
 
     def stop(self) -> None:
         """End all jobs: tasks shut down properly, and keep the episodes that they have."""
-        slurm.cancel(self.jobs)
+        slurm.cancel([job for each in self.submission.jobs for job in (each.array, each.join) if job])
 
     def explain(self, look: SlicesState) -> ThrowcollectError | None:
         """Make the error that says why a run that has ended has no finished dataset; None if it has one."""

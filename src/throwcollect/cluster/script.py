@@ -167,8 +167,7 @@ class BatchScripts:
         # What a script has of its own wins, wherever it stands.
         for name, value in {**shared, **own, **resources, **own}.items():
             if value is not None:
-                text = str(value)
-                yield f"#SBATCH --{name}={text if _is_plain(text) else _quote(text)}"
+                yield f"#SBATCH --{name}={_quote(str(value))}"
 
     def _list_opening_lines(self) -> Iterator[str]:
         yield from self.config.cluster.lines
@@ -217,10 +216,8 @@ def _escape_quotes(text: str) -> str:
     return text.replace("'", "'\\''")
 
 
-def _is_plain(text: str) -> bool:
-    return shlex.quote(text) == text or not set(text) & set(" \t\"'\\#")
-
-
 def _quote(text: str) -> str:
-    """Quote the value of an option as sbatch reads it."""
+    """Quote the value of an option as sbatch reads it, if it has to be."""
+    if shlex.quote(text) == text or not set(text) & set(" \t\"'\\#"):
+        return text
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
