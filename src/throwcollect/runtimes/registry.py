@@ -69,7 +69,9 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
         say(f"runtime: {runtime.describe(config)}{rclpy}{note}")
         return RuntimeChoice(name, runtime, middleware)
 
-    *others, last = candidates = _list_candidates(config)
+    # Simulations of other machines can join a run only if its nodes are processes.
+    wanted = config.run.runtime if config.run.listen is None else "local"
+    *others, last = candidates = AUTOMATIC if wanted == "auto" else (wanted,)
     note = " (auto)" if candidates == AUTOMATIC else ""
     for name in others:
         try:
@@ -79,10 +81,3 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
         except WorkerError as error:
             note = f" (auto, as {error.message})"
     return prepare(last, note)
-
-
-def _list_candidates(config: Config) -> tuple[str, ...]:
-    """Names of the runtimes that the run may have, in the order in which they are tried."""
-    # Simulations of other machines can join a run only if its nodes are processes.
-    name = config.run.runtime if config.run.listen is None else "local"
-    return AUTOMATIC if name == "auto" else (name,)
