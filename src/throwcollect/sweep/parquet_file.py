@@ -85,8 +85,5 @@ def open_parquet(path: Path) -> Iterator[Any]:
             yield file
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         # Names and texts with invalid bytes raise one of these errors, too, at the latest when they are validated.
-        raise DatasetError(f"is damaged: {_read_first_line(error)}", path=path) from error
-
-
-def _read_first_line(error: BaseException) -> str:
-    return str(error).partition("\n")[0] or type(error).__name__
+        reason = str(error).partition("\n")[0] or type(error).__name__
+        raise DatasetError(f"is damaged: {reason}", path=path) from error
