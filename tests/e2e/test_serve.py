@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import psutil
 import pytest
 from websockets.exceptions import ConnectionClosed
@@ -294,6 +295,54 @@ def test_a_session_runs_in_real_time_as_long_as_a_client_watches(place: Place, s
     assert again.ask("DELETE", "/instances/talos")[0] == 202
     assert again.wait_until("talos", "ended")["exit_code"] == 0
     again.kill()
+
+
+def test_sensors_of_a_session_are_added_changed_and_removed(server: Server) -> None:
+    assert server.ask("PUT", "/instances/seen", {"component": "talos", "simulations": 1})[0] == 202
+    server.wait_until("seen", "running")
+    path = "/instances/seen/simulations/sim_0/sensors"
+    assert server.ask("GET", path) == (200, [])
+    camera = {"kind": "camera", "link": "head_2_link", "width": 32, "height": 24, "rate_hz": 50, "rpy_rad": [0, 0.5, 0]}
+    status, added = server.ask("PUT", f"{path}/eye", camera)
+    assert (status, added["streams"], added["section"]["far_m"]) == (200, ["color"], 20)
+    assert server.ask("GET", path) == (200, [added])
+    with server.open_rosbridge("seen") as client:
+
+        def see_info(focal: float) -> None:
+            while (info := json.loads(client.recv(60))["msg"])["k"][0] != pytest.approx(focal):
+                pass
+            assert info["width"] == 32
+
+        topic = {"topic": "/sim_0/eye/camera_info", "type": "sensor_msgs/msg/CameraInfo"}
+        client.send(json.dumps({"op": "subscribe", **topic}))
+        see_info(12 / np.tan(1.05 / 2))
+        status, changed = server.ask("PATCH", f"{path}/eye", {"vertical_fov_rad": 0.5, "noise": {"dropout": 0.1}})
+        assert (status, changed["section"]["noise"]["dropout"], changed["section"]["width"]) == (200, 0.1, 32)
+        see_info(12 / np.tan(0.25))
+        # Who sets a single parameter sees it in what the sensors are.
+        value = {"type": 3, "double_value": 0.6}
+        one = {"parameters": [{"name": "sensors.eye.vertical_fov_rad", "value": value}]}
+        service = {"service": "/sim_0/sensors/set_parameters", "type": "rcl_interfaces/srv/SetParameters"}
+        client.send(json.dumps({"op": "call_service", **service, "args": one}))
+        wait_for(lambda: server.ask("GET", path)[1][0]["section"]["vertical_fov_rad"] == 0.6)
+    for method, name, section, key in (
+        ("PUT", "eye", {**camera, "width": 1}, "sensors.eye.width"),
+        ("PUT", "eye", {**camera, "link": "nose"}, "sensors.eye.link"),
+        ("PUT", "eye", {"width": 8}, "sensors.eye.kind"),
+        ("PUT", "ball", camera, "sensors.ball"),
+        ("PUT", "E", camera, "sensors.E"),
+        ("PATCH", "eye", {"with": 9}, "sensors.eye.with"),
+        ("PATCH", "eye", {"rate_hz": 11}, "sensors.eye.rate_hz"),
+    ):
+        status, refused = server.ask(method, f"{path}/{name}", section)
+        assert (status, [each["key"] for each in refused["problems"]]) == (422, [key]), refused
+    for method, where in (("PATCH", f"{path}/nose"), ("DELETE", f"{path}/nose"), ("GET", path.replace("_0", "_7"))):
+        assert server.ask(method, where, {} if method == "PATCH" else None)[0] == 404
+    assert server.ask("DELETE", f"{path}/eye") == (204, None)
+    assert server.ask("GET", path) == (200, [])
+    assert server.ask("DELETE", "/instances/seen")[0] == 202
+    assert server.wait_until("seen", "ended")["exit_code"] == 0
+    assert server.ask("GET", path)[0] == 409
 
 
 def test_a_terminated_server_ends_despite_connected_listeners(server: Server, place: Place) -> None:

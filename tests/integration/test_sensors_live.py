@@ -1,5 +1,6 @@
 """What sensors see of a running simulation, and of what its clients record."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -44,9 +45,9 @@ def find_nodes(process: Command) -> list[psutil.Process]:
 
 def test_a_node_of_its_own_publishes_what_has_subscribers(seen: tuple[Robot, Command]) -> None:
     robot, process = seen
-    assert {"image_raw", "camera_info"} <= {
-        name.rpartition("/")[2] for name, _ in robot.node.get_topic_names_and_types() if "/side/" in name
-    }
+    names = robot.node.get_topic_names_and_types
+    offered = {robot.topic(f"side/{name}") for name in ("image_raw", "camera_info")}
+    robot.wait_until(lambda: offered <= {name for name, _ in names()}, "the topics of its sensors")
     assert find_nodes(process) == []
     pictures: list[Any] = []
     infos: list[Any] = []
@@ -64,16 +65,30 @@ def test_a_node_of_its_own_publishes_what_has_subscribers(seen: tuple[Robot, Com
 
     parameter, value = (get_message(f"rcl_interfaces/msg/{name}") for name in ("Parameter", "ParameterValue"))
 
-    def set_view(angle_rad: float) -> Any:
-        wanted = parameter(name="sensors.side.vertical_fov_rad", value=value(type=3, double_value=angle_rad))
+    def set_parameter(name: str, **typed: Any) -> Any:
+        wanted = parameter(name=name, value=value(**typed))
         asked = robot.ask("rcl_interfaces/srv/SetParameters", "sensors/set_parameters", parameters=[wanted])
         return robot.result(asked).results[0]
+
+    def set_view(angle_rad: float) -> Any:
+        return set_parameter("sensors.side.vertical_fov_rad", type=3, double_value=angle_rad)
+
+    def list_parameters() -> Any:
+        asked = robot.ask("rcl_interfaces/srv/ListParameters", "sensors/list_parameters", prefixes=["sensors"])
+        return robot.result(asked).result.names
 
     assert set_view(0.5).successful
     robot.wait_until(lambda: infos[-1].k[0] > 1.5 * focal, "the change in the next frame")
     assert "3.1" in set_view(4.0).reason
     robot.send(swing())
     robot.wait_until(lambda: pictures[-1].header.stamp.nanosec > 0, "a picture of an arm that moves")
+    for wrong, reason in (('{"eye"', "JSON"), ("[1]", "JSON"), ('{"eye": {"kind": "nose"}}', "sensors.eye.kind")):
+        refused = set_parameter("sensors", type=4, string_value=wrong)
+        assert (refused.successful, reason in refused.reason) == (False, True), refused.reason
+    others = json.dumps({"eye": {"kind": "camera", "link": "head_2_link", "width": 32}})
+    assert set_parameter("sensors", type=4, string_value=others).successful
+    robot.wait_until(lambda: "sensors.eye.width" in list_parameters(), "the parameters of another sensor")
+    assert not [name for name in list_parameters() if name.startswith("sensors.side.")]
     process.terminate()
     robot.wait_until(lambda: not node.is_running(), "it ends with its simulation")
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import JsonValue
 
 from rclzenoh.interfaces import get_message
 from throwcollect.config.schema import Config
@@ -54,6 +55,24 @@ class SensorTopic:
     def stamp(self) -> str:
         """Path of the stamp in its messages."""
         return "transforms.0.header.stamp" if self.stream == "pose" else "header.stamp"
+
+
+@dataclass(frozen=True)
+class SensorDescription:
+    """What clients get to know of a sensor.
+
+    Attributes:
+        position_m: Its place in its link [m]; it looks along x, with y to its left and z upwards.
+        rotation_xyzw: Its rotation in the link, as a quaternion.
+        streams: What it has: ``color``, ``depth``, ``segmentation``, ``scan`` or ``points``.
+        section: What is below its name in a configuration, with the values of the trial, or of the moment.
+    """
+
+    name: str
+    position_m: tuple[float, float, float]
+    rotation_xyzw: tuple[float, float, float, float]
+    streams: list[str]
+    section: dict[str, JsonValue]
 
 
 def sensor_topics(config: Config) -> dict[str, dict[int, SensorTopic]]:
@@ -102,6 +121,15 @@ def frame_of(name: str, sensor: SensorConfig) -> Frame:
         sp, cp = math.copysign(math.sqrt((1 - cos_pitch) / 2), -dz), math.sqrt((1 + cos_pitch) / 2)
         turn = -sy * sp, cy * sp, sy * cp, cy * cp
     return Frame(sensor.link, f"{name}_frame", (x, y, z), turn)
+
+
+def describe_sensor(name: str, config: Config) -> SensorDescription:
+    """Describe a sensor of a configuration for clients."""
+    section = config.sensors[name]
+    frame = frame_of(name, section)
+    streams = [topic.stream for topic in sensor_topics(config)[name].values()]
+    streams = [stream for stream in streams if stream != "pose" and not stream.endswith("_info")]
+    return SensorDescription(name, frame.translation, frame.rotation_xyzw, streams, section.model_dump())
 
 
 def focal_length(height: int, vertical_fov_rad: float) -> float:

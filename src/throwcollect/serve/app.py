@@ -17,6 +17,7 @@ from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_restoring_abandoned
+from throwcollect.serve.live_sensor_routes import make_live_sensor_routes
 from throwcollect.serve.models import make_model_routes
 from throwcollect.serve.problem_responses import DESCRIPTION, HANDLERS
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
@@ -51,6 +52,7 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
         make_dataset_routes(instances),
         make_throw_routes(instances),
         make_sensor_routes(instances),
+        make_live_sensor_routes(instances),
         make_view_routes(instances, bridges),
         make_model_routes(models),
     ):

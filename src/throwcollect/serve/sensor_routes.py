@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import dataclass
 from functools import lru_cache
 from threading import Lock
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Response
-from pydantic import BaseModel
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_sensors
 from throwcollect.dataset.directory import PLAN
 from throwcollect.dataset.sensors import FRAMES, SensorFrames
 from throwcollect.episode.record import Samples
-from throwcollect.episode.sensor_topics import frame_of, sensor_topics
+from throwcollect.episode.sensor_topics import SensorDescription, describe_sensor
 from throwcollect.errors import NotFoundError
 from throwcollect.robots.description import robot_of
 from throwcollect.sensing.scene import Scene
@@ -28,23 +28,11 @@ _STEP_S = 0.1
 """Time that each picture waits before it is rendered: all clients together get at most ten a second."""
 
 
-class SensorSummary(BaseModel):
-    """A sensor of a throw.
+@dataclass(frozen=True)
+class SensorSummary(SensorDescription):
+    """A sensor of a throw, with the time of each frame since the start of the throw [s]."""
 
-    Attributes:
-        position_m: Its place in its link [m]; it looks along x, with y to its left and z upwards.
-        rotation_xyzw: Its rotation in the link, as a quaternion.
-        streams: What it has: ``color``, ``depth``, ``segmentation``, ``scan`` or ``points``.
-        time_s: Time of each frame since the start of the throw [s].
-        section: What is below its name in a configuration, with the values of this throw.
-    """
-
-    name: str
-    position_m: tuple[float, float, float]
-    rotation_xyzw: tuple[float, float, float, float]
-    streams: list[str]
     time_s: list[float]
-    section: dict[str, Any]
 
 
 def make_sensor_routes(instances: Instances) -> APIRouter:
@@ -101,7 +89,7 @@ def make_sensor_routes(instances: Instances) -> APIRouter:
             config = with_sensors(config, {"camera": {**camera, "kind": "camera", "streams": ["color"]}})
             number = min(round(time_s * config.record.rate_hz), len(samples) - 1)
             seen = make_sensor("camera", config, scene, trial).look(scene.place_sample(samples, number), number)
-        about = json.dumps(_describe("camera", config, [number / config.record.rate_hz]).model_dump())
+        about = json.dumps(vars(_describe("camera", config, [number / config.record.rate_hz])))
         colors = seen["color"]["data"].tobytes()
         return Response(colors, media_type="application/octet-stream", headers={"Sensor": about})
 
@@ -109,13 +97,4 @@ def make_sensor_routes(instances: Instances) -> APIRouter:
 
 
 def _describe(name: str, config: Config, time_s: list[float]) -> SensorSummary:
-    section = config.sensors[name]
-    frame = frame_of(name, section)
-    return SensorSummary(
-        name=name,
-        position_m=frame.translation,
-        rotation_xyzw=frame.rotation_xyzw,
-        streams=[topic.stream for topic in sensor_topics(config)[name].values() if topic.stream in FRAMES],
-        time_s=time_s,
-        section=section.model_dump(),
-    )
+    return SensorSummary(**vars(describe_sensor(name, config)), time_s=time_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import time
@@ -14,25 +15,27 @@ import numpy as np
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.config.values import leaves, with_values
+from throwcollect.config.values import leaves, with_sensors, with_values
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.sensor_topics import SensorTopic, sensor_topics
+from throwcollect.episode.sensor_topics import SensorTopic, describe_sensor, sensor_topics
 from throwcollect.episode.topics import odometry, put_stamps
 from throwcollect.errors import ConfigError
 from throwcollect.own_process import make_command
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import moving_bodies_of
-from throwcollect.ros import Node, Parameter, Publisher, QoSProfile, get_message, graph_changes
-from throwcollect.ros.msg import SetParametersResult
+from throwcollect.ros import DurabilityPolicy, Node, Parameter, Publisher, QoSProfile, get_message, graph_changes
+from throwcollect.ros.msg import SetParametersResult, String
 from throwcollect.ros.nodes import descriptors
 from throwcollect.ros.serving import begin_to_serve
 from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import Scene
-from throwcollect.sensing.sensor import make_sensor
+from throwcollect.sensing.sensor import check_sensors, make_sensor
 from throwcollect.units import NS_PER_S
 
 NAME = "sensors"
-"""Name of the node, in the namespace of its simulation."""
+"""Name of the node in the namespace of its simulation, and of the parameter and the topic that have all sensors."""
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Quality of service of that topic."""
 _SAMPLED = QoSProfile(depth=10)
 _NEWEST = QoSProfile(depth=1)
 _WAIT_S = 0.01
@@ -42,8 +45,10 @@ _IDLE_S = 0.1
 class SensorNode(Node):
     """Publishes the topics of the sensors of a configuration that have subscribers, in the namespace of a simulation.
 
-    Each number and word of a sensor is a parameter, such as ``sensors.head.vertical_fov_rad``; the next frame shows a
-    change. In real time, frames come at most as often as `rate_hz` says of simulated time.
+    Each number and word of a sensor is a parameter, such as ``sensors.head.vertical_fov_rad``, and the parameter
+    ``sensors`` has all sections in JSON, to add and to remove sensors; the next frame shows a change. The latched topic
+    ``sensors`` says in JSON what sensors there are. In real time, frames come at most as often as `rate_hz` says of
+    simulated time.
     """
 
     def __init__(self, config: Config, namespace: str) -> None:
@@ -54,11 +59,10 @@ class SensorNode(Node):
         self._stamp_ns = 0
         self._noticed_changes = -1
         self._states: list[Any] = []
+        self._scene, self._declared = Scene.of(config), set[str]()
+        self._described = self.create_publisher(String, NAME, LATCHED)
         self._use(config)
-        for leaf in leaves(config):
-            if leaf.name.startswith("sensors.") and isinstance(leaf.value, bool | int | float | str):
-                about = descriptors.of_key(leaf.name, leaf.value, read_only=leaf.name.endswith(".kind"))
-                self.declare_parameter(leaf.name, leaf.value, about)
+        self._declare()
         self.add_on_set_parameters_callback(self._change)
 
     @property
@@ -68,9 +72,9 @@ class SensorNode(Node):
 
     def _use(self, config: Config) -> None:
         """Render by a configuration from now on."""
-        scene, channels = Scene.of(config), Channels(config, full_description(config))
-        self._sensors = {name: make_sensor(name, config, scene, 0) for name in config.sensors}
-        self._config, self._scene, self._topics = config, scene, channels.sensors
+        self._topics = Channels(config, full_description(config)).sensors
+        self._sensors = {name: make_sensor(name, config, self._scene, 0) for name in config.sensors}
+        self._config, self._is_declared = config, False
         for topics in self._topics.values():
             for topic in topics.values():
                 if topic.name not in self._made:
@@ -79,13 +83,43 @@ class SensorNode(Node):
         self._frames = dict.fromkeys(config.sensors, 0)
         self._due_s = dict.fromkeys(config.sensors, 0.0)
         self._find_listened()
+        # Clients get to know this before the answer to their request.
+        described = [vars(describe_sensor(name, config)) for name in config.sensors]
+        self._described.publish(String(data=json.dumps(described)))
 
     def _change(self, parameters: list[Parameter]) -> SetParametersResult:
+        values = {parameter.name: parameter.value for parameter in parameters}
         try:
-            self._use(with_values(self._config, {parameter.name: parameter.value for parameter in parameters}))
+            config = with_sensors(self._config, json.loads(values.pop(NAME))) if NAME in values else self._config
+            # The parameters of sensors that were removed are undeclared.
+            known = {leaf.name for leaf in leaves(config)}
+            config = with_values(config, {name: value for name, value in values.items() if name in known})
+            if config != self._config:
+                check_sensors(config)
+                self._use(config)
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
+        except (TypeError, ValueError) as error:
+            return SetParametersResult(successful=False, reason=f"{NAME}: should be sections by name in JSON: {error}")
         return SetParametersResult(successful=True)
+
+    def _declare(self) -> None:
+        """Declare the parameters of all sensors, and undeclare those of sensors that were removed."""
+        self._is_declared = True
+        sections = {name: section.model_dump() for name, section in self._config.sensors.items()}
+        values = {NAME: json.dumps(sections)} | {
+            leaf.name: leaf.value
+            for leaf in leaves(self._config)
+            if leaf.name.startswith(f"{NAME}.") and isinstance(leaf.value, bool | int | float | str)
+        }
+        changed = [name for name in self._declared if self.get_parameter(name).value != values.get(name)]
+        self.set_parameters([Parameter(name, value=values.get(name)) for name in changed])
+        for name in values.keys() - self._declared:
+            about = descriptors.of_key(name, values[name])
+            # Setting it to no value undeclares it.
+            about.dynamic_typing = name != NAME
+            self.declare_parameter(name, values[name], about)
+        self._declared = set(values)
 
     def _find_listened(self) -> None:
         """Find the topics with subscribers, and listen to the simulation if there are any."""
@@ -116,6 +150,8 @@ class SensorNode(Node):
 
     def follow_up(self) -> None:
         """Publish the frames that are due."""
+        if not self._is_declared:
+            self._declare()
         if (changes := graph_changes(self)) != self._noticed_changes:
             self._noticed_changes = changes
             self._find_listened()
@@ -140,7 +176,7 @@ class SensorNode(Node):
 
 
 class SensorProcess:
-    """Starts the node of the sensors of a simulation when one of their topics has a subscriber.
+    """Starts the node of the sensors of a simulation when one of their topics, or `NAME`, has a subscriber.
 
     The simulation has publishers of these topics, too, by which subscribers find them.
 
@@ -154,13 +190,13 @@ class SensorProcess:
         self._node, self._file = node, file
         self._offered = [
             node.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED) for topic in topics
-        ]
+        ] + [node.create_publisher(String, NAME, LATCHED)]
         self._process: subprocess.Popen[bytes] | None = None
         self._noticed_changes = -1
 
     def follow_up(self) -> None:
         """Start the node if it is wanted and does not run."""
-        if not self._offered or (changes := graph_changes(self._node)) == self._noticed_changes:
+        if (changes := graph_changes(self._node)) == self._noticed_changes:
             return
         self._noticed_changes = changes
         wanted = any(publisher.get_subscription_count() for publisher in self._offered)
