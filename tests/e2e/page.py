@@ -50,6 +50,21 @@ def press(tab: Tab, button: str) -> None:
     tab.evaluate(f"document.querySelector('button[aria-label={json.dumps(button)}]').click()")
 
 
+_SLIDE = """
+((word, value) => {
+  const labels = [...document.querySelectorAll("#sensor-form label")];
+  const slider = labels.find(({ textContent }) => textContent.startsWith(word)).querySelector("input");
+  slider.value = value;
+  slider.dispatchEvent(new Event("input"));
+})
+"""
+
+
+def slide(tab: Tab, word: str, value: float) -> None:
+    """Move the slider of the form of a sensor whose label begins with a word."""
+    tab.evaluate(f"{_SLIDE.strip()}({json.dumps(word)}, {value})")
+
+
 def find_own_errors(tab: Tab) -> list[str]:
     """Errors of a page that are its own."""
     return [error for error in tab.errors if CHANGED not in error]

@@ -15,7 +15,7 @@ import pytest
 import throwcollect
 from tests.e2e.chromium import browse, chromium
 from tests.e2e.collection import FAST, collect_here, write_config
-from tests.e2e.page import CHANGED, find_own_errors, load, press, serve
+from tests.e2e.page import CHANGED, find_own_errors, load, press, serve, slide
 from tests.unit.serve.made_model import make_model
 from throwcollect.runs.records import Records
 from throwcollect.runs.run_record import RunRecord
@@ -194,6 +194,9 @@ sensors:
   head: {kind: camera, link: head_2_link, width: 32, height: 24, rate_hz: 2, streams: [color, depth, segmentation]}
   scan: {kind: lidar_2d, link: base_link, position_m: [0.4, 0, 0], rpy_rad: [0, 0.3, 0], rays: 36, rate_hz: 2}
 """
+_CHANGE = "document.querySelectorAll('#pictures button[title^=change]')"
+
+
 _READ_HEAD = """
 [...document.querySelector('canvas[aria-label="color of head"]').getContext('2d').getImageData(0, 0, 32, 24).data]
   .filter((_, i) => i % 4 !== 3)
@@ -212,23 +215,28 @@ def test_the_page_shows_what_sensors_saw_and_what_another_camera_sees(
         f"{address}&run={over[1]}", width=390, height=800, features={"prefers-reduced-motion": "reduce"}
     ) as tab:
         load(tab)
-        station, sensors = "throwcollect.view.stations.get('replay')", "throwcollect.sensors"
-        tab.wait_for(
-            f"throwcollect.playback.at('replay') && {station}.robot?.isWhole && {sensors}.strands.length === 4"
-        )
+        station, strip = "throwcollect.view.stations.get('replay')", "throwcollect.strip"
+        tab.wait_for(f"throwcollect.playback.at('replay') && {station}.robot?.isWhole && {strip}.strands.length === 4")
         tab.evaluate("throwcollect.playback.seek(0.6)")
-        tab.wait_for(f"{sensors}.strands.every(({{ shown }}) => shown === 1)")
+        tab.wait_for(f"{strip}.strands.every(({{ shown }}) => shown === 1)")
         assert tab.evaluate(_READ_HEAD) == seen.images[1].ravel().tolist()
         lines, points = (f"{station}.sensors.object.children[{number}]" for number in (0, 3))
         assert tab.evaluate(f"{points}.geometry.attributes.position.count") > 0
         assert not tab.evaluate(f"{lines}.visible")
         tab.evaluate("document.querySelector('#frustum').click(); document.querySelector('#add-camera').click()")
-        tab.wait_for(f"{lines}.visible && {sensors}.camera.summary")
+        drawn = f"{strip}.strands.find(({{ key }}) => key === 'camera/color')?.drawn"
+        tab.wait_for(f"{lines}.visible && {drawn}")
         # The camera of the frustum is at the head of the robot.
         assert 1.3 < tab.evaluate(f"{lines}.matrix.elements[14]") < 2
         assert tab.evaluate(f"{station}.sensors.object.children.length") == 6
-        tab.evaluate("document.querySelector('#add-camera').click()")
+        # A slider moves the camera; what is recorded cannot be changed.
+        slide(tab, "x [m]", 2)
+        added = f"{strip}.sensors.find(({{ name }}) => name === 'camera')"
+        tab.wait_for(f"{drawn} > 1 && {added}.position_m[0] === 2")
+        assert tab.evaluate(f"[...{_CHANGE}].length") == 1
+        tab.evaluate("[...document.querySelectorAll('#sensor-form button')][1].click()")
         assert tab.evaluate(f"{station}.sensors.object.children.length") == 4
+        assert tab.evaluate("document.querySelector('#sensor-form').hidden")
         assert tab.evaluate("document.documentElement.scrollWidth") == 390
         assert find_own_errors(tab) == []
 

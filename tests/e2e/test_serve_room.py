@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from tests.e2e.chromium import Tab, browse, chromium
 from tests.e2e.collection import FAST, write_config
-from tests.e2e.page import find_own_errors, load, press, serve
+from tests.e2e.page import find_own_errors, load, press, serve, slide
 from tests.npm import install
 from throwcollect import ros
 from throwcollect.runs.records import Records
@@ -33,6 +34,8 @@ sweep:
   parameters:
     task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}
     task.duration_s: {{min: 1.0, max: 1.2}}
+sensors:
+  scan: {{kind: lidar_2d, link: base_link, position_m: [0.4, 0, 0], rpy_rad: [0, 0.3, 0], rays: 36}}
 run: {{runtime: local, replay: 0}}
 """
 _DEVICE = """
@@ -43,11 +46,13 @@ _DEVICE = """
     const until = render.frame + 4;
     while (render.frame < until) await new Promise((resolve) => setTimeout(resolve, 20));
   };
+  window.press = async (value) => {
+    device.controllers.right.updateButtonValue("trigger", value);
+    await someFrames();
+  };
   window.pull = async () => {
-    for (const value of [1, 0]) {
-      device.controllers.right.updateButtonValue("trigger", value);
-      await someFrames();
-    }
+    await press(1);
+    await press(0);
   };
 """
 _FLOOR = """
@@ -85,7 +90,10 @@ _ENTER = "document.querySelector('#enter-room').click()"
 def server(tmp_path: Path) -> Iterator[dict[str, Any]]:
     write_config(tmp_path, trials=600, text=_CONFIG, sim=f"{FAST}, real_time_factor: 1")
     catalogue = tmp_path / "catalogue.yaml"
-    catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml, max_instances: 2}}\n")
+    catalogue.write_text(
+        "components: {throws: {pretty_name: Throws, config: small.yaml, max_instances: 2}, "
+        "hands: {pretty_name: Hands, session: small.yaml}}\n"
+    )
     with serve(catalogue, tmp_path / "datasets") as told:
         yield told
 
@@ -146,10 +154,11 @@ def leave(tab: Tab) -> None:
     tab.wait_for("!throwcollect.room.isEntered")
 
 
-def hold(tab: Tab, x: float, y: float, z: float) -> None:
-    """Hold the right controller somewhere in the room [m], and point ahead."""
+def hold(tab: Tab, x: float, y: float, z: float, left: float = 0) -> None:
+    """Hold the right controller somewhere in the room [m], and point ahead, or turned to the left by an angle [rad]."""
     tab.evaluate(
-        f"device.controllers.right.position.set({x}, {y}, {z}); device.controllers.right.quaternion.set(0, 0, 0, 1)"
+        f"device.controllers.right.position.set({x}, {y}, {z}); "
+        f"device.controllers.right.quaternion.set({turn(left, 0)})"
     )
     tab.evaluate("someFrames()")
 
@@ -207,3 +216,67 @@ def set_by_hand(tab: Tab, ears: Ears) -> None:
     hold(tab, -0.4, 0.5, -1.4)
     tab.evaluate("pull()")
     assert ears.hear() == pytest.approx((1.4, -0.2, 0.5), abs=_MM)
+
+
+def test_a_sensor_of_a_session_is_added_and_placed_by_hand(server: dict[str, Any], emulator: str) -> None:
+    still = {"prefers-reduced-motion": "reduce"}
+    with browse(server["page"], width=390, height=800, features=still, script=emulator) as tab:
+        load(tab)
+        start = "document.querySelector('button[aria-label=\"Start Hands\"]')"
+        tab.evaluate(f"{start}.form.querySelector('input').value = '1'; {start}.click()")
+        robot = "throwcollect.view.stations.get('sim_0')?.robot?.isWhole"
+        tab.wait_for(f"throwcollect.live.simulations.size && {robot}", within_s=120, every_s=1)
+        try:
+            place_by_hand(tab)
+        finally:
+            # A session outlives its server.
+            press(tab, f"Stop {tab.evaluate('throwcollect.watching.id')}")
+            tab.wait_for("document.querySelector('#ended .status')?.textContent.startsWith('has ended')", every_s=1)
+
+
+def place_by_hand(tab: Tab) -> None:
+    marks, strip = "throwcollect.view.stations.get('sim_0').sensors.object.children", "throwcollect.strip"
+
+    def read(key: str) -> Any:
+        """What the simulation says of its camera."""
+        path = "`/instances/${throwcollect.watching.id}/simulations/sim_0/sensors`"
+        return tab.evaluate(f"throwcollect.connection.read('GET', {path}).then(([, camera]) => camera.section.{key})")
+
+    # The lidar that the session begins with has points; a camera is added.
+    tab.evaluate("document.querySelector('#show-sensors').click()")
+    tab.wait_for(f"{marks}[1]?.geometry.attributes.position.count > 0")
+    tab.evaluate("document.querySelector('#add-camera').click()")
+    tab.wait_for(f"{strip}.strands.find(({{ key }}) => key === 'camera/color')?.drawn > 0")
+    slide(tab, "width", 64)
+    tab.wait_for("document.querySelector('[aria-label=\"color of camera\"]').width === 64")
+    assert read("width") == 64
+    assert tab.evaluate("document.documentElement.scrollWidth") == 390
+
+    # It stands 1 m behind the user and 1 m to the right. The hand takes it, turns to the left and lets it go.
+    enter(tab)
+    tab.wait_for(f"throwcollect.view.world.visible && {marks}[2].visible")
+    boards = "throwcollect.room.sensors.boards"
+    assert tab.evaluate(f"{boards}.length === 1 && {boards}[0].mesh.visible")
+    assert tab.evaluate(f"{boards}[0].mesh.position.toArray()") == pytest.approx([1, 1.82, 1], abs=_MM)
+    hold(tab, 1, 1.5, 1.1)
+    tab.evaluate("press(1)")
+    hold(tab, 0.5, 1.2, -0.4, left=math.pi / 2)
+    tab.evaluate("press(0)")
+    placed = [0.4, -1.6, 1.2]
+    tab.wait_for(f"Math.abs({strip}.sensors[1].position_m[0] - 0.4) < {_MM}")
+    assert read("position_m") == pytest.approx(placed, abs=_MM)
+    yaw = math.atan2(3, -0.4) + math.pi / 2 - math.tau
+    assert read("rpy_rad") == pytest.approx([0, math.atan2(0.5, math.hypot(3, 0.4)), yaw], abs=_MM)
+    # It was no trigger for a target.
+    assert not tab.evaluate("throwcollect.view.stations.get('sim_0').target.visible")
+    leave(tab)
+    assert not tab.evaluate(f"{marks}[2].visible")
+
+    tab.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text }")
+    tab.evaluate("document.querySelector('#pictures button[title=\"copy camera as YAML\"]').click()")
+    copied = yaml.safe_load(tab.evaluate("copied"))["sensors"]["camera"]
+    assert (copied["position_m"], copied["width"]) == (pytest.approx(placed, abs=_MM), 64)
+    assert "look_at_m" not in copied
+    tab.evaluate("document.querySelectorAll('#sensor-form button')[1].click()")
+    tab.wait_for(f"{strip}.sensors.length === 1")
+    assert find_own_errors(tab) == []

@@ -482,28 +482,73 @@ test("a throw that comes late does not replace one that was chosen since, and a 
   replay.leave();
 });
 
-test("pictures are subscribed to only while the strip of a simulation is open", async () => {
-  const topics = new Set();
+/** The sensors of sim_0, shown in a strip that keeps what it is given. */
+function showLiveSensors() {
+  const topics = new Map();
+  const sent = [];
+  const answers = [];
+  const notes = [];
   const live = {
     simulations: new Set(),
-    call: async () => ({ topics: ["/sim_0/head/image_raw", "/sim_1/head/image_raw"] }),
-    subscribe: (topic) => topics.add(topic),
+    call: (_service, _type, { parameters }) => {
+      sent.push(JSON.parse(parameters[0].value.string_value));
+      return new Promise((resolve) => answers.push((result) => resolve({ results: [result] })));
+    },
+    subscribe: (topic, _type, hear) => topics.set(topic, hear),
     unsubscribe: (topic) => topics.delete(topic),
   };
-  const strip = new LiveSensors(live);
-  const button = document.getElementById("show-sensors");
-  const follow = async (...names) => {
-    live.simulations = new Set(names);
-    strip.follow();
-    await settle();
+  const strip = {
+    strands: [], sensors: [], source: null,
+    tell: (text) => notes.push(text),
+    put(source, sensors) {
+      Object.assign(this, { source, sensors, strands: sensors.map((sensor) => ({ sensor, stream: "color" })) });
+    },
   };
-  await follow("sim_0");
+  const sensors = new LiveSensors({ live, strip });
+  const follow = (...names) => {
+    live.simulations = new Set(names);
+    sensors.follow();
+  };
+  const hear = (sections) => topics.get("/sim_0/sensors")({ data: JSON.stringify(Object.entries(sections).map(([name, section]) => ({ name, section }))) });
+  return { answers, follow, hear, notes, sensors, sent, strip, topics, button: document.getElementById("show-sensors") };
+}
+
+test("pictures are subscribed to only while the strip of a simulation is open", () => {
+  const { follow, hear, strip, topics, button } = showLiveSensors();
+  follow("sim_0");
   assert.deepEqual([button.hidden, topics.size], [false, 0]);
   button.click();
-  assert.deepEqual([...topics], ["/sim_0/head/image_raw"]);
+  assert.deepEqual([...topics.keys()], ["/sim_0/sensors"]);
+  hear({ head: {}, side: {} });
+  hear({ side: {}, camera: {} });
+  assert.deepEqual([...topics.keys()], ["/sim_0/sensors", "/sim_0/side/image_raw", "/sim_0/camera/image_raw"]);
   button.click();
-  assert.equal(topics.size, 0);
+  assert.deepEqual([topics.size, strip.source], [0, null]);
   button.click();
-  await follow("sim_0", "sim_1");
+  follow("sim_0", "sim_1");
   assert.deepEqual([topics.size, button.hidden], [0, true]);
+});
+
+test("while the node of the sensors changes them, only the newest change waits", async () => {
+  const { answers, follow, hear, notes, sensors, sent, button } = showLiveSensors();
+  follow("sim_0");
+  button.click();
+  hear({ head: { width: 8 }, side: { width: 8 } });
+  for (const width of [16, 24, 32]) sensors.change("head", { width });
+  assert.deepEqual(sent, [{ head: { width: 16 }, side: { width: 8 } }]);
+  // What the node says meanwhile does not undo what waits.
+  hear({ head: { width: 16 }, side: { width: 8 } });
+  answers.shift()({ successful: true });
+  await settle();
+  assert.deepEqual(sent.at(-1), { head: { width: 32 }, side: { width: 8 } });
+  answers.shift()({ successful: true });
+  await settle();
+  hear({ head: { width: 32 }, side: { width: 8 } });
+  sensors.change("side", null);
+  assert.deepEqual(sent.slice(2), [{ head: { width: 32 } }]);
+  answers.shift()({ successful: false, reason: "sensors.side: no" });
+  await settle();
+  assert.equal(notes.at(-1), "sensors.side: no");
+  sensors.change("camera", { width: 8 });
+  assert.deepEqual(sent.at(-1), { head: { width: 32 }, side: { width: 8 }, camera: { width: 8 } });
 });

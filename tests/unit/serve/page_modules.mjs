@@ -17,10 +17,10 @@ const { describe, median, tabulate } = await load("model_words.js");
 const { Rosbridge } = await load("rosbridge.js");
 const { Bodies } = await load("bodies.js");
 const { addSuccess, colorOf } = await load("outcomes.js");
-const { frameAt, linesOf, paint, pointsOf, toYaml } = await load("sensor_frames.js");
-const { nest, paintImage } = await load("live_sensors.js");
+const { aimAlong, anglesTo, frameAt, linesOf, paint, pointsOf, rpyOf, toYaml } = await load("sensor_frames.js");
+const { paintImage } = await load("live_sensors.js");
 const { SensorMarks } = await load("sensor_marks.js");
-const { BoxGeometry, Matrix4, SphereGeometry, Vector3 } = await load("vendor/three/build/three.module.js");
+const { BoxGeometry, Euler, Matrix4, Quaternion, SphereGeometry, Vector3 } = await load("vendor/three/build/three.module.js");
 
 const bytes = readFileSync(process.env.THROW);
 const thrown = () => decodeThrow(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
@@ -318,13 +318,16 @@ test("a section is written as YAML that reads as the same", () => {
 test("messages of cameras are painted as frames of the same encoding", () => {
   const image = (encoding, numbers) => ({ encoding, width: numbers.length, height: 1, data: Buffer.from(numbers.buffer).toString("base64") });
   const greys = (pixels) => [...pixels].filter((_, i) => i % 4 === 0);
-  assert.deepEqual(greys(paintImage(image("16UC1", Uint16Array.from([1000, 3000, 0])))), [255, 55, 0]);
-  assert.deepEqual(greys(paintImage(image("32FC1", Float32Array.from([1, 3, Infinity])))), [255, 55, 0]);
-  assert.deepEqual([...paintImage({ ...image("rgb8", Uint8Array.from([7, 8, 9])), width: 1 })], [7, 8, 9, 255]);
-  assert.equal(paintImage(image("bayer", Uint8Array.from([0]))), null);
+  assert.deepEqual(greys(paintImage("depth", image("16UC1", Uint16Array.from([1000, 3000, 0])))), [255, 55, 0]);
+  assert.deepEqual(greys(paintImage("depth", image("32FC1", Float32Array.from([1, 3, Infinity])))), [255, 55, 0]);
+  assert.deepEqual([...paintImage("color", { ...image("rgb8", Uint8Array.from([7, 8, 9])), width: 1 })], [7, 8, 9, 255]);
 });
 
-test("parameters of sensors become sections", () => {
-  const values = [["sensors.head.kind", "camera"], ["sensors.head.rpy_rad.0", 1], ["sensors.head.rpy_rad.1", 2], ["sensors.head.noise.recorded", false], ["sensors.scan.rays", 3]];
-  assert.deepEqual(nest(values), { head: { kind: "camera", rpy_rad: [1, 2], noise: { recorded: false } }, scan: { rays: 3 } });
+test("angles of a sensor are those of its rotation, and of the point that it looks at", () => {
+  const rpy = [0.3, -0.4, 2.5];
+  const turn = new Quaternion().setFromEuler(new Euler(...rpy, "ZYX"));
+  rpyOf(turn.toArray()).forEach((angle, i) => near(angle, rpy[i]));
+  const point = aimAlong([1, 2, 3], [0, -0.4, 2.5]);
+  near(Math.hypot(point[0] - 1, point[1] - 2, point[2] - 3), 1);
+  anglesTo([1, 2, 3], point).forEach((angle, i) => near(angle, [0, -0.4, 2.5][i]));
 });

@@ -148,16 +148,39 @@ export class InfoBoard extends Board {
   }
 }
 
-/** A plot of the page, beside the link that it is bound to. */
-export class PlotBoard extends Board {
+/** A board with a line to what it shows. */
+class LedBoard extends Board {
   leader = new Line(new BufferGeometry().setFromPoints([new Vector3(), new Vector3()]), new LineBasicMaterial({ color: color("accent") }));
 
+  constructor(...size) {
+    super(...size);
+    this.leader.frustumCulled = false;
+  }
+
+  /**
+   * Draw the line to a place.
+   * @param {Vector3 | null} place in the room [m]; null if there is none
+   */
+  lead(place) {
+    this.leader.visible = place !== null;
+    if (place) this.leader.geometry.setFromPoints([this.mesh.position, place]);
+  }
+
+  dispose() {
+    super.dispose();
+    this.leader.removeFromParent();
+    this.leader.geometry.dispose();
+    this.leader.material.dispose();
+  }
+}
+
+/** A plot of the page, beside the link that it is bound to. */
+export class PlotBoard extends LedBoard {
   /** @param {import("./plot_panel.js").PlotPanel} panel */
   constructor(panel) {
     // A plot that follows no link is wide, as it is on the page.
     super(panel.follows ? 0.5 : 1, panel.follows ? 512 : 1024, panel.follows ? 320 : 260);
     this.panel = panel;
-    this.leader.frustumCulled = false;
   }
 
   show() {
@@ -181,22 +204,31 @@ export class PlotBoard extends Board {
   press() {
     this.panel.collapse();
   }
+}
 
-  /**
-   * Draw the line to the link.
-   * @param {Vector3 | null} link in the room [m]; null if there is none
-   */
-  lead(link) {
-    this.leader.visible = link !== null;
-    if (link) this.leader.geometry.setFromPoints([this.mesh.position, link]);
+/** A picture of a sensor, above it. */
+export class PictureBoard extends LedBoard {
+  /** @param {import("./sensor_strip.js").Strand} strand */
+  constructor(strand) {
+    super(0.36, 360, 300);
+    this.strand = strand;
   }
 
-  dispose() {
-    super.dispose();
-    this.leader.removeFromParent();
-    this.leader.geometry.dispose();
-    this.leader.material.dispose();
+  show() {
+    const { canvas, drawn, key } = this.strand;
+    this.renew(drawn, (pen, width, height) => {
+      drawCard(pen, width, height);
+      pen.fillStyle = color("text");
+      pen.font = `600 22px ${FONT}`;
+      pen.fillText(key.replace("/", ": "), 16, 30, width - 32);
+      const ratio = Math.min((width - 16) / canvas.width, (height - 48) / canvas.height);
+      pen.imageSmoothingEnabled = false;
+      pen.drawImage(canvas, (width - canvas.width * ratio) / 2, 40, canvas.width * ratio, canvas.height * ratio);
+    });
   }
+
+  /** It has nothing to press, but sets no target either. */
+  press() {}
 }
 
 /** The landing map, lying on the ground in its own size. */

@@ -1,182 +1,142 @@
-/** The strip of sensors of one simulation that is shown live: what they see at the moment, and sliders that change them. */
+/** The sensors of one simulation that is shown live: what they see at the moment, by rosbridge. */
 
-import { get, make, makeButton, setText } from "./dom.js";
-import { paint, toYaml } from "./sensor_frames.js";
+import { get } from "./dom.js";
+import { paint, pointsOf } from "./sensor_frames.js";
 
-const IMAGE = "sensor_msgs/msg/Image";
-/** Least time between two pictures of a camera [ms]. */
+/** Least time between two frames of a sensor [ms]. */
 const PERIOD_MS = 100;
-/** Farthest that sliders go from zero [m or rad; pixels and other integers], unless the value is farther already. */
-const [REACH, INTEGER_REACH] = [4, 640];
-/** How often the page looks for cameras, and the time in between. */
-const [TRIES, WAIT_MS] = [10, 2000];
-const STREAMS = { rgb8: "color", "16UC1": "depth", "32FC1": "depth", mono16: "segmentation" };
-const [INTEGER, DOUBLE] = [2, 3];
-const VALUES = { 1: "bool_value", [INTEGER]: "integer_value", [DOUBLE]: "double_value", 4: "string_value" };
+const IMAGE = "sensor_msgs/msg/Image";
+const TOPICS = {
+  color: ["image_raw", IMAGE], depth: ["depth/image_raw", IMAGE], segmentation: ["segmentation/image_raw", IMAGE],
+  scan: ["scan", "sensor_msgs/msg/LaserScan"], points: ["points", "sensor_msgs/msg/PointCloud2"],
+};
+const STRING = 4;
+
+const decode = (data) => Uint8Array.from(atob(data), (each) => each.charCodeAt(0)).buffer;
 
 /**
+ * @param {string} stream
  * @param {{encoding: string, width: number, height: number, data: string}} image a message with its data as base64
- * @returns {Uint8ClampedArray | null} red, green, blue and opacity of each pixel; null if its encoding is not known
+ * @returns {Uint8ClampedArray} red, green, blue and opacity of each pixel
  */
-export function paintImage({ encoding, width, height, data }) {
-  const stream = STREAMS[encoding];
-  if (!stream) return null;
-  let { buffer } = Uint8Array.from(atob(data), (each) => each.charCodeAt(0));
+export function paintImage(stream, { encoding, width, height, data }) {
+  let buffer = decode(data);
   // Millimetres, with 0 for none.
   if (encoding === "16UC1") ({ buffer } = Float32Array.from(new Uint16Array(buffer), (each) => each / 1000 || Infinity));
   return paint(stream, buffer, width * height);
 }
 
-/**
- * @param {[string, unknown][]} values by parameter, such as sensors.head.rpy_rad.1
- * @returns {Record<string, Record<string, any>>} sections by sensor
- */
-export function nest(values) {
-  const whole = {};
-  for (const [name, value] of values) {
-    const keys = name.split(".").slice(1);
-    const last = keys.pop();
-    let place = whole;
-    keys.forEach((key, i) => {
-      place[key] ??= /^\d+$/.test(keys[i + 1] ?? last) ? [] : {};
-      place = place[key];
-    });
-    place[last] = value;
-  }
-  return whole;
-}
-
-/** Shows the sensors of a simulation while the strip is open. */
+/** Shows the sensors of a simulation while the strip is open for them, and changes them. */
 export class LiveSensors {
-  #simulation = "";
-  /** @type {string[]} topics of its pictures */
-  #offered = [];
-  /** @type {string[]} topics of pictures that the strip has subscribed to */
-  #topics = [];
-  /** @type {Map<string, unknown>} values of the parameters of the node */
-  #values = new Map();
+  /** Name of the simulation that is shown live; empty if there is none, or there are several. */
+  station = "";
+  /** @type {Set<string>} topics of frames that the strip has subscribed to */
+  #topics = new Set();
   #isOpen = false;
-  #isAsked = false;
+  /** @type {Record<string, object>} sections of all sensors as they are, or as the user wants them */
+  #sections = {};
+  #isAsking = false;
+  #isChanged = false;
 
-  /** @param {import("./live.js").Live} live */
-  constructor(live) {
-    this.live = live;
+  /**
+   * @param {object} parts
+   * @param {import("./live.js").Live} parts.live
+   * @param {import("./sensor_strip.js").SensorStrip} parts.strip
+   */
+  constructor({ live, strip }) {
+    Object.assign(this, { live, strip });
     get("show-sensors").addEventListener("click", () => (this.#isOpen ? this.#close() : this.#open()));
+  }
+
+  /** See `Source`. */
+  mayChange() {
+    return true;
+  }
+
+  /** See `Source`. The node gets the newest sections when it has answered the request before. */
+  async change(name, section) {
+    this.#sections = { ...this.#sections, [name]: section ?? undefined };
+    this.#isChanged = true;
+    if (this.#isAsking) return;
+    this.#isAsking = true;
+    try {
+      while (this.#isChanged) {
+        this.#isChanged = false;
+        const value = { type: STRING, string_value: JSON.stringify(this.#sections) };
+        const { results } = await this.live.call(`/${this.station}/sensors/set_parameters`, "rcl_interfaces/srv/SetParameters", { parameters: [{ name: "sensors", value }] });
+        const { successful, reason } = results[0] ?? { reason: "its node has no sensors" };
+        this.strip.tell(successful ? "" : reason);
+        if (!successful && !this.#isChanged) this.#forget();
+      }
+    } catch ({ message }) {
+      this.strip.tell(message);
+      this.#forget();
+    } finally {
+      this.#isAsking = false;
+    }
   }
 
   /** Follow the choice of the simulation that is shown live; called for each picture of the view. */
   follow() {
     const { simulations } = this.live;
     const [name] = simulations.size === 1 ? simulations : [""];
-    if (name === this.#simulation) return;
+    if (name === this.station) return;
     this.#close();
-    this.#simulation = name;
-    get("show-sensors").hidden = true;
-    if (name) this.#find(name);
-  }
-
-  /** Offer the strip if the simulation has cameras; the connection may be open, and topics known, a little later. */
-  async #find(name) {
-    for (let tries = 0; tries < TRIES && name === this.#simulation; tries++) {
-      const found = await this.live.call("/rosapi/topics_for_type", "rosapi_msgs/srv/TopicsForType", { type: IMAGE }).catch(() => null);
-      if (name !== this.#simulation) return;
-      this.#offered = (found?.topics ?? []).filter((topic) => topic.startsWith(`/${name}/`)).sort();
-      get("show-sensors").hidden = !this.#offered.length;
-      if (this.#offered.length) return;
-      await new Promise((resolve) => setTimeout(resolve, WAIT_MS));
-    }
+    this.station = name;
+    get("show-sensors").hidden = !name;
   }
 
   #open() {
     this.#isOpen = true;
-    this.#isAsked = false;
     get("show-sensors").setAttribute("aria-pressed", "true");
-    get("live-sensors").hidden = false;
-    setText(get("live-sensors-note"), "waiting for the first pictures …");
-    this.#topics = this.#offered;
-    for (const topic of this.#topics) {
-      const title = topic.split("/").slice(2, -1).join(": ");
-      const canvas = make("canvas", { role: "img", "aria-label": `live picture of ${title}` });
-      get("live-pictures").append(make("figure", {}, canvas, make("figcaption", {}, title)));
-      this.live.subscribe(topic, IMAGE, (image) => this.#draw(canvas, image), PERIOD_MS);
-    }
+    this.strip.put(this, []);
+    this.strip.tell("waiting for the sensors …");
+    // This subscription lets the simulation start the node that renders pictures.
+    this.live.subscribe(`/${this.station}/sensors`, "std_msgs/msg/String", ({ data }) => this.#put(JSON.parse(data)));
   }
 
   #close() {
-    for (const topic of this.#topics) this.live.unsubscribe(topic);
-    this.#topics = [];
+    if (!this.#isOpen) return;
     this.#isOpen = false;
-    this.#values.clear();
+    for (const topic of [...this.#topics, `/${this.station}/sensors`]) this.live.unsubscribe(topic);
+    this.#topics.clear();
     get("show-sensors").setAttribute("aria-pressed", "false");
-    get("live-sensors").hidden = true;
-    get("live-pictures").replaceChildren();
-    get("live-keys").replaceChildren();
+    if (this.strip.source === this) this.strip.put(null, []);
   }
 
-  #draw(canvas, image) {
-    const { width, height } = image;
-    const pixels = paintImage(image);
-    if (!pixels) return;
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    canvas.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
-    // The node of the sensors has been started by the subscription, so its parameters are there now.
-    if (!this.#isAsked) this.#fetchKeys();
-  }
-
-  async #fetchKeys() {
-    this.#isAsked = true;
-    setText(get("live-sensors-note"), "");
-    const name = this.#simulation;
-    const ask = (what, args) => this.#ask(`/${name}/sensors/${what}`, `rcl_interfaces/srv/${what.replace(/(^|_)(\w)/g, (_all, _dash, letter) => letter.toUpperCase())}`, args);
-    const listed = await ask("list_parameters", { prefixes: ["sensors"], depth: 0 });
-    const names = listed?.result.names ?? [];
-    const [described, given] = await Promise.all([ask("describe_parameters", { names }), ask("get_parameters", { names })]);
-    if (!described || !given || !this.#isOpen || name !== this.#simulation) return;
-    described.descriptors.forEach((each, i) => this.#values.set(each.name, given.values[i][VALUES[each.type]]));
-    const sliders = described.descriptors.flatMap((each) => {
-      const [range] = [...each.floating_point_range, ...each.integer_range];
-      return range && !each.read_only ? [this.#makeSlider(each, range)] : [];
-    });
-    const copy = makeButton("Copy as YAML", () => this.#copy());
-    get("live-keys").replaceChildren(make("div", { className: "row" }, ...sliders), make("div", { className: "row" }, copy));
-  }
-
-  #makeSlider({ name, type, description }, { from_value: from, to_value: to }) {
-    const value = this.#values.get(name);
-    const isMetric = type === DOUBLE;
-    const reach = Math.max(isMetric ? REACH : INTEGER_REACH, Math.abs(value));
-    const input = make("input", { type: "range", min: Math.max(from, -reach), max: Math.min(to, reach), step: isMetric ? 0.01 : 1, value, title: description });
-    const output = make("output", {}, String(value));
-    input.addEventListener("input", () => this.#set(name, type, Number(input.value), output));
-    return make("label", {}, `${name.replace(/^sensors\./, "")} `, input, output);
-  }
-
-  async #set(name, type, value, output) {
-    setText(output, String(value));
-    const parameters = [{ name, value: { type, [VALUES[type]]: value } }];
-    const answer = await this.#ask(`/${this.#simulation}/sensors/set_parameters`, "rcl_interfaces/srv/SetParameters", { parameters });
-    if (!answer) return;
-    const [{ successful, reason }] = answer.results;
-    if (successful) this.#values.set(name, value);
-    setText(get("live-sensors-note"), successful ? "" : reason);
-  }
-
-  async #copy() {
-    const text = Object.entries(nest([...this.#values])).map(([name, section]) => toYaml(name, section)).join("").replaceAll(/(?<=\n)sensors:\n/g, "");
-    try {
-      await navigator.clipboard.writeText(text);
-      setText(get("live-sensors-note"), "the sensors are copied as YAML");
-    } catch {
-      setText(get("live-sensors-note"), text);
+  #put(sensors) {
+    if (!this.#isOpen) return;
+    const isFirst = !this.#topics.size;
+    if (!this.#isAsking) this.#forget(sensors);
+    this.strip.put(this, sensors);
+    if (isFirst) this.strip.tell(sensors.length ? "" : "this simulation has no sensors; add a camera");
+    const wanted = new Map(this.strip.strands.map((strand) => [`/${this.station}/${strand.sensor.name}/${TOPICS[strand.stream][0]}`, strand]));
+    for (const topic of [...this.#topics]) {
+      if (wanted.has(topic)) continue;
+      this.#topics.delete(topic);
+      this.live.unsubscribe(topic);
+    }
+    for (const [topic, strand] of wanted) {
+      if (this.#topics.has(topic)) continue;
+      this.#topics.add(topic);
+      this.live.subscribe(topic, TOPICS[strand.stream][1], (message) => this.#show(strand, message), PERIOD_MS);
     }
   }
 
-  async #ask(service, type, args) {
-    try {
-      return await this.live.call(service, type, args);
-    } catch ({ message }) {
-      setText(get("live-sensors-note"), message);
-      return null;
+  /** Forget what the user wanted: the sensors are as the node says. */
+  #forget(sensors = this.strip.sensors) {
+    this.#sections = Object.fromEntries(sensors.map(({ name, section }) => [name, section]));
+  }
+
+  #show(strand, message) {
+    if (strand.canvas) {
+      strand.draw(paintImage(strand.stream, message), message);
+      return;
     }
+    const { station, view } = this.strip;
+    // Infinite ranges are null in JSON.
+    const buffer = message.ranges ? Float32Array.from(message.ranges, (range) => range ?? Infinity).buffer : decode(message.data);
+    station?.sensors.setPoints(strand.sensor.name, pointsOf(strand.sensor, buffer), station.robot);
+    view.touch();
   }
 }

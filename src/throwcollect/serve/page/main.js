@@ -16,7 +16,8 @@ import { REPLAY, Replay } from "./replay.js";
 import { Meshes } from "./robot.js";
 import { Room } from "./room.js";
 import { View } from "./scene.js";
-import { Sensors } from "./sensors.js";
+import { SensorStrip } from "./sensor_strip.js";
+import { StoredSensors } from "./stored_sensors.js";
 import { inOrder, lives, steps, watchable } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
@@ -94,16 +95,17 @@ class Page {
     this.watching = new Watching({ connection, view, playback, map, meshes, tell });
     this.replay = new Replay({ connection, view, playback, map, tell, changed: () => this.#show() });
     this.watching.replay = this.replay;
-    this.sensors = new Sensors({ connection, view, playback, replay: this.replay });
+    this.strip = new SensorStrip(view);
+    this.storedSensors = new StoredSensors({ connection, playback, replay: this.replay, strip: this.strip });
     this.watching.stored.came = () => this.#offerThrows();
     this.live = new Live({ connection, view, watching: this.watching, tell, choose: () => this.#chooseOne() });
-    this.liveSensors = new LiveSensors(this.live);
+    this.liveSensors = new LiveSensors({ live: this.live, strip: this.strip });
     this.plots = new Plots({ view, playback, live: this.live });
     this.watching.described = (simulation, urdf) => this.plots.bind(simulation, urdf);
     const watch = (id) => this.#watch(id);
     this.models = new Models({ connection, map, changed: () => this.#showBoxes() });
     this.target = new Target({ view, map, live: this.live, aim: (place) => this.models.aimAt(place) });
-    this.room = new Room({ view, map, target: this.target, plots: this.plots, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
+    this.room = new Room({ view, map, target: this.target, plots: this.plots, strip: this.strip, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
     this.controls = new Controls(connection, watch);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
     this.#restoreLayout();
@@ -357,8 +359,9 @@ class Page {
   #advance(seconds) {
     this.playback.step(seconds);
     this.watching.pose(this.live.simulations);
-    this.sensors.follow();
+    this.storedSensors.follow();
     this.liveSensors.follow();
+    this.strip.follow();
     this.plots.draw();
     this.#showTransport();
   }

@@ -1,12 +1,13 @@
 /** The view in the room of a user with a headset (WebXR, immersive-ar): placed on the floor, with a target in the hand. */
 
 import {
-  BufferGeometry, Line, LineBasicMaterial, Mesh, MeshBasicMaterial, PerspectiveCamera, Quaternion, Raycaster, RingGeometry, Vector3,
+  BufferGeometry, Line, LineBasicMaterial, Matrix4, Mesh, MeshBasicMaterial, PerspectiveCamera, Quaternion, Raycaster, RingGeometry, Vector3,
 } from "./vendor/three/build/three.module.js";
 import { InfoBoard, MapBoard, PlotBoard } from "./boards.js";
 import { get, setText } from "./dom.js";
 import { makeMarker } from "./marker.js";
 import { TARGET_COLOR } from "./outcomes.js";
+import { RoomSensors } from "./room_sensors.js";
 
 const FEATURES = { requiredFeatures: ["local-floor"], optionalFeatures: ["hit-test", "hand-tracking"] };
 const UP = new Vector3(0, 1, 0);
@@ -23,6 +24,8 @@ const BELOW_M = 0.5;
 const PLOT_HEIGHT_M = 0.33;
 /** Distance of a plot in front of the link that it follows, so that no robot hides it [m]. */
 const BEFORE_M = 0.4;
+/** Distance of a new camera in front of the user [m]. */
+const WITHIN_REACH_M = 0.6;
 
 /** Enters and leaves a room. */
 export class Room {
@@ -46,12 +49,14 @@ export class Room {
    * @param {import("./landing_map.js").LandingMap} parts.map
    * @param {import("./target.js").Target} parts.target
    * @param {import("./plots.js").Plots} parts.plots
+   * @param {import("./sensor_strip.js").SensorStrip} parts.strip
    * @param {(text: string) => void} parts.tell shows what is wrong
    * @param {(seconds: number) => void} parts.advance moves replays and live simulations on
    * @param {() => import("./boards.js").Facts} parts.facts returns what the info board shows
    */
-  constructor({ view, map, target, plots, tell, advance, facts }) {
-    Object.assign(this, { view, map, target, plots, tell, advance, facts });
+  constructor({ view, map, target, plots, strip, tell, advance, facts }) {
+    Object.assign(this, { view, map, target, plots, strip, tell, advance, facts });
+    this.sensors = new RoomSensors(view, strip);
     this.button = get("enter-room");
     this.button.addEventListener("click", () => this.#toggle());
     navigator.xr?.addEventListener("devicechange", () => this.#offer());
@@ -88,14 +93,18 @@ export class Room {
   async #enter(session) {
     const { view } = this;
     session.addEventListener("end", () => this.#leave());
+    session.addEventListener("selectstart", ({ frame, inputSource }) => this.#take(frame, inputSource));
     session.addEventListener("select", ({ frame, inputSource }) => this.#select(frame, inputSource));
+    session.addEventListener("selectend", ({ frame, inputSource }) => this.#moveSensor(frame, inputSource, true));
     this.isEntered = true;
     this.#isPlaced = false;
     this.#finder = undefined;
     view.enterRoom();
+    this.strip.enter(true);
     view.world.visible = false;
     this.info = new InfoBoard([
       { text: "Place again", isOffered: () => true, act: () => this.#placeAgain() },
+      { text: "Add a camera", isOffered: () => this.strip.source !== null, act: () => this.#addCamera() },
       { text: "Leave", isOffered: () => true, act: () => session.end() },
     ]);
     this.mapBoard = new MapBoard(this.map);
@@ -116,6 +125,8 @@ export class Room {
     const { view } = this;
     view.renderer.setAnimationLoop(null);
     for (const board of [this.info, this.mapBoard, ...this.#plotBoards.values()]) board.dispose();
+    this.sensors.dispose();
+    this.strip.enter(false);
     for (const source of [...this.#hands.keys()]) this.#drop(source);
     this.reticle.geometry.dispose();
     this.reticle.material.dispose();
@@ -144,6 +155,7 @@ export class Room {
       if (ahead.lengthSq() > 1e-3) this.#ahead = ahead.normalize();
       if (!this.#isPlaced) this.#find(frame, space);
     }
+    for (const source of frame.session.inputSources) if (this.sensors.holds(source)) this.#moveSensor(frame, source);
     const rays = this.#showHands(frame, space);
     this.#showBoards(rays);
     this.view.drawRoom(this.#camera);
@@ -180,6 +192,25 @@ export class Room {
     this.reticle.visible = false;
   }
 
+  /** Take the sensor that a hand points at, unless a board is in between. */
+  #take(frame, source) {
+    const space = this.view.renderer.xr.getReferenceSpace();
+    const [ray, hand] = [rayOf(frame, source, space), poseOf(frame, source, space)];
+    if (!ray || !this.#isPlaced || ray.intersectObjects(this.#boards.map(({ mesh }) => mesh)).length) return;
+    this.sensors.take(source, ray.ray, hand);
+  }
+
+  /** Add a camera before the user, where a hand reaches it. */
+  #addCamera() {
+    const place = this.#eye.clone().addScaledVector(this.#ahead, WITHIN_REACH_M).addScaledVector(UP, -WITHIN_REACH_M / 2);
+    this.strip.add(this.view.toWorld(place).toArray());
+  }
+
+  #moveSensor(frame, source, isLast = false) {
+    const hand = poseOf(frame, source, this.view.renderer.xr.getReferenceSpace());
+    if (hand) this.sensors.move(source, hand, isLast);
+  }
+
   #select(frame, source) {
     const space = this.view.renderer.xr.getReferenceSpace();
     if (!this.#isPlaced) {
@@ -192,6 +223,8 @@ export class Room {
       hit.object.userData.board.press(hit.uv);
       return;
     }
+    // A hand that lets a sensor go sets no target. Some devices select before they say that a selection begins.
+    if (this.sensors.holds(source) || (ray && this.sensors.find(ray.ray))) return;
     const place = placeOf(frame, source, space) ?? meetFloor(ray, this.view.world.position.y);
     if (place) this.target.set(this.view.toWorld(place).toArray());
   }
@@ -237,7 +270,7 @@ export class Room {
   }
 
   get #boards() {
-    return [this.info, ...this.#plotBoards.values()].filter(({ mesh }) => mesh.visible);
+    return [this.info, ...this.#plotBoards.values(), ...this.sensors.boards].filter(({ mesh }) => mesh.visible);
   }
 
   #showBoards(rays) {
@@ -253,6 +286,7 @@ export class Room {
     this.info.show(this.facts(), pointed.find((each) => each !== null) ?? null);
     this.mapBoard.show();
     this.#showPlots();
+    this.sensors.show(this.#eye, this.#isPlaced);
   }
 
   #showPlots() {
@@ -306,6 +340,12 @@ function placeOf(frame, source, space) {
   const finger = source.hand?.get("index-finger-tip");
   const pose = finger ? frame.getJointPose(finger, space) : frame.getPose(source.targetRaySpace, space);
   return pose ? new Vector3().copy(pose.transform.position) : null;
+}
+
+/** Pose of an input in the room, along whose negative z axis it points; null if it is unknown. */
+function poseOf(frame, source, space) {
+  const pose = frame.getPose(source.targetRaySpace, space);
+  return pose ? new Matrix4().fromArray(pose.transform.matrix) : null;
 }
 
 /** Raycaster along the direction in which an input points; null if that is unknown. */

@@ -120,6 +120,28 @@ export function linesOf({ section }) {
   return Float32Array.from([...lines, corners[0], top, top, corners[1]].flat());
 }
 
+/**
+ * @param {[number, number, number, number]} turn as x, y, z, w
+ * @returns {[number, number, number]} rotations about the fixed axes x, y, z, in this order [rad]
+ */
+export function rpyOf([x, y, z, w]) {
+  return [
+    Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+    Math.asin(Math.max(-1, Math.min(1, 2 * (w * y - z * x)))),
+    Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+  ];
+}
+
+/** @returns {number[]} the point 1 m in front of a sensor with these angles [m] */
+export function aimAlong([x, y, z], [, pitch, yaw]) {
+  return [x + Math.cos(pitch) * Math.cos(yaw), y + Math.cos(pitch) * Math.sin(yaw), z - Math.sin(pitch)];
+}
+
+/** @returns {number[]} angles of a sensor that looks at a point, with its z upwards [rad] */
+export function anglesTo([x, y, z], [atX, atY, atZ]) {
+  return [0, Math.atan2(z - atZ, Math.hypot(atX - x, atY - y)), Math.atan2(atY - y, atX - x)];
+}
+
 function write(value) {
   if (Array.isArray(value)) return `[${value.map(write).join(", ")}]`;
   if (typeof value === "number") return String(Number(value.toPrecision(6)));

@@ -41,7 +41,7 @@ export class SensorMarks {
    * @param {import("./robot.js").Robot | null} robot
    */
   follow(robot) {
-    for (const { sensor, lines } of this.#marks.values()) lines.matrix.copy(poseOf(sensor, robot));
+    for (const { sensor, lines } of this.#marks.values()) lines.matrix.copy(this.poseOf(sensor, robot));
   }
 
   /**
@@ -54,7 +54,7 @@ export class SensorMarks {
     if (!mark) return;
     mark.points.geometry.dispose();
     mark.points.geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(points, 3));
-    mark.points.matrix.copy(poseOf(mark.sensor, robot));
+    mark.points.matrix.copy(this.poseOf(mark.sensor, robot));
   }
 
   clear() {
@@ -65,11 +65,15 @@ export class SensorMarks {
     this.#marks.clear();
     this.object.clear();
   }
-}
 
-/** Pose of a sensor in the frame world. */
-function poseOf({ position_m: place, rotation_xyzw: turn, section }, robot) {
-  const pose = new Matrix4().compose(new Vector3(...place), new Quaternion(...turn), new Vector3(1, 1, 1));
-  const link = robot?.poseOf(section.link);
-  return link ? link.multiply(pose) : pose;
+  /**
+   * @param {import("./sensor_frames.js").Sensor} sensor
+   * @param {import("./robot.js").Robot | null} robot
+   * @returns {Matrix4} pose of the sensor in the frame world
+   */
+  poseOf({ position_m: place, rotation_xyzw: turn, section }, robot) {
+    const pose = new Matrix4().compose(new Vector3(...place), new Quaternion(...turn), new Vector3(1, 1, 1));
+    const link = robot?.poseOf(section.link);
+    return link ? link.multiply(pose) : pose;
+  }
 }
