@@ -125,6 +125,7 @@ export class StoredSensors {
       const wanted = JSON.stringify([this.#path, section, time]);
       if (wanted === camera.asked) continue;
       camera.asked = wanted;
+      if (!camera.sensor) this.strip.tell("waiting for the picture …");
       this.#isAsking = true;
       try {
         const answer = await this.connection.ask("POST", `${this.#path}/picture`, { camera: section, time_s: time });
