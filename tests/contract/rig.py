@@ -109,15 +109,17 @@ class Rig:
         self.spin(lambda: False, seconds)
 
     def close(self) -> None:
+        self._close_nodes()
+        for context in self.contexts:
+            context.try_shutdown()
+        if ON_DDS:
+            # An action refers to itself, so its node would stay in its domain, where a later test would see it.
+            gc.collect()
+
+    def _close_nodes(self) -> None:
         # Without a timeout, an executor of rclpy would wait for tasks.
         options: Any = {"timeout_sec": 0} if ON_RCLPY else {}
         for executor, node in self.executors:
             executor.shutdown(**options)
             node.destroy_node()
-        for context in self.contexts:
-            context.try_shutdown()
-        if ON_DDS:
-            # An action refers to itself, so its node would stay in its domain, where a later test would see it.
-            del executor, node
-            self.executors.clear()
-            gc.collect()
+        self.executors.clear()
