@@ -98,10 +98,7 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     # Files of robot and bodies are named as in the plan, but read where they are now.
     placed = sources[0].config
     if sensors is not None:
-        plan = replace(plan, config=with_sensors(plan.config, sensors))
-        for key in plan.keys:
-            if key.startswith("sensors.") and (reason := reason_not_sweepable(plan.config, key)):
-                raise ConfigError([Problem(f"the dataset sweeps it, so the sensors should have it: {reason}", key)])
+        plan = _with_sensors(plan, sensors)
         placed = placed.model_copy(update={"sensors": plan.config.sensors})
         check_sensors(placed)
     elif any(source.config.sensors != plan.config.sensors for source in sources):
@@ -135,8 +132,7 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
         held = list(members)
         runs = ((number, episode_run(next(episodes))) for number, _ in held)
         with replacing(directory / name) as descriptor:
-            write = partial(write_all, descriptor)
-            finished = write_runs(write, channels, runs, name=name)
+            finished = write_runs(partial(write_all, descriptor), channels, runs, name=name)
         recordings += [finished.recording] if finished.recording else []
         tables.append(
             table.table(
@@ -156,6 +152,15 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     write_provenance(directory, provenance)
     write_description(directory, plan.config.name, throws, channels, recordings)
     return len(copies), Dataset.open(directory).digest
+
+
+def _with_sensors(plan: Plan, sensors: SensorSections) -> Plan:
+    """Make a copy of a plan with other sensors, among whose numbers are those that it sweeps."""
+    config = with_sensors(plan.config, sensors)
+    for key in plan.keys:
+        if key.startswith("sensors.") and (reason := reason_not_sweepable(config, key)):
+            raise ConfigError([Problem(f"the dataset sweeps it, so the sensors should have it: {reason}", key)])
+    return replace(plan, config=config)
 
 
 def _check_copies(copies: Sequence[Copy], plan: Plan) -> None:

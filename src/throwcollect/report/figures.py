@@ -139,7 +139,7 @@ def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:
 
 def draw_limit_boxes(peaks: Mapping[str, NDArray[np.float64]]) -> go.Figure:
     """Draw the peaks of each joint over their limit, as `summarise_peaks` finds them, the first joint on top."""
-    rows = list(reversed(peaks.items()))
+    rows = [*peaks.items()][::-1]
     low, first, median, third, high = np.transpose(
         [np.percentile(shares, [0, 25, 50, 75, 100]) for _, shares in rows]
     ).tolist()
