@@ -50,12 +50,9 @@ def init(*, robot: str = "talos", flange: FlangeOption = None, task: str = "thro
 def _search_beginning(robot: str, section: RobotConfig, task: str) -> Beginning:
     from throwcollect.extras import is_installed
     from throwcollect.learning.first_throw import find_first_throw
-    from throwcollect.tasks.starter import Beginning
 
     engine = "bullet" if is_installed("pybullet") else "mujoco"
-    found = find_first_throw(section, task, engine, say=tell)
-    tell(f"found a throw of {found.distance_m:.2f} m; {found.landed:.0%} of the trials about it land")
-    return Beginning(write_robot(robot, section), found.start, found.end, found.duration_s, found.ranges)
+    return find_first_throw(section, write_robot(robot, section), task, engine, say=tell)
 
 
 def config(

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import product
@@ -25,6 +25,7 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.trials import Trial
+from throwcollect.tasks.starter import Beginning
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.wording import blank_numbers, format_count
 
@@ -54,27 +55,6 @@ _ENOUGH = 12
 
 
 @dataclass(frozen=True)
-class FirstThrow:
-    """A throw that lands, and ranges in which nearly all throws land.
-
-    Attributes:
-        start: Angle of each joint at the start [rad].
-        end: Angle at the end of the joints that move [rad].
-        duration_s: Duration of the motion.
-        ranges: Least and greatest value of the keys to sweep.
-        landed: Share of the trials of a grid over the ranges that landed [-].
-        distance_m: How far the throw lands from the robot's base.
-    """
-
-    start: Mapping[str, float]
-    end: Mapping[str, float]
-    duration_s: float
-    ranges: Mapping[str, tuple[float, float]]
-    landed: float
-    distance_m: float
-
-
-@dataclass(frozen=True)
 class _Candidate:
     speed: float
     start: NDArray[np.float64]
@@ -82,11 +62,14 @@ class _Candidate:
     duration_s: float
 
 
-def find_first_throw(robot: RobotConfig, task: str, engine: str, *, say: Callable[[str], None]) -> FirstThrow:
-    """Search a throw of a robot.
+def find_first_throw(
+    robot: RobotConfig, lines: Sequence[str], task: str, engine: str, *, say: Callable[[str], None]
+) -> Beginning:
+    """Search a throw of a robot that lands, and ranges in which nearly all throws land.
 
     Args:
         robot: The complete section of the robot.
+        lines: What a configuration has of it.
         task: Name of the task.
         engine: Name of the physics engine.
         say: Is given progress, a line at a time.
@@ -94,13 +77,15 @@ def find_first_throw(robot: RobotConfig, task: str, engine: str, *, say: Callabl
     Raises:
         ConfigError: If no throw was found; the message has what failed how often.
     """
-    return _Search(robot, task, engine, say).run()
+    return _Search(robot, lines, task, engine, say).run()
 
 
 class _Search:
-    def __init__(self, robot: RobotConfig, task: str, engine: str, say: Callable[[str], None]) -> None:
+    def __init__(
+        self, robot: RobotConfig, lines: Sequence[str], task: str, engine: str, say: Callable[[str], None]
+    ) -> None:
         self._robot: Robot = robot.find()
-        self._say = say
+        self._lines, self._say = lines, say
         self._keys = {"robot": robot, "sim": {"engine": engine}}
         self._task = task
         self._tried: Counter[str] = Counter()
@@ -118,7 +103,7 @@ class _Search:
         self._carrying = [index for index in self._postures.carrying if self._velocity[index] > 0]
         self._base_m = robot.base_height_m
 
-    def run(self) -> FirstThrow:
+    def run(self) -> Beginning:
         begin = time.monotonic()
         starts, angle = self._postures.find_upright(_STARTS)
         if not starts:
@@ -222,7 +207,7 @@ class _Search:
             return None
         return math.hypot(float(result["landing_x_m"]), float(result["landing_y_m"]))
 
-    def _spread(self, candidate: _Candidate, distance: float) -> FirstThrow | None:
+    def _spread(self, candidate: _Candidate, distance: float) -> Beginning | None:
         """Find ranges about a throw in which nearly all trials land; None if there are none."""
         moving = [index for index in self._carrying if abs(candidate.end[index] - candidate.start[index]) > 1e-4]
         config = self._make_config(candidate.start, candidate.end, candidate.duration_s, moving)
@@ -243,7 +228,8 @@ class _Search:
                 share = sum(self._throw(point, feasibility, simulator) is not None for point in grid) / len(grid)
                 self._say(f"{share:.0%} land with {joint} from {low:.2f} to {high:.2f} rad")
                 if share >= _LEAST_SHARE:
+                    self._say(f"found a throw of {distance:.2f} m; {share:.0%} of the trials about it land")
                     task = config.task
-                    return FirstThrow(task.start, task.end, task.duration_s, ranges, share, distance)
+                    return Beginning(self._lines, task.start, task.end, task.duration_s, ranges)
                 half, slower = half / 2, 1 + (slower - 1) / 2
         return None
