@@ -173,9 +173,9 @@ class LearnedMap:
         # Each throw keeps its own residual, as only the world around it changes.
         return self.residuals + self.forward.predict(moved) + self.correction.offset
 
-    def correct(self, correction: Correction) -> LearnedMap:
-        """The map of another world, learned from the same throws."""
-        other = replace(self, correction=correction)
+    def correct(self, correction: Correction | None) -> LearnedMap:
+        """The map of another world, or with None of the dataset's own world, learned from the same throws."""
+        other = replace(self, correction=correction or _no_correction(self.axes, self.targets))
         # The throws are the same, so cached values that were computed from them are reused.
         vars(other).update(inputs=self.inputs, residuals=self.residuals)
         return other
@@ -207,7 +207,7 @@ def find_nearest(squares: Vector, count: int) -> NDArray[np.intp]:
     return few[np.argsort(squares[few], kind="stable")][:count]
 
 
-def no_correction(axes: tuple[Axis, ...], targets: tuple[str, ...]) -> Correction:
+def _no_correction(axes: tuple[Axis, ...], targets: tuple[str, ...]) -> Correction:
     """Make the correction of the dataset's own world, whose latents are those of its configuration."""
     latents = tuple(axis for axis in axes if axis.role is KeyRole.LATENT)
     nominal = np.array([axis.nominal for axis in latents], np.float64)
@@ -253,7 +253,7 @@ def fit_throws(
     degree = min(errors, key=errors.__getitem__)
     forward = fit_polynomial(inputs, outputs, degree, minor=minor)
     effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, degree))
-    correction = no_correction(axes, targets)
+    correction = _no_correction(axes, targets)
     return LearnedMap(kind, axes, targets, forward, effort, values, outputs, efforts, correction), errors, blind
 
 

@@ -24,7 +24,7 @@ from throwcollect.learning.learned_map import EFFORT, Correction, KeyRole, Learn
 from throwcollect.learning.model_card import ModelCard
 from throwcollect.learning.polynomial import Array, ModelEntry
 from throwcollect.learning.score import Score
-from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
+from throwcollect.learning.scoring import Simulates, score_model
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 from throwcollect.version import __version__
 from throwcollect.wording import command, format_count
@@ -164,7 +164,7 @@ class Model(ModelCard):
             check_bounds(name, number, least=1)
         check_bounds("seed", seed, least=0)
         _check_scatter(scatter)
-        distilled = None if self.distilled is None else distil(leave_out_correction(self.learned))
+        distilled = None if self.distilled is None else distil(self.learned.correct(None))
         return score_model(
             self.learned,
             simulator,

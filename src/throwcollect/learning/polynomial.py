@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import combinations_with_replacement
+from operator import add
 from typing import Annotated, Any
 
 import numpy as np
@@ -127,7 +128,7 @@ def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, m
             log.note(len(errors) * len(numbers) + len(parts))
         distances = np.empty(len(inputs))
         for fold, left_out in zip(numbers, parts, strict=True):
-            others = _Sums.add([part for part in parts if part is not left_out])
+            others = reduce(add, [part for part in parts if part is not left_out])
             held = folds == fold
             missed = _solve(exponents, others).predict(inputs[held]) - outputs[held]
             distances[held] = np.linalg.norm(missed, axis=1)
@@ -168,13 +169,8 @@ class _Sums:
         transposed = np.ascontiguousarray(terms.T)
         return cls(len(inputs), matmul(transposed, terms), matmul(transposed, outputs))
 
-    @classmethod
-    def add(cls, parts: Sequence[_Sums]) -> _Sums:
-        squares, products = parts[0].squares.copy(), parts[0].products.copy()
-        for part in parts[1:]:
-            squares += part.squares
-            products += part.products
-        return cls(sum(part.samples for part in parts), squares, products)
+    def __add__(self, more: _Sums) -> _Sums:
+        return _Sums(self.samples + more.samples, self.squares + more.squares, self.products + more.products)
 
 
 def _solve(exponents: NDArray[np.int64], sums: _Sums) -> Polynomial:

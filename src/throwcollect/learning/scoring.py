@@ -20,7 +20,6 @@ from throwcollect.learning.learned_map import (
     count_needed_throws,
     find_nearest,
     fit_throws,
-    no_correction,
     number_cells,
 )
 from throwcollect.learning.polynomial import Array
@@ -86,7 +85,7 @@ def score_model(
         processes: How many processes simulate.
     """
     context = _find_nominal_context(learned)
-    plain = leave_out_correction(learned)
+    plain = learned.correct(None)
     given = np.tile(context, (count, 1))
     needed = count_needed_throws(len(learned.axes_of(KeyRole.PARAMETER)))
     sizes = [size for size in SIZES if needed <= size < len(learned.values)]
@@ -131,11 +130,6 @@ def score_model(
         adapted=adapted,
         adapted_throws=adapted_throws,
     )
-
-
-def leave_out_correction(learned: LearnedMap) -> LearnedMap:
-    """Make the map of the dataset's own world."""
-    return learned.correct(no_correction(learned.axes, learned.targets))
 
 
 def _adapt_step_by_step(
