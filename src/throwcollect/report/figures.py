@@ -21,7 +21,6 @@ from throwcollect.report.contents import Tile
 from throwcollect.report.measured import (
     Outcomes,
     SweptKey,
-    Throughput,
     choose_points,
     in_words,
     read_numbers,
@@ -41,6 +40,8 @@ _MOST_MATRIX_POINTS = 8000
 """Most points in all panels of the matrix together; a browser redraws more points slowly."""
 _LEAST_ROOM_M = 0.15
 """Least room around the points of a map, so that a bin around them can be seen."""
+_INTERVALS = 40
+"""Most intervals of time in which trials are counted."""
 _CELL_PX = 128
 _CELL_GAP = 0.012
 
@@ -162,16 +163,18 @@ def draw_limit_boxes(peaks: Mapping[str, NDArray[np.float64]]) -> go.Figure:
     return figure.update_layout(height=120 + 46 * len(rows))
 
 
-def draw_throughput(throughput: Throughput, noun: str) -> go.Figure:
-    """Draw trials a second over the time of collecting; `noun` is the word for a trial."""
-    total_s = throughput.edges_s[-1]
+def draw_throughput(times: Mapping[str, list[float]], total_s: float, noun: str) -> go.Figure:
+    """Draw trials a second over the time of collecting, as `measure_times` finds it; `noun` is the word for a trial."""
+    commits = times["commit"]
+    edges_s = np.linspace(0, total_s, min(_INTERVALS, max(len(commits) // 5, 1)) + 1)
+    rate_per_s = np.histogram(commits, edges_s)[0] / np.diff(edges_s)
     unit, seconds = ("h", 3600) if total_s > 7200 else ("min", 60) if total_s > 120 else ("s", 1)
-    edges = throughput.edges_s / seconds
+    edges = edges_s / seconds
     figure = go.Figure(
         go.Scatter(
             # Each rate is a step from one edge to the next, so each edge appears twice, but the first and last once.
             x=np.repeat(edges, 2)[1:-1],
-            y=np.repeat(throughput.rate_per_s, 2),
+            y=np.repeat(rate_per_s, 2),
             mode="lines",
             fill="tozeroy",
             line={"color": BLUE, "width": 1.5},
@@ -179,15 +182,16 @@ def draw_throughput(throughput: Throughput, noun: str) -> go.Figure:
             hovertemplate=f"%{{y:.1f}} {noun}s/s<extra></extra>",
         )
     )
-    for times_s, name, symbol, colour in (
-        (throughput.failed_s, "a simulation did not bring a trial back", "x", "#D55E00"),
-        (throughput.lost_s, "a trial was lost", "diamond", NEUTRAL),
+    for kind, name, symbol, colour in (
+        ("fail", "a simulation did not bring a trial back", "x", "#D55E00"),
+        ("lost", "a trial was lost", "diamond", NEUTRAL),
     ):
-        if times_s:
-            x = np.array(times_s)[choose_points(len(times_s), 500)] / seconds
+        if times[kind]:
+            x = np.array(times[kind])[choose_points(len(times[kind]), 500)] / seconds
             marker = {"symbol": symbol, "color": colour, "size": 9}
             figure.add_scatter(x=x, y=np.zeros(len(x)), mode="markers", name=name, marker=marker, cliponaxis=False)
-    for time_s in throughput.resumed_s:
+    # The first opening began the collection; each later one resumed it.
+    for time_s in times["opened"][1:]:
         figure.add_vline(x=time_s / seconds, line=MOMENT_LINE)
     figure.update_xaxes(title=f"time spent collecting [{unit}]", range=[0, edges[-1]])
     figure.update_yaxes(title=f"{noun}s per second [1/s]", rangemode="tozero")

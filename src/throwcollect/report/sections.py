@@ -42,9 +42,8 @@ from throwcollect.report.measured import (
     KINDS,
     Outcomes,
     SweptKey,
-    Throughput,
     in_words,
-    measure_throughput,
+    measure_times,
     read_parameters,
     summarise_peaks,
 )
@@ -134,7 +133,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
             _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
             *task.episodes,
             *show_cameras(dataset),
-            _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
+            _show_throughput(*measure_times(read_journal(dataset.directory / JOURNAL)), info),
             _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
         ),
         noun=noun,
@@ -239,22 +238,21 @@ def _show_limits(peaks: dict[str, dict[str, NDArray[np.float64]]], noun: str) ->
     return ReportSection("limits", "Limits", title, text, (panels,))
 
 
-def _show_throughput(throughput: Throughput | None, info: Info) -> ReportSection:
-    title = "How fast it was collected"
-    if throughput is None:
+def _show_throughput(times: dict[str, list[float]], total_s: float, info: Info) -> ReportSection:
+    title, commits = "How fast it was collected", len(times["commit"])
+    if not commits or total_s <= 0:
         no_journal = Markup(
             "This dataset has no journal of its collection (<code>logs/journal.jsonl</code>) with {}s in it."
         ).format(info.noun)
         return ReportSection("throughput", "Throughput", title, no_journal)
-    wall_s = info.wall_s or float(throughput.edges_s[-1])
-    mean = throughput.commits / wall_s
+    wall_s = info.wall_s or total_s
     text = (
-        f"{throughput.commits:,} {info.noun}s in {wall_s:,.1f} s, start of the nodes included; "
-        f"{mean:.1f} a second on average."
+        f"{commits:,} {info.noun}s in {wall_s:,.1f} s, start of the nodes included; "
+        f"{commits / wall_s:.1f} a second on average."
     )
-    if resumed := len(throughput.resumed_s):
+    if (resumed := len(times["opened"]) - 1) > 0:
         text += f" It was resumed {f'{resumed} times' if resumed > 1 else 'once'} (dotted); the pauses are left out."
-    panel = Panel("rate", f"{info.noun.capitalize()}s a second", figures.draw_throughput(throughput, info.noun))
+    panel = Panel("rate", f"{info.noun.capitalize()}s a second", figures.draw_throughput(times, total_s, info.noun))
     return ReportSection("throughput", "Throughput", title, text, ((panel,),))
 
 

@@ -11,12 +11,12 @@ import pytest
 
 from throwcollect.dataset.journal import JournalLine
 from throwcollect.dataset.reader import Dataset
-from throwcollect.report.figures import draw_limit_boxes
+from throwcollect.report.figures import draw_limit_boxes, draw_throughput
 from throwcollect.report.measured import (
     Outcomes,
     SweptKey,
     choose_points,
-    measure_throughput,
+    measure_times,
     read_parameters,
     summarise_peaks,
 )
@@ -80,10 +80,16 @@ def test_throughput_leaves_pauses_out() -> None:
         JournalLine("opened", 9000.0),
         *(JournalLine("commit", 9000.0 + i) for i in range(1, 9)),
     ]
-    found = measure_throughput(events)
-    assert found is not None
-    assert (found.commits, found.edges_s[-1], found.resumed_s) == (18, 20.0, (12.0,))
-    assert (found.failed_s, found.lost_s) == ((12.0,), ())
-    assert (found.rate_per_s * np.diff(found.edges_s)).sum() == pytest.approx(18)
-    assert measure_throughput([]) is None
-    assert measure_throughput([JournalLine("commit", 5.0)]) is None
+    times, total_s = measure_times(events)
+    assert (len(times["commit"]), total_s, times["opened"]) == (18, 20.0, [0.0, 12.0])
+    assert (times["fail"], times["lost"]) == ([12.0], [])
+    figure = draw_throughput(times, total_s, "throw")
+    rates, failed = figure.data
+    assert (np.array(rates.y)[::2] * np.diff(np.array(rates.x)).max()).sum() == pytest.approx(18)
+    assert failed.x.tolist() == [12.0]
+    assert [line.x0 for line in figure.layout.shapes] == [12.0]
+    assert measure_times([])[0]["commit"] == []
+    assert measure_times([JournalLine("commit", 5.0)]) == (
+        {"commit": [0.0], "opened": [], "fail": [], "lost": []},
+        0.0,
+    )
