@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.export.exporter import Exporter
@@ -91,7 +90,11 @@ def write(source: ExportSource, directory: Path) -> None:
             if interruptions():
                 raise KeyboardInterrupt
         file[f"mask/{config.task.success}"] = np.array(succeeded, dtype="S")
-        _add_table(file.create_group("throws"), source.table, h5py.string_dtype())
+        table = file.create_group("throws")
+        for field in source.table.schema:
+            column = to_array(source.table[field.name])
+            kind = h5py.string_dtype() if column.dtype == object else None
+            table.create_dataset(field.name, data=column, dtype=kind).attrs.update(read_metadata(field))
 
 
 class _Output(io.FileIO):
@@ -170,13 +173,6 @@ def _add_signal(group: Any, name: str, signal: Signal, values: NDArray[np.float6
     stored.attrs["description"] = signal.description + when
     if signal.components:
         stored.attrs["components"] = list(signal.components)
-
-
-def _add_table(group: Any, table: pa.Table, text: Any) -> None:
-    for field in table.schema:
-        values = to_array(table[field.name])
-        stored = group.create_dataset(field.name, data=values, dtype=text if values.dtype == object else None)
-        stored.attrs.update(read_metadata(field))
 
 
 HDF5 = Exporter(describe, write, packages=("h5py",), images={"arrays": ("color", "depth"), NO_IMAGES: ()})

@@ -6,7 +6,7 @@ matrix ``targets`` and the structure ``robot_data``, with fields of the same nam
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -164,7 +164,7 @@ def _gather_throws(source: ExportSource, throws: Dataset) -> dict[str, Any]:
         "qPath": _make_cell(paths),
         "targets": np.array(targets),
         **wanted,
-        "DMP": _make_cell(_describe_primitives(motions, source.rate_hz)),
+        "DMP": _make_cell([*_describe_primitives(motions, source.rate_hz)]),
         "trial": throws["trial"].astype(np.float64)[:, np.newaxis],
         "measured": _make_cell(measured),
         "ball": _make_cell(balls),
@@ -175,45 +175,38 @@ def _stack_signals(throw: ThrowSeries, *names: str, of: Sequence[int]) -> NDArra
     return np.column_stack([throw.signals["time_s"], *(throw.signals[name][:, of] for name in names)])
 
 
-def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], rate_hz: int) -> list[dict[str, Any]]:
+def _describe_primitives(
+    motions: Sequence[tuple[JointTrajectory, TaskConfig]], rate_hz: int
+) -> Iterator[dict[str, Any]]:
     """Describe the DMPs of throws: those of their configurations, else ones fitted to the commanded motions."""
     to_fit = [motion for motion, task in motions if not isinstance(task.trajectory, DynamicMovementPrimitive)]
     fitted = iter(fit_motions(to_fit, basis_functions=BASIS_FUNCTIONS))
     # Rolling them out takes three times as long as reading the throws.
-    logged = log_progress(motions, len(motions), "motion", "described")
-    return [
-        _describe_primitive(motion, task.trajectory, task.duration_s, rate_hz)
-        if isinstance(task.trajectory, DynamicMovementPrimitive)
-        else _describe_primitive(motion, next(fitted), float(motion.times[-1]), rate_hz, fitted=True)
-        for motion, task in logged
-    ]
-
-
-def _describe_primitive(
-    trajectory: JointTrajectory, family: DynamicMovementPrimitive, tau: float, rate_hz: int, *, fitted: bool = False
-) -> dict[str, Any]:
-    times = np.linspace(0, trajectory.times[-1], FIT_POINTS)
-    positions, _, _ = sample_quintic(trajectory, times)
-    weights = np.array(
-        [family.weights.get(joint, [0.0] * family.basis_functions) for joint in trajectory.joints], dtype=np.float64
-    )
-    start, goal = trajectory.positions[0], trajectory.positions[-1]
-    motion = roll_out(times, start=start, goal=goal, weights=weights, tau=tau, family=family)[0]
-    centres, variances = kernels(count=family.basis_functions, alpha_x=family.alpha_x)
-    return {
-        "N": float(family.basis_functions),
-        "dt": 1 / rate_hz,
-        "a_z": family.alpha_z,
-        "a_x": family.alpha_x,
-        "c": centres[np.newaxis],
-        "sigma_2": variances[np.newaxis],
-        "w": weights.T,
-        "tau": tau,
-        "goal": goal[np.newaxis],
-        "y0": start[np.newaxis],
-        "fitted": float(fitted),
-        "error": np.abs(motion - positions).max(axis=0)[np.newaxis],
-    }
+    for trajectory, task in log_progress(motions, len(motions), "motion", "described"):
+        own = task.trajectory if isinstance(task.trajectory, DynamicMovementPrimitive) else None
+        family, tau = (own, task.duration_s) if own is not None else (next(fitted), float(trajectory.times[-1]))
+        times = np.linspace(0, trajectory.times[-1], FIT_POINTS)
+        positions, _, _ = sample_quintic(trajectory, times)
+        weights = np.array(
+            [family.weights.get(joint, [0.0] * family.basis_functions) for joint in trajectory.joints], dtype=np.float64
+        )
+        start, goal = trajectory.positions[0], trajectory.positions[-1]
+        motion = roll_out(times, start=start, goal=goal, weights=weights, tau=tau, family=family)[0]
+        centres, variances = kernels(count=family.basis_functions, alpha_x=family.alpha_x)
+        yield {
+            "N": float(family.basis_functions),
+            "dt": 1 / rate_hz,
+            "a_z": family.alpha_z,
+            "a_x": family.alpha_x,
+            "c": centres[np.newaxis],
+            "sigma_2": variances[np.newaxis],
+            "w": weights.T,
+            "tau": tau,
+            "goal": goal[np.newaxis],
+            "y0": start[np.newaxis],
+            "fitted": float(own is None),
+            "error": np.abs(motion - positions).max(axis=0)[np.newaxis],
+        }
 
 
 MAT = Exporter(describe, write, packages=("scipy",))
