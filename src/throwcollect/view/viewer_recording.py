@@ -79,21 +79,18 @@ class ViewRecording:
         declared += [(topic.name, topic.type_name, _SAMPLED) for topic in self._topics]
         self.channels = tuple(Channel(number, *facts) for number, facts in enumerate(declared, start=1))
         self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-        self._numbers = self._declare()
-        self._counts: Counter[int] = Counter()
-        self._times = (0, 0)
-
-    def _declare(self) -> dict[str, int]:
         self._writer.start(profile=PROFILE, library=LIBRARY)
         schemas, channels = declarations(self.channels)
         for schema in schemas:
             self._writer.register_schema(schema.name, schema.encoding, schema.data)
-        return {
+        self._numbers = {
             channel.topic: self._writer.register_channel(
                 channel.topic, channel.message_encoding, channel.schema_id, channel.metadata
             )
             for channel in channels
         }
+        self._counts: Counter[int] = Counter()
+        self._times = (0, 0)
 
     def write(self, paths: Sequence[ShownThrow], throws: Iterable[tuple[ShownThrow, Samples]]) -> None:
         """Write throws in order of time, at least one, with their samples and everything else that viewers draw.
