@@ -72,8 +72,12 @@ def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) ->
             hovertemplate="%{y} trials near %{x:.4g}<extra></extra>",
         )
         figure.update_yaxes(row=row + 1, col=row + 1, showgrid=False, rangemode="tozero")
-        last, above = parameter.short_label
-        axis: dict[str, Any] = {"range": _matrix_range(parameter), "nticks": 4, "tickfont": {"size": 9}}
+        above, _, last = parameter.key.rpartition(".")
+        above = f"{above} [{parameter.unit or '-'}]".strip()
+        ends = parameter.edges[[0, -1]]
+        low, high = (np.log10(ends) if parameter.logarithmic else ends).tolist()
+        room = 0.04 * (high - low)
+        axis: dict[str, Any] = {"range": [low - room, high + room], "nticks": 4, "tickfont": {"size": 9}}
         axis |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
         labels = {"title": {"text": f"{last}<br>{above}", "font": {"size": 10}}, "showticklabels": True}
         figure.update_xaxes(axis, col=row + 1)
@@ -104,13 +108,6 @@ def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) ->
 def count_matrix_points(parameters: Sequence[SweptKey]) -> int:
     """Count the trials that each panel of the matrix shows at most."""
     return _MOST_MATRIX_POINTS // max(len(parameters) * (len(parameters) - 1) // 2, 4)
-
-
-def _matrix_range(parameter: SweptKey) -> list[float]:
-    ends = parameter.edges[[0, -1]]
-    low, high = np.log10(ends) if parameter.logarithmic else ends
-    room = 0.04 * (high - low)
-    return [float(low - room), float(high + room)]
 
 
 def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:

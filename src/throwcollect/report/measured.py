@@ -123,12 +123,6 @@ class SweptKey:
         values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
         return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
 
-    @property
-    def short_label(self) -> tuple[str, str]:
-        """Last part of the key, and the parts before it with the unit."""
-        above, _, last = self.key.rpartition(".")
-        return last, f"{above} [{self.unit or '-'}]".strip()
-
 
 def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[SweptKey, ...]:
     """Read all swept keys of a table of throws, in its order."""
