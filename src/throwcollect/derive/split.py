@@ -11,13 +11,12 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.compute as pc
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.arguments import check_bounds, refuse_argument
@@ -96,10 +95,8 @@ def split(
     parts = {}
     with new_directory(Path(output)) as beside:
         for name, cell_of in members.items():
-            chosen = replace(
-                dataset, throws=dataset.throws.filter(pc.is_in(dataset.throws["trial"], pa.array(cell_of)))
-            )
-            derived, held = derive([chosen], beside / name, offered=len(dataset)), list(cell_of.values())
+            derived = derive([dataset.select(cell_of)], beside / name, offered=len(dataset))
+            held = list(cell_of.values())
             parts[name] = SplitPart(derived, len({cell for cell in held if cell is not None}), held.count(None))
     return Split(parts, count_without_episode(dataset))
 
