@@ -144,10 +144,7 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     provenance = Provenance.of_this_machine(
         simulations=None, wall_s=time.monotonic() - began, was_open=False, robot=channels.robot
     )
-    facts = [(source.config.name, str(source.directory), source.digest) for source in sources]
-    origins = [(copy.number, *facts[copy.source], copy.trial) for copy in copies]
-    columns = [pa.array(column, field.type) for field, column in zip(_SOURCES, zip(*origins, strict=True), strict=True)]
-    write_file(directory / SOURCES, encode_table(pa.table(columns, _SOURCES)))
+    write_file(directory / SOURCES, encode_table(_tabulate_sources(copies, sources)))
     write_file(directory / CARD, (data_card(plan.config, throws, provenance) + _describe_sources(sources)).encode())
     write_provenance(directory, provenance)
     write_description(directory, plan.config.name, throws, channels, recordings)
@@ -213,6 +210,13 @@ def _make_row(plan: Plan, number: int, row: Row) -> Row:
     trial = plan.trial(number)
     values = {column_of(key): value for key, value in trial.values.items()}
     return {**row, **values, **trial.target, "trial": number}
+
+
+def _tabulate_sources(copies: Sequence[Copy], sources: Sequence[Dataset]) -> pa.Table:
+    """Make a table with one row a trial: the dataset and trial that it comes from."""
+    facts = [(source.config.name, str(source.directory), source.digest) for source in sources]
+    rows = [(copy.number, *facts[copy.source], copy.trial) for copy in copies]
+    return pa.Table.from_pylist([dict(zip(_SOURCES.names, row, strict=True)) for row in rows], schema=_SOURCES)
 
 
 def _describe_sources(sources: Sequence[Dataset]) -> str:
