@@ -19,7 +19,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath
-from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, count_needed_throws, fit_throws
+from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, LearnedMap, count_needed_throws, fit_throws
 from throwcollect.learning.model import MODEL, Model, load_model
 from throwcollect.learning.model_card import TrainedOn
 from throwcollect.learning.polynomial import Array
@@ -72,9 +72,6 @@ def fit(
     values = np.column_stack([_read_numbers(throws, column_of(axis.key), dataset) for axis in axes])
     efforts = _read_numbers(throws, EFFORT, dataset)
     learned, errors, blind = fit_throws(chosen, axes, columns, values, outputs, efforts)
-    points = {"trial": throws["trial"].to_numpy()}
-    points |= {axis.key: values[:, number] for number, axis in enumerate(axes)}
-    points |= {target: outputs[:, number] for number, target in enumerate(columns)}
     return Model(
         version=__version__,
         kind=chosen,
@@ -97,7 +94,7 @@ def fit(
             latents_count=blind is not None and blind >= _WORTH_KNOWING * min(errors.values()),
         ),
         adaptation=None,
-        points=pa.table({**points, EFFORT: efforts}),
+        points=_tabulate(throws, learned),
         config=config_text(config),
         source=dataset.directory,
     )
@@ -164,6 +161,14 @@ def _choose_role(config: Config, key: str, parameters: Sequence[str], context: S
         return KeyRole.CONTEXT
     chosen = key in parameters if parameters else key.startswith("task.")
     return KeyRole.PARAMETER if chosen else KeyRole.LATENT
+
+
+def _tabulate(throws: pa.Table, learned: LearnedMap) -> pa.Table:
+    """Make a table of the throws that a map was learned from."""
+    columns = {"trial": throws["trial"].to_numpy()}
+    columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
+    columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
+    return pa.table({**columns, EFFORT: learned.efforts})
 
 
 def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
