@@ -1,31 +1,41 @@
-"""Adds simulations of this machine to a run of another machine; they may leave it again at any time."""
+"""Adds simulations of this machine to a run of another machine, by its token; they may leave it again at any time."""
 
 from __future__ import annotations
 
+import base64
+import binascii
+import json
 import os
 import socket
 import time
 from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.build import build_digest
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.carried_robot import unpack_robot
-from throwcollect.errors import UnreachableError, WorkerError
+from throwcollect.errors import ConfigError, UnreachableError, WorkerError
 from throwcollect.files import write_file
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import split_address
 from throwcollect.run_key import RunKey
-from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import CONFIGURATION, LAUNCHER, ROBOT_FILES, simulation_name_of, simulation_nodes
 from throwcollect.runtimes.runtime import RunContext
 from throwcollect.runtimes.supervisor import Supervisor
+from throwcollect.trial.conditions import build_of
 from throwcollect.wording import format_count
 
+_START = "tc2."
+"""Beginning of every token; the number is the version of the format."""
 _ANSWER_S = 15.0
 """Time in which the router, and then the launcher, has to answer."""
 _POLL_S = 0.1
@@ -33,6 +43,71 @@ _SILENT_S = 120.0
 """If no report arrives for this long, the run counts as over. A shorter silence may be a failure of the network."""
 _OVER_S = 5.0
 """The same time, for a run whose last trial has ended."""
+
+
+@dataclass(frozen=True)
+class JoinToken:
+    """The facts of a run that another machine needs to join it. It holds the key of the run, so it is a secret, too.
+
+    Attributes:
+        endpoint: Endpoint at which other machines reach the router.
+        secret: Secret of the key of the run, in hexadecimal.
+        build: Digest over the code that computes the run's throws with this engine, robot, tool and task; see
+            `throwcollect.build`.
+    """
+
+    run: str
+    endpoint: str
+    secret: str
+    domain_id: int
+    engine: str
+    build: str
+    robot: str = "talos"
+    tool: str = "spoon"
+    task: str = "throw"
+    policy: str = ""
+
+    @classmethod
+    def of(cls, run: str, endpoint: str, key: RunKey, config: Config) -> JoinToken:
+        """Make the token of a run with this configuration."""
+        policy = config.task.policy.use if config.task.policy else ""
+        names = config.sim.engine, build_of(config), config.robot.name, config.tool.name, config.task.name, policy
+        return cls(run, endpoint, key.secret.hex(), config.run.domain_id, *names)
+
+    def encode(self) -> str:
+        """The token as one word."""
+        text = json.dumps(asdict(self), separators=(",", ":"))
+        return _START + base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
+
+    @classmethod
+    def decode(cls, word: str) -> JoinToken:
+        """Read a token."""
+        data = word.strip().removeprefix(_START)
+        try:
+            if data == word.strip():
+                raise ValueError(word)
+            # `encode` leaves out the padding, but `b64decode` demands it.
+            text = base64.b64decode(data + "=" * (-len(data) % 4), altchars=b"-_", validate=True)
+            token = _JSON.validate_json(text)
+            bytes.fromhex(token.secret)
+            split_address(token.endpoint)
+        except (ValueError, binascii.Error, ValidationError) as error:
+            raise ConfigError("this is no token of a run, or only a part of one", expected=f"{_START}...") from error
+        return token
+
+    def check_build(self) -> None:
+        """Check that this machine would compute the same throws as the run's own machine."""
+        if self.build != build_digest(self.engine, self.robot, self.tool, self.task, self.policy):
+            raise ConfigError(
+                f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
+                f"package of the robot {self.robot}, the tool {self.tool} or the task {self.task}, and would collect "
+                "other bytes",
+                hint="install the same versions on both machines, or the image on both; throwcollect doctor shows the "
+                "build of each",
+            )
+
+
+_JSON = TypeAdapter(JoinToken)
 
 
 def join_run(

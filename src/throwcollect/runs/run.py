@@ -129,7 +129,7 @@ class Run:
     @property
     def token(self) -> str:
         """The token with which simulations of other machines join the prepared run; keep it secret."""
-        from throwcollect.runs.token import JoinToken
+        from throwcollect.runs.joining import JoinToken
 
         if self.config.run.listen is None:
             raise ConfigError("other machines cannot join the run", hint="set run.listen to an address of this machine")

@@ -10,7 +10,7 @@ import pytest
 from throwcollect import build
 from throwcollect.build import build_digest
 from throwcollect.errors import ConfigError
-from throwcollect.runs.token import JoinToken
+from throwcollect.runs.joining import JoinToken
 
 
 def make(build: str = "") -> JoinToken:
