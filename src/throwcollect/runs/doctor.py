@@ -7,7 +7,6 @@ import shutil
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
 
 from throwcollect import ros_installation
 from throwcollect.build import build_digest
@@ -57,10 +56,8 @@ def _check_memory() -> Check:
         if line.startswith("MemAvailable:"):
             available = int(line.split()[1]) * 1024 / _GIB
             room = int(available / _SIMULATION_MEMORY_GIB)
-            status: Literal["ok", "problem"] = "ok" if room >= 1 else "problem"
-            return Check(
-                "memory", status, f"{available:.1f} GiB available, enough for {format_count(room, 'simulation')}"
-            )
+            found = f"{available:.1f} GiB available, enough for {format_count(room, 'simulation')}"
+            return Check("memory", "ok" if room >= 1 else "problem", found)
     return Check("memory", "note", "/proc/meminfo does not say what is available")
 
 
@@ -147,8 +144,7 @@ def _check_embedded() -> Check:
 
 def _check_disk(directory: Path) -> Check:
     free = shutil.disk_usage(directory).free / _GIB
-    status: Literal["ok", "problem"] = "ok" if free >= _LEAST_DISK_GIB else "problem"
-    return Check("disk", status, f"{free:.1f} GiB free in {directory}")
+    return Check("disk", "ok" if free >= _LEAST_DISK_GIB else "problem", f"{free:.1f} GiB free in {directory}")
 
 
 def examine(directory: Path) -> list[Check]:
