@@ -23,6 +23,7 @@ AnySection = TypeVar("AnySection", bound=Section)
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_]")
 
 
+@cache
 def column_of(key: str) -> str:
     """Name the column of a swept key in tables of throws: the key with underscores, such as ``task_duration_s``.
 

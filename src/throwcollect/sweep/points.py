@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class Points:
     def __getitem__(self, rows: slice) -> Points:
         return Points(self.names, self.table[rows])
 
-    @property
+    @cached_property
     def keys(self) -> tuple[str, ...]:
         """Dotted configuration keys, ``(n_keys,)``."""
         return tuple(name for name in self.names if not is_target(name))
@@ -46,7 +47,7 @@ class Points:
         """Values of the keys, shape ``(n_trials, n_keys)``."""
         return self.table[:, : len(self.keys)]
 
-    @property
+    @cached_property
     def target_names(self) -> tuple[str, ...]:
         """Columns of targets; empty if no trial has one."""
         return self.names[len(self.keys) :]

@@ -88,27 +88,24 @@ class ResultColumns(Generic[AnyResult]):
     ) -> None:
         self._results = results
         self._joints = tuple(joints)
-        self._fields = [
-            (
-                field.name,
-                columns,
-                [_say_unit(each, field.name, sliding) for each in columns.declare(field.name, joints)],
-            )
+        declared = [
+            (field, columns, [_say_unit(each, field.name, sliding) for each in columns.declare(field.name, joints)])
             for field, columns in _list_declared(results)
         ]
+        self._fields = [(field.name, columns, [each.name for each in found]) for field, columns, found in declared]
         self.columns = tuple(
             replace(column, description=column.description.replace("{tool}", tool).replace("{object}", acted_on))
-            for _, _, declared in self._fields
-            for column in declared
+            for *_, found in declared
+            for column in found
         )
 
     def write(self, result: AnyResult) -> dict[str, object]:
         """Make the values of all columns, by name; None where nothing was measured."""
         values: dict[str, object] = {}
-        for name, columns, declared in self._fields:
+        for name, columns, names in self._fields:
             value = getattr(result, name)
-            parts = [None] * len(declared) if value is None else columns.split(value, self._joints)
-            values |= zip((column.name for column in declared), parts, strict=True)
+            parts = [None] * len(names) if value is None else columns.split(value, self._joints)
+            values |= zip(names, parts, strict=True)
         return values
 
     def to_json(self, result: AnyResult) -> str:
@@ -135,8 +132,8 @@ class ResultColumns(Generic[AnyResult]):
     def read(self, outcome: Outcome, reason: str | None, row: Mapping[str, Any]) -> AnyResult:
         """Make the result whose values stand in a row of the table, by column."""
         measures = {}
-        for name, columns, declared in self._fields:
-            values = [row[column.name] for column in declared]
+        for name, columns, names in self._fields:
+            values = [row[column] for column in names]
             measures[name] = None if None in values else columns.join(values, self._joints)
         return self._results(outcome, reason, **measures)
 
