@@ -116,7 +116,7 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     carry_robot(placed, directory)
     table = ThrowsTable.of(plan)
     tables, recordings = [], []
-    progress = log_progress(copies, len(copies), "trial", "written")
+    numbers = (copy.number for copy in log_progress(copies, len(copies), "trial", "written"))
     taken = [sources[copy.source].throw(copy.trial) for copy in copies]
     configs = map(replace(plan, config=placed).config_of, (plan.trial(copy.number) for copy in copies))
     # Episodes are read in order, one after the other, as they are written; pictures are rendered by all cores.
@@ -127,8 +127,7 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
         processes=1 if sensors is None else limit_processes(count_cores(), len(copies)),
         doing="renders",
     )
-    numbered = ((copy.number, throw) for copy, throw in zip(progress, taken, strict=True))
-    for name, members in groupby(numbered, key=lambda each: shard_of(plan, each[0])):
+    for name, members in groupby(zip(numbers, taken, strict=True), key=lambda each: shard_of(plan, each[0])):
         held = list(members)
         runs = ((number, episode_run(next(episodes))) for number, _ in held)
         with replacing(directory / name) as descriptor:
