@@ -56,8 +56,7 @@ class DrawnThrow:
 
     def __init__(self, throw: Throw, config: Config, scene: Scene) -> None:
         self.throw, self._config, self._scene = throw, config, scene
-        hexadecimal = style_of(throw.outcome, config.task.success).colour
-        red, green, blue = bytes.fromhex(hexadecimal.removeprefix("#"))
+        red, green, blue = bytes.fromhex(style_of(throw.outcome, config.task.success).colour[1:])
         self.color: Rgb = (red, green, blue)
         self.samples = throw.read_samples()[1]
         self.times_s = self.samples.seconds_since(self.samples.stamps_ns[0])
