@@ -13,7 +13,6 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.values import column_of
 from throwcollect.dataset.misses import read_targets, summarise_misses
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.summary import MissSummary
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Model, load_model, read_score
 from throwcollect.learning.score import SCORE_HEAD, Errors, ThrowAtTarget, format_length
@@ -122,7 +121,13 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
             if each.measured
         ),
     ]
-    return (ReportSection("misses", "Targets", "How targets are missed", text, (tuple(panels), _tabulate(misses))),)
+    rows = (
+        (name, f"{each.targets:,}", f"{each.measured:,}", *each.format_misses(unit_of_name(name)))
+        for name, each in misses.items()
+    )
+    head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
+    table = Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
+    return (ReportSection("misses", "Targets", "How targets are missed", text, (tuple(panels), table)),)
 
 
 def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> Panel:
@@ -155,15 +160,6 @@ def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
     figure.update_xaxes(title=f"distance from the target [{unit}]", rangemode="tozero")
     figure.update_yaxes(title="share of trials", range=[0, 1.02])
     return figure.update_layout(height=420, showlegend=False)
-
-
-def _tabulate(misses: dict[str, MissSummary]) -> Table:
-    rows = tuple(
-        (name, f"{each.targets:,}", f"{each.measured:,}", *each.format_misses(unit_of_name(name)))
-        for name, each in misses.items()
-    )
-    head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
-    return Table(head=head, rows=rows, number_columns=(1, 2, 3, 4, 5))
 
 
 def show_model(directory: Path, dataset: Dataset) -> ReportSection:

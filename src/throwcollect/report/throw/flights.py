@@ -82,21 +82,13 @@ def show_examples(
     trajectory = commanded_trajectory(dataset.config_of(middle), middle.read_samples()[1])
     note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
     note += "; the vertical line is the release." if release is not None else "."
-    commanded = dict(zip(trajectory.joints, sample_positions(trajectory, middle.joints.time_s).T, strict=True))
-    sliding = robot_of(dataset.config).sliding
-    scales = {name: (1000.0, " mm") if name in sliding else (math.degrees(1), "°") for name in commanded}
-    errors = {name: np.abs(middle.joints[name].position - goal).max() for name, goal in commanded.items()}
-    joints = tuple(
-        Panel(
-            key=name,
-            title=name,
-            figure=draw_joint(middle.joints[name], goal, release, scale),
-            text=f"Largest tracking error: {scale[0] * errors[name]:.2g}{scale[1]}.",
-            small=True,
-        )
-        for (name, goal), scale in zip(commanded.items(), scales.values(), strict=True)
-    )
-    return ReportSection("throws", "Throws", title, text, (views, note, joints))
+    sliding, joints = robot_of(dataset.config).sliding, list[Panel]()
+    for name, goal in zip(trajectory.joints, sample_positions(trajectory, middle.joints.time_s).T, strict=True):
+        joint = middle.joints[name]
+        factor, unit = (1000.0, " mm") if name in sliding else (math.degrees(1), "°")
+        error = f"Largest tracking error: {factor * np.abs(joint.position - goal).max():.2g}{unit}."
+        joints.append(Panel(name, name, draw_joint(joint, goal, release, (factor, unit)), error, small=True))
+    return ReportSection("throws", "Throws", title, text, (views, note, tuple(joints)))
 
 
 def _draw_paths(throws: Sequence[Throw], outcomes: Outcomes, axis: int, bodies: Sequence[BodyLook]) -> go.Figure:
