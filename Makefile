@@ -48,7 +48,7 @@ INSTALL := packaging/install.sh $(BIN)/python
 $(READY): pyproject.toml | $(VENV)/bin/python
 	$(find_libgomp)
 	@# MuJoCo is smaller than pybullet, in whose place it is installed where the Python is too new for that.
-	@$(BIN)/python -c 'import sys; print("installing about 80 packages into $(VENV):", "410 MB to download, 1.5 GB" \
+	@$(BIN)/python -c 'import sys; print("installing about 80 packages into $(VENV):", "480 MB to download, 1.7 GB" \
 	    if sys.version_info >= (3, 12) else "500 MB to download, 1.8 GB", "with the description of the robot")'
 	$(INSTALL) -e '.[collect,docker,report,export,serve]'
 	@touch $@

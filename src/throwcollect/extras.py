@@ -34,6 +34,7 @@ EXTRA_OF = MappingProxyType(
         "scipy": "export",
         "jinja2": "report",
         "mujoco": "mujoco",
+        "numba": "mujoco",
         "onnx": "onnx",
         "orjson": "serve",
         "pandas": "pandas",

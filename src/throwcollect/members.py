@@ -147,6 +147,11 @@ def is_own(family: str, name: str) -> bool:
     return name in _OWN[family]
 
 
+def find_modules(family: str, name: str) -> list[str]:
+    """Find the module of a member of our own; none if another package brings it, as that may fail in any way."""
+    return [_OWN[family][name].partition(":")[0]] if is_own(family, name) else []
+
+
 def list_origins(family: str, name: str) -> list[str]:
     """List the packages that bring a member, with their versions and what they bring; none if it is our own."""
     if is_own(family, name):

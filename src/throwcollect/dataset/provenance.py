@@ -26,8 +26,9 @@ from pydantic import TypeAdapter
 
 from throwcollect.dataset.directory import CARD, PROVENANCE
 from throwcollect.dataset.manifest import Finding, entry_of_file
-from throwcollect.errors import DatasetError
+from throwcollect.errors import DatasetError, ThrowcollectError
 from throwcollect.files import read_text, write_file
+from throwcollect.members import load_member
 from throwcollect.version import __version__
 
 HOST_VARIABLE = "THROWCOLLECT_HOST"
@@ -70,6 +71,7 @@ class Provenance:
             in no clone.
         image: Id of the image that ran; None without one.
         robot_sha256: SHA-256 of the robot's description; None if not known.
+        steps: How its engine took steps where this was written, if there are several ways; all give the same bits.
         session: Simulation whose clients were recorded; None if the trials were collected.
     """
 
@@ -84,13 +86,14 @@ class Provenance:
     revision: str | None = None
     image: str | None = None
     robot_sha256: str | None = None
+    steps: str | None = None
     session: str | None = None
 
     @classmethod
     def of_this_machine(
-        cls, *, simulations: int | None, wall_s: float | None, was_open: bool, robot: str
+        cls, *, simulations: int | None, wall_s: float | None, was_open: bool, robot: str, engine: str | None = None
     ) -> Provenance:
-        """Make the provenance of a collection that ends now, here; `robot` is the robot's description."""
+        """Make the provenance of a collection by an engine that ends now, here; `robot` is the robot's description."""
         return cls(
             finished=datetime.now(timezone.utc),
             # Inside a container, the host name is only a random id.
@@ -103,6 +106,7 @@ class Provenance:
             was_open=was_open,
             revision=_read_revision(),
             image=os.environ.get(IMAGE_VARIABLE) or None,
+            steps=_describe_steps(engine) if engine else None,
             robot_sha256=hashlib.sha256(robot.encode()).hexdigest(),
         )
 
@@ -117,6 +121,7 @@ class Provenance:
             "revision": self.revision,
             "image": self.image,
             "robot description": self.robot_sha256 and f"SHA-256 {self.robot_sha256}",
+            "steps of the engine": self.steps,
             "simulations": None if self.simulations is None else str(self.simulations),
             "session": self.session and f"clients of {self.session}; no function of `config.yaml`",
             "wall time": None if self.wall_s is None else f"{self.wall_s:.1f} s",
@@ -182,6 +187,13 @@ def _read_revision() -> str | None:
     with suppress(OSError, subprocess.SubprocessError):
         described = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)
         return described.stdout.strip() or None
+    return None
+
+
+def _describe_steps(engine: str) -> str | None:
+    # A machine that only coordinates has no engines.
+    with suppress(ThrowcollectError, ImportError):
+        return load_member("engines", engine).describe_steps() or None
     return None
 
 

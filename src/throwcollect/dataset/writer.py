@@ -224,7 +224,11 @@ class DatasetWriter:
         if self._journal is not None:
             wall_s = self._journal.measure_collected_s()
         provenance = provenance or Provenance.of_this_machine(
-            simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory), robot=self._channels.robot
+            simulations=simulations,
+            wall_s=wall_s,
+            was_open=was_open(self._directory),
+            robot=self._channels.robot,
+            engine=self._config.sim.engine,
         )
         # How it was run must not change the dataset, so only data card and provenance say that.
         config = self._config.without_run()

@@ -255,6 +255,11 @@ class Engine(ABC):
     What follows from a state and commands does not depend, in any bit, on what happened in the world before.
     """
 
+    @classmethod
+    def describe_steps(cls) -> str:
+        """Say how steps are taken here, if there are several ways, such as ``compiled``; all give the same bits."""
+        return ""
+
     @abstractmethod
     def close(self) -> None:
         """Free the world; it cannot be used afterwards."""

@@ -69,7 +69,11 @@ def _check_engine(name: str) -> Check:
     package = ENGINE_PACKAGES[name]
     if is_installed(package.module):
         found = f"{version(package.distribution)}, build {build_digest(name)[:_DIGITS]}"
-        return Check(package.module, "ok", found)
+        try:
+            steps = load_member("engines", name).describe_steps()
+        except (ConfigError, ImportError) as error:
+            return Check(package.module, "problem", f"{found}; {error}")
+        return Check(package.module, "ok", found + (f", steps {steps}" if steps else ""))
     others = any(is_installed(each.module) for each in ENGINE_PACKAGES.values())
     hint = f"not installed, for sim.engine: {name}; try: {MissingExtraError(package.module).hint}"
     return Check(package.module, "note" if others else "problem", hint)

@@ -18,6 +18,7 @@ from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.configuration import reading_config
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ThrowcollectError, WorkerError
+from throwcollect.members import find_modules
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.runs.launcher import launch
@@ -178,10 +179,10 @@ def prepare_run(
         reserve_port(config.run).close()
         is_new = not directory.exists()
         if config.run.runtime in ("auto", "local"):
-            # What nodes need is imported while this process makes the plan.
+            # What nodes need is imported, and a loop compiled, while this process makes the plan.
             from throwcollect.runtimes.node_process import begin_imports
 
-            begin_imports()
+            begin_imports(*find_modules("engines", config.sim.engine))
         made = plan(directory) if callable(plan) else plan
         # These imports would take long, but making the plan has made them already.
         from throwcollect.coordinator.prepare import describe_plan

@@ -24,9 +24,9 @@ from throwcollect.ros.middleware import VARIABLE
 from throwcollect.side_by_side import launching
 
 
-def begin_imports() -> None:
-    """Let a process begin to import what nodes need, unless it has begun; it ends with this process."""
-    forkserver.set_forkserver_preload(["throwcollect.runtimes.fork_server"])
+def begin_imports(*modules: str) -> None:
+    """Let a process begin to import what nodes need, and `modules`, unless it has begun; it ends with this process."""
+    forkserver.set_forkserver_preload(["throwcollect.runtimes.fork_server", *modules])
     with launching():
         forkserver.ensure_running()
 

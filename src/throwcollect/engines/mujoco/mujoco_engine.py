@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import compress
-from operator import itemgetter, or_
 
 import mujoco
 import numpy as np
@@ -29,11 +27,13 @@ from throwcollect.engines.engine import (
     split_bodies,
 )
 from throwcollect.engines.grip import HELD_LINK, carry, find_held
-from throwcollect.engines.mujoco.contact_targets import ROLLING_ROWS, SLIDING_ROWS, aim_contacts
+from throwcollect.engines.mujoco.loop import check_version, make_loop
 from throwcollect.engines.mujoco.scenery import (
+    OBJECT,
     Surface,
     describe_links,
     find_bounces,
+    find_reach,
     let_object_hit_floor,
     make_spec,
     place_bodies,
@@ -41,32 +41,42 @@ from throwcollect.engines.mujoco.scenery import (
     set_physics,
     weigh_held,
 )
+from throwcollect.engines.mujoco.stepping import EMPTY, turn, write_sample
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 
-_ORIENTATION, _SPIN = slice(-10, -6), -3
-"""Places of the object's orientation and angular velocity in a sample."""
+_LOOP = make_loop()
+"""Made when this module is imported: by the process from which simulations are forked, before they are."""
 
-_PRESS = 3
-"""Each contact sensor has three numbers, of which the first is the normal force."""
+_AHEAD = 16
+"""Steps that are taken before the observer gets their samples; if it stops at one, the world goes back to that one."""
 
 
 class MujocoEngine(Engine):
-    """A MuJoCo world in this process."""
+    """A MuJoCo world in this process.
+
+    Raises:
+        ConfigError: If the MuJoCo that is installed is another one than the one that this needs.
+    """
 
     _scene: Scene
     _physics: Physics
     _surfaces: list[Surface]
-    _bounces: dict[int, float]
-    _rows: int
     _seat: int | None
     _held: BodyState | None
     _model: mujoco.MjModel
     _data: mujoco.MjData
 
     def __init__(self) -> None:
+        check_version()
         self._is_loaded = False
         self._touching: frozenset[str] = frozenset()
+
+    @classmethod
+    def describe_steps(cls) -> str:
+        """See `Engine.describe_steps`."""
+        check_version()
+        return _LOOP.made
 
     def close(self) -> None:
         """Free the world."""
@@ -90,12 +100,35 @@ class MujocoEngine(Engine):
         place_bodies(self._model, scene.bodies)
         self._data = mujoco.MjData(self._model)
         self._seat = None if scene.tool.seat is None else self._model.body(HELD_LINK).id
-        self._grip = bytes(surface.name == scene.tool.name for surface in self._surfaces)
+        self._grip = [surface.name == scene.tool.name for surface in self._surfaces]
         # Joints of the robot come first in the model, but not in the order of the scene.
         names = [self._model.joint(number).name for number in range(len(scene.moving))]
         self._columns = np.array([scene.moving.index(name) for name in names])
-        self._places = [names.index(name) for name in scene.moving]
+        self._order = [names.index(name) for name in scene.moving]
+        self._share_memory()
         self._is_loaded = True
+
+    def _share_memory(self) -> None:
+        """Make the arguments of the loop that stay as long as the world does."""
+        model, data, count, surfaces = self._model, self._data, len(self._order), len(self._surfaces)
+        bodies = 1 + len(self._scene.moving_bodies)
+        self._motors, self._bounces = np.zeros((count, 4)), np.zeros(model.ngeom)
+        self._pressing = np.zeros(surfaces, int)
+        self._samples = np.zeros((_AHEAD, 3 * count + BODY_NUMBERS * bodies))
+        self._states = np.zeros((_AHEAD, model.nq + 4 * model.nv))
+        self._changes = np.zeros((_AHEAD + 1, 1 + surfaces), int)
+        memory = [data.qpos, data.qvel, data.qacc, data.qacc_warmstart, data.qfrc_passive, data.qfrc_constraint]
+        memory += [data.qfrc_applied, data.qfrc_inverse, data.sensordata, data.xipos, data.ximat]
+        memory += [model.bvh_aabb, model.body_bvhadr, self._motors, self._bounces, np.array(self._order)]
+        # Arrays have to live as long as what is shared of them.
+        self._memory = [
+            array.reshape(-1) for array in (*memory, self._samples, self._states, self._changes, self._pressing)
+        ]
+        # To find out in Python what is far takes longer than to look for contacts, and bodies may be touched anywhere.
+        watched = 0 if self._scene.bodies or not _LOOP.is_compiled else model.body(OBJECT).id
+        self._sizes = count, bodies
+        sizes = (*self._sizes, surfaces, watched)
+        self._fixed = [*_LOOP.list_world(model, data), *map(_LOOP.share, self._memory), *sizes]
 
     def describe_robot(self) -> list[LoadedLink]:
         """Describe the robot's links as MuJoCo has them."""
@@ -103,13 +136,11 @@ class MujocoEngine(Engine):
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
-        self._physics = physics
-        set_physics(self._model, self._scene, physics)
-        self._rows = ROLLING_ROWS if self._scene.object.rolling_friction_m else SLIDING_ROWS
-        self._bounces = find_bounces(self._model, self._scene)
-        moving, first = len(self._scene.moving_bodies), 3 * len(self._places)
-        self._pick = _make_sample_picker(self._model, self._places, moving)
-        self._ends_of_bodies = [first + BODY_NUMBERS * number for number in range(1, moving + 1)]
+        self._physics, model, motors, hz = physics, self._model, self._motors, float(physics.hz)
+        set_physics(model, self._scene, physics)
+        self._bounces[:], self._reach_m = find_bounces(model, self._scene), find_reach(model)
+        motors[:, 0], motors[:, 1] = hz * physics.position_gain_per_s, hz * physics.velocity_gain
+        motors[:, 2], motors[:, 3] = model.dof_damping[: len(motors)] / hz, np.array(physics.efforts)[self._columns]
 
     def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
         """Put joints, object and bodies at their start, all at rest."""
@@ -132,6 +163,7 @@ class MujocoEngine(Engine):
         """Put robot, bodies and object into a state, and leave no trace of earlier ones in the world."""
         count, data = len(self._columns), self._data
         let_object_hit_floor(self._model, floor=False)
+        self._model.opt.disableflags &= ~EMPTY
         mujoco.mj_resetData(self._model, data)
         positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
         data.qpos[:count], data.qvel[:count] = positions[self._columns], velocities[self._columns]
@@ -148,66 +180,48 @@ class MujocoEngine(Engine):
         return State(self._sample(), self._touching)
 
     def run(self, steps: Steps, observer: Observer) -> int:
-        """Take steps until the observer stops them.
-
-        In one step, a motor gives its joint the velocity that Bullet's motor would give it. Inverse dynamics of the
-        present state give the torque for that, with the contact forces of the step before and within the efforts. So
-        the solver finds contacts for the motion that the tool really has.
-        """
+        """Take steps until the observer stops them."""
         let_object_hit_floor(self._model, floor=steps.ground_is_solid)
-        # Local names, arithmetic in place and a single loop, because every operation here costs time in every step.
-        model, data, physics = self._model, self._data, self._physics
-        count, hz = len(self._columns), float(physics.hz)
-        pull, brake = (np.full(count, hz * gain) for gain in (physics.position_gain_per_s, physics.velocity_gain))
-        # These are views: what is written into `acceleration` and `torque` is what MuJoCo computes with.
-        position, velocity = data.qpos[:count], data.qvel[:count]
-        acceleration, torque = data.qacc[:count], data.qfrc_applied[:count]
-        passive, pushed = data.qfrc_passive[:count], data.qfrc_constraint[:count]
-        needed, work, other = np.zeros(model.nv), np.zeros(count), np.zeros(count)
-        load = needed[:count]
-        most = np.array(physics.efforts)[self._columns]
-        least, lag = -most, model.dof_damping[:count] / hz
-        pressing, nothing = data.sensordata[::_PRESS], np.zeros(len(self._surfaces))
-        presses, untouched = np.zeros(len(self._surfaces), np.bool_), bytes(len(self._surfaces))
-        multiply, add, subtract, maximum, minimum = np.multiply, np.add, np.subtract, np.maximum, np.minimum
-        begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
-        drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
-        restitution, bounces, rows = self._scene.object.restitution, self._bounces, self._rows
-        # This equals no state of the surfaces, so the first step compares what presses with what pressed before.
-        last_presses, number = b"", 0
-        for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
+        targets, velocities = steps.targets[:-1, self._columns], steps.velocities[:, self._columns]
+        # These are in the order of steps, whatever NumPy makes of the columns above.
+        wanted = np.ravel(self._motors[:, 0] * targets + self._motors[:, 1] * velocities)
+        total = len(targets)
+        shared, hz, due, number = _LOOP.share(wanted), float(self._physics.hz), steps.first_sample, 0
+        # This equals no state of the surfaces, so the first step is compared with what pressed before.
+        self._pressing.fill(-1)
+        is_over = False
+        while number < total and not is_over:
             if number == steps.held:
                 self._hold(None)
-            begin_step(model, data)
-            # Bullet's motor accelerates by hz (gain (target - position) + share (target velocity - velocity)).
-            subtract(want, multiply(position, pull, work), work)
-            subtract(work, multiply(velocity, brake, other), acceleration)
-            inverse(model, data, 1, needed)
-            # Joint damping acts on the velocity after the step.
-            subtract(multiply(acceleration, lag, work), passive, work)
-            subtract(work, pushed, work)
-            add(work, load, work)
-            maximum(minimum(work, most, out=work), least, out=torque)
-            contacts = data.ncon
-            if contacts:
-                aim_contacts(data, hz, restitution, bounces, rows)
-            if drag:
-                self._apply_drag(drag)
-            end_step(model, data)
-            number += 1
-            now = greater(pressing, nothing, presses).tobytes() if contacts else untouched
+            last = min(number + (1 if self._held else _AHEAD), total)
+            call = (shared, number, last, due, steps.stride, hz, steps.drag_kgpm, self._reach_m)
+            count = _LOOP.take_steps(*self._fixed, *call)
+            samples = self._samples[: max(0, 1 + (last - due) // steps.stride)].tolist()
+            changes = self._changes[:count].tolist()
             if self._held is not None:
-                now = self._carry(self._held, now)
-            if now != last_presses:
-                last_presses = now
-                self._report_touch(number, now, observer)
-            if number == due:
-                due += stride
-                if observer.on_sample(number, self._sample()):
+                self._carry(self._held)
+                changes, samples = [[last, *self._pressing.tolist()]], [self._sample() for _ in samples]
+            for place, sample in enumerate(samples):
+                while changes and changes[0][0] <= due:
+                    self._report_touch(*changes.pop(0), observer=observer)
+                if is_over := observer.on_sample(due, tuple(sample)):
+                    if due < last:
+                        self._go_back(place)
+                    last, changes = due, []
                     break
+                due += steps.stride
+            for change in changes:
+                self._report_touch(*change, observer=observer)
+            number = last
         # Forces that are applied stay until they are replaced, and the next steps may have no drag.
-        data.qfrc_applied[count : count + 3] = 0.0
+        self._data.qfrc_applied[len(self._order) : len(self._order) + 3] = 0.0
         return number
+
+    def _go_back(self, place: int) -> None:
+        """Put the world back to where it was at a sample of the last steps."""
+        data, state = self._data, self._states[place]
+        data.qpos[:], rest = state[: len(data.qpos)], state[len(data.qpos) :].reshape(-1, 4)
+        data.qvel[:], data.qacc_warmstart[:], data.qfrc_constraint[:], data.qfrc_applied[:] = rest.T
 
     def place(self, number: int, state: BodyState) -> None:
         """Set pose and velocity of a body."""
@@ -229,46 +243,35 @@ class MujocoEngine(Engine):
         if self._seat is not None:
             weigh_held(self._model, is_held=held is not None)
 
-    def _carry(self, held: BodyState, presses: bytes) -> bytes:
-        """Move the held object to where the tool is after a step, and return which surfaces press on it."""
+    def _carry(self, held: BodyState) -> None:
+        """Move the held object to where the tool is after a step, and let the tool press on it."""
         mujoco.mj_kinematics(self._model, self._data)
-        (x, y, z), turn = self._data.xpos[self._seat].tolist(), _to_xyzw(self._data.xquat[self._seat])
-        self._held = carry(held, (x, y, z), turn, self._physics.hz)
+        (x, y, z), turned = self._data.xpos[self._seat].tolist(), _to_xyzw(self._data.xquat[self._seat])
+        self._held = carry(held, (x, y, z), turned, self._physics.hz)
         self._place(0, self._held)
-        return bytes(map(or_, presses, self._grip))
+        self._pressing[self._grip] = 1
 
     def _compute_contact_forces(self) -> None:
         """Compute the contact forces on the robot that motors need in the first step, as if they had held it before."""
         model, data, count = self._model, self._data, len(self._columns)
         mujoco.mj_step1(model, data)
         data.qfrc_applied[:count] = data.qfrc_bias[:count]
-        if data.ncon:
-            aim_contacts(data, self._physics.hz, self._scene.object.restitution, self._bounces, self._rows)
+        _LOOP.take_steps(*self._fixed, self._fixed[8], 0, 0, 0, 0, float(self._physics.hz), 0.0, 0.0)
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
 
-    def _report_touch(self, step: int, presses: bytes, observer: Observer) -> None:
-        """Tell the observer which bodies press on the object now, if others did before.
-
-        `presses` has one byte for each surface, 1 if it presses.
-        """
+    def _report_touch(self, step: int, *presses: int, observer: Observer) -> None:
+        """Tell the observer which bodies press on the object now, if others did before; one number says so of each."""
         touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
         if touching != self._touching:
             self._touching = touching
             observer.on_touch(step, touching)
 
     def _sample(self) -> Sample:
-        data = self._data
-        row = self._pick(data.qpos.tolist() + data.qvel.tolist() + data.qfrc_applied.tolist())
-        for end in self._ends_of_bodies:
-            row = row[: end + _SPIN] + _turn(row[end - 10 : end - 6], row[end + _SPIN : end]) + row[end:]
-        return row[:_SPIN] + _turn(row[_ORIENTATION], row[_SPIN:])
-
-    def _apply_drag(self, drag_kgpm: float) -> None:
-        first = len(self._columns)
-        velocity = self._data.qvel[first : first + 3].tolist()
-        factor = -drag_kgpm * math.hypot(*velocity)
-        self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
+        numbers = [0.0] * self._samples.shape[1]
+        qpos, qvel, applied = (part.tolist() for part in (self._data.qpos, self._data.qvel, self._data.qfrc_applied))
+        write_sample(qpos, qvel, applied, self._order, *self._sizes, numbers, 0)
+        return tuple(numbers)
 
 
 def _list_kinds(scene: Scene) -> list[object]:
@@ -279,31 +282,6 @@ def _list_kinds(scene: Scene) -> list[object]:
     ]
 
 
-def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int], bodies: int) -> Callable[[list[float]], Sample]:
-    """Make a function that picks a sample from all positions, velocities and forces.
-
-    The function leaves angular velocities in the frames of their bodies. `order` is the place of each moving joint
-    among the joints of the model, behind which are those of the object and of some moving bodies.
-    """
-    velocities, forces = model.nq, model.nq + model.nv
-    places = [first + place for first in (0, velocities, forces) for place in order]
-    for number in (*range(1, bodies + 1), 0):
-        x, y, z, w, i, j, k = range(len(order) + 7 * number, len(order) + 7 * number + 7)
-        first = velocities + len(order) + 6 * number
-        places += [x, y, z, i, j, k, w, *range(first, first + 6)]
-    pick: Callable[[list[float]], Sample] = itemgetter(*places)
-    return pick
-
-
-def _turn(orientation_xyzw: Sequence[float], vector: Sequence[float]) -> Vector:
-    """Turn a vector from the frame of a body into world."""
-    x, y, z, w = orientation_xyzw
-    a, b, c = vector
-    # With t = 2 u x v for the vector part u and the real part w, the turned vector is v + w t + u x t.
-    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p)
-
-
 def _to_xyzw(orientation_wxyz: NDArray[np.float64]) -> Quaternion:
     w, x, y, z = orientation_wxyz.tolist()
     return x, y, z, w
@@ -312,4 +290,4 @@ def _to_xyzw(orientation_wxyz: NDArray[np.float64]) -> Quaternion:
 def _turn_back(orientation_xyzw: Quaternion, vector: Vector) -> Vector:
     """Turn a vector from world into the frame of a body."""
     x, y, z, w = orientation_xyzw
-    return _turn((-x, -y, -z, w), vector)
+    return turn(-x, -y, -z, w, *vector)

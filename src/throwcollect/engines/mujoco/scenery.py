@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from throwcollect.engines.body import BodyModel, LinkShape, Vector, turn_of
 from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
 from throwcollect.engines.grip import HELD_LINK, add_held_link
-from throwcollect.engines.mujoco.contact_targets import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
+from throwcollect.engines.mujoco.stepping import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 
@@ -230,6 +230,11 @@ def resize_object(model: mujoco.MjModel, body: SceneBody) -> None:
     model.dof_length[first + 3 : first + 6] = model.geom_rbound[geom]
 
 
+def find_reach(model: mujoco.MjModel) -> float:
+    """Find the distance from the object's centre beyond which MuJoCo makes no contacts of it [m]."""
+    return float(model.geom_rbound[model.geom(OBJECT).id]) + 2 * _REACH_M
+
+
 def weigh_held(model: mujoco.MjModel, *, is_held: bool) -> None:
     """Give the link of the held object the mass and the inertia of the object, or none."""
     link, held = model.body(HELD_LINK).id, model.body(OBJECT).id
@@ -330,7 +335,10 @@ def _list_geoms(model: mujoco.MjModel, body: SceneBody) -> list[int]:
     return [model.geom(f"{_name_body(body)}/{number}").id for number in range(len(body.link.shapes))]
 
 
-def find_bounces(model: mujoco.MjModel, scene: Scene) -> dict[int, float]:
-    """Map shapes to their restitution, by number; it is 1 for all others. The map is empty without bodies."""
-    found = {geom: each.restitution for each in scene.bodies for geom in _list_geoms(model, each)}
-    return {**found, model.geom(OBJECT).id: scene.object.restitution} if found else {}
+def find_bounces(model: mujoco.MjModel, scene: Scene) -> NDArray[np.float64]:
+    """Find the restitution of each shape, by number; a contact has the product."""
+    found = np.ones(model.ngeom)
+    found[model.geom(OBJECT).id] = scene.object.restitution
+    for each in scene.bodies:
+        found[_list_geoms(model, each)] = each.restitution
+    return found
