@@ -28,6 +28,7 @@ for module in modules:
             if (getattr(missing, "name", "") or "").partition(".")[0] not in EXTRAS:
                 raise
 PYTHON
+python -c "from throwcollect.engines.mujoco.loop import make_loop; assert make_loop().made == 'compiled', make_loop()"
 throwcollect --help > help
 throwcollect up -n 1 --runtime inprocess --trials 2 --set sim.engine=mujoco --output mujoco "$quickstart"
 for backend; do

@@ -105,8 +105,8 @@ ENVIRONMENT = "environment.data/data"
 COPIED = "ros_*.libs/*"
 """Libraries that ROS' wheels hold beside their own: the loader searches all these directories, and one copy does."""
 
-LOADED_BY_NAME = "lib*__rosidl_typesupport_*_c.so"
-"""What ROS loads when a type is first used with Fast DDS, without any library saying that it needs it."""
+LOADED_BY_NAME = ("lib*__rosidl_typesupport_*_c.so", "libllvmlite.so")
+"""What no library says that it needs: of ROS, when a type is first used with Fast DDS, and of llvmlite."""
 
 LIBRARY = re.compile(r"lib[^.]*\.so(\.\d+)*")
 """File names of libraries; those of modules say for which Python: ``lib.cpython-311-x86_64-linux-gnu.so``."""
@@ -138,7 +138,9 @@ def find_unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
     """
     shared = {path: list_needed(content) for path, read in files.items() if ".so" in path and is_elf(content := read())}
     libraries = {path for path in shared if LIBRARY.fullmatch(PurePosixPath(path).name)}
-    by_name = {path for path in libraries if fnmatchcase(PurePosixPath(path).name, LOADED_BY_NAME)}
+    by_name = {
+        path for path in libraries if any(fnmatchcase(PurePosixPath(path).name, pattern) for pattern in LOADED_BY_NAME)
+    }
     reached = set(shared) - libraries | by_name
     fresh = set(reached)
     while fresh:
