@@ -34,7 +34,6 @@ EXTRA_OF = MappingProxyType(
         "scipy": "export",
         "jinja2": "report",
         "mujoco": "mujoco",
-        "numba": "mujoco",
         "onnx": "onnx",
         "orjson": "serve",
         "pandas": "pandas",

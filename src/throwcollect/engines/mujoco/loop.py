@@ -74,7 +74,9 @@ def make_loop() -> Loop:
         return _make_plain(f"{_OFF} is set")
     try:
         return _make_compiled()
-    except Exception as error:  # noqa: BLE001 - whatever a missing or unsuitable Numba raises, Python computes the same
+    except ModuleNotFoundError:
+        return _make_plain("Numba is not installed (try: pip install 'throwcollect[mujoco]')")
+    except Exception as error:  # noqa: BLE001 - whatever an unsuitable Numba raises, Python computes the same
         return _make_plain(f"{type(error).__name__}: {error}".partition("\n")[0])
 
 
