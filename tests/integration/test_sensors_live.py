@@ -82,7 +82,7 @@ def test_a_node_of_its_own_publishes_what_has_subscribers(seen: tuple[Robot, Com
     assert "3.1" in set_view(4.0).reason
     robot.send(swing())
     robot.wait_until(lambda: pictures[-1].header.stamp.nanosec > 0, "a picture of an arm that moves")
-    for wrong, reason in (('{"eye"', "JSON"), ("[1]", "JSON"), ('{"eye": {"kind": "nose"}}', "sensors.eye.kind")):
+    for wrong, reason in (('{"eye"', "JSON"), ("[]", "JSON"), ('{"eye": {"kind": "nose"}}', "sensors.eye.kind")):
         refused = set_parameter("sensors", type=4, string_value=wrong)
         assert (refused.successful, reason in refused.reason) == (False, True), refused.reason
     others = json.dumps({"eye": {"kind": "camera", "link": "head_2_link", "width": 32}})

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import refuse_argument
+from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.dataset.reader import Dataset, load
 from throwcollect.dataset.sensors import FRAMES, Frames
 from throwcollect.export.throw_source import ExportSource, choose_streams
@@ -24,8 +24,9 @@ class FrameDataset:
 
     A frame is a dictionary of NumPy arrays with the names that exports and policies have: signals, such as
     ``joint_position_rad``, in float32; ``<camera>_image``, uint8 of shape ``(height, width, 3)``; ``<camera>_depth``
-    [m], float32 of shape ``(height, width, 1)``; ``action``, the positions of the moving joints [rad] that are
-    commanded one frame later, float32; and the number of its ``trial``. May be sent to other processes.
+    [m], float32 of shape ``(height, width, 1)``, inf where nothing is near enough and NaN where noise has dropped it;
+    ``action``, the positions of the moving joints [rad] that are commanded one frame later, float32; and the number of
+    its ``trial``. May be sent to other processes.
 
     Args:
         dataset: Directory of a dataset, or what `load` gave, or a part of that.
@@ -47,6 +48,7 @@ class FrameDataset:
         rate_hz: int | None = None,
         horizon: int = 0,
     ) -> None:
+        check_bounds("horizon", horizon, least=0)
         dataset = dataset if isinstance(dataset, Dataset) else load(dataset)
         streams = choose_streams(dataset.config, _ENDINGS)
         seen = {f"{name}_{_ENDINGS[each]}": (name, FRAMES[each]) for name, some in streams.items() for each in some}
@@ -70,10 +72,11 @@ class FrameDataset:
         number = range(len(self))[index]
         throw = int(np.searchsorted(self._ends, number, side="right"))
         opened = self._opened
-        if opened is None or opened[0] != throw:
-            self._opened = opened = throw, self._open(throw)
-        # Counted from the end of the throw.
-        return {name: series[number - self._ends[throw]] for name, series in opened[1].items()}
+        with self._source.throws[throw].locating_damage():
+            if opened is None or opened[0] != throw:
+                self._opened = opened = throw, self._open(throw)
+            # Counted from the end of the throw; a frame is the caller's own.
+            return {name: series[number - self._ends[throw]].copy() for name, series in opened[1].items()}
 
     def _open(self, number: int) -> dict[str, Any]:
         """Open a throw: all that frames have, with the frame as the first axis."""
@@ -87,10 +90,10 @@ class FrameDataset:
             found[name] = series.signals[name].astype(np.float32).reshape(len(rows), -1)
         for name, (sensor, kind) in self._seen.items():
             step = throw.sensors[sensor].config.rate_hz // rate_hz
-            found[name] = Frames(len(rows), partial(_copy, getattr(throw.sensors[sensor], kind), step))
+            found[name] = Frames(len(rows), partial(_find_frame, getattr(throw.sensors[sensor], kind), step))
         return found
 
 
-def _copy(frames: Frames, step: int, number: int) -> NDArray[Any]:
-    frame = np.array(frames[number * step])
+def _find_frame(frames: Frames, step: int, number: int) -> NDArray[Any]:
+    frame: NDArray[Any] = frames[number * step]
     return frame.reshape(*frame.shape[:2], -1)

@@ -82,7 +82,7 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 dataset = LeRobotDataset("me/throws", root=".")
 {success} = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: episode["outcome"] == "{success}")""",
-        frames="`observation.images.<sensor>`",
+        frames="`observation.images.<sensor>`, depths `observation.images.<sensor>_depth` [mm, 0 for none]",
         notes=(
             f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a {noun}. Frames are float32, "
             f"as usual there. Joints that do not move, orientation and spin of the {body}, and commanded velocities "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import shutil
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from tests.unit.dataset.damage import flip
 from tests.unit.export.conftest import actions_of
 
 import throwcollect
@@ -84,7 +86,7 @@ def test_pictures_in_tables_are_exact_and_say_what_is_left_out(seen: Path, tmp_p
         assert np.array_equal(stored, expected)
     card = (tmp_path / "out" / "README.md").read_text()
     assert "recorded: `front` depth; `head` color; `scan` scan; `side` color, depth. " in card
-    assert "here is: `head` color; `side` color; named `observation.images.<sensor>`." in card
+    assert "here is: `head` color; `side` color; named `observation.images.<sensor>`, depths `" in card
 
 
 def test_depths_in_tables_are_those_of_throws_in_mm(seen: Path, tmp_path: Path) -> None:
@@ -218,6 +220,15 @@ def test_a_throw_that_lacks_frames_is_found(seen: Path, tmp_path: Path, monkeypa
         export(seen, tmp_path / "out", to="hdf5")
 
 
+def test_frames_of_a_damaged_recording_name_their_dataset(seen: Path, tmp_path: Path) -> None:
+    shutil.copytree(seen, tmp_path / "damaged")
+    row = throwcollect.load(seen)[0].row
+    flip(tmp_path / "damaged" / f"{row['shard']}", row["chunk_offset"] + 2000)
+    frames = throwcollect.FrameDataset(tmp_path / "damaged")
+    with pytest.raises(DatasetError, match=r"damaged.*trial 0(.|\n)*dataset verify"):
+        [frames[number] for number in range(8)]
+
+
 def test_frames_for_training_are_those_of_throws_with_their_signals_and_actions(seen: Path) -> None:
     frames = pickle.loads(pickle.dumps(throwcollect.FrameDataset(seen, horizon=3)))  # noqa: S301
     throws = throwcollect.load(seen)
@@ -244,7 +255,12 @@ def test_frames_for_training_have_what_is_observed_at_the_rate_of_its_cameras(se
     assert frames[7].keys() == {"side_image", "ball_position_m", "action", "trial"}
     assert np.array_equal(frames[7]["side_image"], throws[0].sensors["side"].images[7])
     assert np.array_equal(frames[7]["ball_position_m"], throws[0].ball.position[70].astype(np.float32))
-    assert frames[7]["side_image"].flags.writeable
+    for name in frames[7].keys() - {"trial"}:
+        changed, before = frames[7][name], frames[7][name]
+        changed += 1
+        assert np.array_equal(frames[7][name], before), name
+    with pytest.raises(ConfigError, match="horizon: got -1"):
+        throwcollect.FrameDataset(seen, horizon=-1)
     with pytest.raises(ConfigError, match=r"observation: there is no 'side_imag'; did you mean 'side_image'\?"):
         throwcollect.FrameDataset(seen, observation=["side_imag"])
     with pytest.raises(ConfigError, match=r"images of side at 25 Hz\n  expected: a divisor of 25$"):

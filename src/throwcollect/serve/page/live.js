@@ -35,6 +35,8 @@ export class Live {
   #objects = new Map();
   /** @type {Map<string, string[]>} bodies that are followed, by simulation, with the object last */
   #bodies = new Map();
+  /** Counts connections; subscriptions end with theirs. */
+  connections = 0;
   #bridge = null;
   #run = null;
   #described = new Set();
@@ -182,6 +184,7 @@ export class Live {
     for (const name of [...this.simulations]) this.#leave(name);
     this.#bridge?.close();
     this.#bridge = null;
+    this.connections += 1;
     this.#described.clear();
     this.#run = run;
     if (run !== null) {

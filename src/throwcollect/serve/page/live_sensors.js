@@ -33,8 +33,10 @@ export class LiveSensors {
   /** @type {Set<string>} topics of frames that the strip has subscribed to */
   #topics = new Set();
   #isOpen = false;
-  /** @type {Record<string, object>} sections of all sensors as they are, or as the user wants them */
-  #sections = {};
+  /** Number of the connection that the subscriptions are of. */
+  #connection = 0;
+  /** @type {Record<string, object> | null} sections of all sensors as they are, or as the user wants them; null until they are known */
+  #sections = null;
   #isAsking = false;
   #isChanged = false;
 
@@ -55,6 +57,7 @@ export class LiveSensors {
 
   /** See `Source`. The node gets the newest sections when it has answered the request before. */
   async change(name, section) {
+    if (!this.#sections) return;
     this.#sections = { ...this.#sections, [name]: section ?? undefined };
     this.#isChanged = true;
     if (this.#isAsking) return;
@@ -78,16 +81,20 @@ export class LiveSensors {
 
   /** Follow the choice of the simulation that is shown live; called for each picture of the view. */
   follow() {
-    const { simulations } = this.live;
+    const { connections, simulations } = this.live;
     const [name] = simulations.size === 1 ? simulations : [""];
-    if (name === this.station) return;
+    if (name === this.station && connections === this.#connection) return;
+    const isSame = this.#isOpen && name === this.station;
     this.#close();
     this.station = name;
+    this.#connection = connections;
     get("show-sensors").hidden = !name;
+    if (isSame) this.#open();
   }
 
   #open() {
     this.#isOpen = true;
+    this.#sections = null;
     get("show-sensors").setAttribute("aria-pressed", "true");
     this.strip.put(this, []);
     this.strip.tell("waiting for the sensors …");
@@ -123,7 +130,7 @@ export class LiveSensors {
     }
   }
 
-  /** Forget what the user wanted: the sensors are as the node says. */
+  /** Forget what the user wanted: the sensors are as the node has them. */
   #forget(sensors = this.strip.sensors) {
     this.#sections = Object.fromEntries(sensors.map(({ name, section }) => [name, section]));
   }

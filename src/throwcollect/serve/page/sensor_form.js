@@ -20,7 +20,7 @@ const NUMBERS = [
 /** For this time, the form shows what the user has set, and not what comes back from the sensor [ms]. */
 const SETTLES_MS = 1000;
 
-/** Shows the keys of the sensor that was chosen, and says what the user changes. */
+/** Shows the keys of the sensor that was chosen, and reports what the user changes. */
 export class SensorForm {
   #name = "";
   #section = {};

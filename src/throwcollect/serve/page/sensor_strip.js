@@ -9,7 +9,7 @@ import { rpyOf, toYaml } from "./sensor_frames.js";
 /**
  * @typedef {object} Source what the sensors of the strip see: a stored throw, or a simulation
  * @property {string} station whose robot carries them
- * @property {(name: string) => boolean} mayChange says whether a sensor can be changed and removed
+ * @property {(name: string) => boolean} mayChange whether a sensor can be changed and removed
  * @property {(name: string, section: object | null) => void} change adds or changes a sensor; null removes it
  */
 
@@ -86,7 +86,7 @@ export class SensorStrip {
     return this.view.stations.get(this.source?.station);
   }
 
-  /** @param {string} text says what is wrong, or was done */
+  /** @param {string} text what is wrong, or was done */
   tell(text) {
     setText(get("sensors-note"), text);
   }
@@ -154,7 +154,7 @@ export class SensorStrip {
     const [place, turn] = [new Vector3(), new Quaternion()];
     (link ? link.invert().multiply(pose) : pose).decompose(place, turn, new Vector3());
     const [position_m, rotation_xyzw] = [place.toArray().map(round), turn.toArray()];
-    // It is drawn there at once; what comes back from the source says the same.
+    // It is drawn there at once; what comes back from the source is the same.
     Object.assign(sensor, { position_m, rotation_xyzw, section: { ...sensor.section, position_m, look_at_m: null, rpy_rad: rpyOf(rotation_xyzw).map(round) } });
     if (sensor.name === this.#chosen) this.form.put(sensor);
   }

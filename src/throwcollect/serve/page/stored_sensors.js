@@ -69,6 +69,8 @@ export class StoredSensors {
       this.strip.put(null, []);
     }
     this.#recorded = sensors;
+    // A recorded sensor takes the name of a camera that was added to another throw.
+    for (const { name } of sensors) this.#added.delete(name);
     if (shown) this.#put();
     if (this.strip.source === this) for (const strand of this.strip.strands) Object.assign(strand, { shown: -1, isAsking: false });
   }

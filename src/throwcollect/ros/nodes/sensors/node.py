@@ -47,7 +47,7 @@ class SensorNode(Node):
 
     Each number and word of a sensor is a parameter, such as ``sensors.head.vertical_fov_rad``, and the parameter
     ``sensors`` has all sections in JSON, to add and to remove sensors; the next frame shows a change. The latched topic
-    ``sensors`` says in JSON what sensors there are. In real time, frames come at most as often as `rate_hz` says of
+    ``sensors`` lists in JSON what sensors there are. In real time, frames come at most as often as `rate_hz` demands in
     simulated time.
     """
 
@@ -90,7 +90,11 @@ class SensorNode(Node):
     def _change(self, parameters: list[Parameter]) -> SetParametersResult:
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
-            config = with_sensors(self._config, json.loads(values.pop(NAME))) if NAME in values else self._config
+            config = self._config
+            if NAME in values:
+                if not isinstance(sections := json.loads(values.pop(NAME)), dict):
+                    raise TypeError(f"got a {type(sections).__name__}")
+                config = with_sensors(config, sections)
             # The parameters of sensors that were removed are undeclared.
             known = {leaf.name for leaf in leaves(config)}
             config = with_values(config, {name: value for name, value in values.items() if name in known})
