@@ -34,20 +34,24 @@ def measure(directory: Path) -> tuple[float, float]:
         directory: A finished dataset, whose episodes are collected once more.
     """
     dataset = Dataset.open(directory)
-    settings = Settings(dataset.config)
-    columns = task_of(dataset.config).columns
-    messages = []
+    messages = list(sign_episodes(dataset, _SIGNER).values())
+    random.Random(0).shuffle(messages)
+    with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
+        taken_in = _take_in(messages, dataset.plan, Settings(dataset.config), Path(scratch) / "data")
+        return taken_in, _raw(messages, Path(scratch) / "raw")
+
+
+def sign_episodes(dataset: Dataset, signer: Signer) -> dict[int, bytes]:
+    """Make the messages that hand over the episodes of a dataset, by trial."""
+    settings, columns = Settings(dataset.config), task_of(dataset.config).columns
+    messages = {}
     for episode in dataset.episodes():
-        trial = dataset.plan.trial(episode.header.trial)
-        config = dataset.plan.config_of(trial)
+        config = dataset.plan.config_of(dataset.plan.trial(episode.header.trial))
         result = columns.to_json(judge_episode(config, episode))
         conditions = settings.conditions_of(config, trajectory_of(config).digest)
         judged = Episode(episode.header, episode.chunk, result=result, conditions=conditions)
-        messages.append(pack(judged, _SIGNER))
-    random.Random(0).shuffle(messages)
-    with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        taken_in = _take_in(messages, dataset.plan, settings, Path(scratch) / "data")
-        return taken_in, _raw(messages, Path(scratch) / "raw")
+        messages[episode.header.trial] = pack(judged, signer)
+    return messages
 
 
 def _take_in(messages: list[bytes], plan: Plan, settings: Settings, directory: Path) -> float:
