@@ -44,7 +44,6 @@ _TRIALS_AT_ONCE = 25
 """Number of trials whose arrays stay in the processor's cache."""
 _Trial = tuple[Config, JointTrajectory]
 
-
 Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 """Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, n_joints)``, in the order of
 `Robot.joints`."""
@@ -135,6 +134,9 @@ class Feasibility:
         sure = np.zeros(len(trials), np.bool_)
         for _, group in groupby(enumerate(trials), lambda numbered: _describe_shapes(numbered[1][0])):
             numbers, alike = zip(*group, strict=True)
+            if len(alike) == 1:
+                # There is nothing to share.
+                continue
             with suppress(ConfigError):
                 sure[[*numbers]] = self._find_feasible_alike(alike)
         return sure
@@ -142,7 +144,8 @@ class Feasibility:
     def _find_feasible_alike(self, trials: Sequence[_Trial]) -> NDArray[np.bool_]:
         """Find trials that `check` surely accepts among some whose tool and bodies have the same shapes and places."""
         config = trials[0][0]
-        tool, bodies, free = self._tool_of(config), bodies_of(config), self._dynamics_of_free_joints(config).columns
+        tool, bodies, dynamics = self._tool_of(config), bodies_of(config), self._dynamics_of_free_joints(config)
+        free = dynamics.columns
         offsets = np.array([joint_offsets(each) for each, _ in trials])
         postures = np.array([[*start_posture(each).values()] for each, _ in trials]) + offsets
         keys = [(posture.tobytes(), object_of(each)) for posture, (each, _) in zip(postures, trials, strict=True)]
@@ -158,7 +161,7 @@ class Feasibility:
         ways, counts = [], []
         for first in range(0, len(trials), _TRIALS_AT_ONCE):
             some = slice(first, first + _TRIALS_AT_ONCE)
-            within, way, count = self._find_within_limits(trials[some], postures[some], offsets[some])
+            within, way, count = self._find_within_limits(dynamics, trials[some], postures[some], offsets[some])
             sure[some] &= within
             ways.append(way.T)
             counts.append(count)
@@ -170,15 +173,18 @@ class Feasibility:
         return sure
 
     def _find_within_limits(
-        self, trials: Sequence[_Trial], postures: NDArray[np.float64], offsets: NDArray[np.float64]
+        self,
+        dynamics: Dynamics,
+        trials: Sequence[_Trial],
+        postures: NDArray[np.float64],
+        offsets: NDArray[np.float64],
     ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.intp]]:
         """Find trials whose free joints surely keep their limits, and move the tool where they have to.
 
         Returns:
             Whether each does; the free joints at the instants of one trial after the other; numbers of these instants.
         """
-        config, dynamics = trials[0][0], self._dynamics_of_free_joints(trials[0][0])
-        free, limits = dynamics.columns, self._limits
+        task, free, limits = trials[0][0].task, dynamics.columns, self._limits
         joined, times, counts = _join([trajectory for _, trajectory in trials])
         firsts, numbers = np.cumsum(counts) - counts, np.repeat(np.arange(len(trials)), counts)
         speeds = np.array([[each.robot.speed_scale] for each, _ in trials])[numbers]
@@ -198,7 +204,7 @@ class Feasibility:
         ):
             within &= (shares_of(values, limit[free]) <= _SURELY).all(axis=1)
         sure: NDArray[np.bool_] = np.logical_and.reduceat(within, firsts)
-        if config.task.tool_acts and config.task.policy is None:
+        if task.tool_acts and task.policy is None:
             moved = np.abs(motion[0][firsts + counts - 1] - motion[0][firsts])[:, np.isin(free, self._carrying)]
             sure &= moved.max(axis=1, initial=0.0) > _POSITION_SLACK_RAD
         return sure, motion[0], counts
