@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 from docker.client import DockerClient
-from docker.errors import ImageNotFound
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.docker_engine import connect, default_tag, is_outdated
+from throwcollect.runtimes.docker.docker_engine import connect, default_tag, find_image
+from throwcollect.runtimes.image_sources import SOURCES_LABEL, are_others
 
 UNAVAILABLE = Path(__file__).parents[2] / "build" / "engine-unavailable"
 
@@ -21,10 +21,8 @@ def client() -> Iterator[DockerClient]:
         # Continuous integration writes this file with the reason if it could not start an engine.
         pytest.skip(UNAVAILABLE.read_text().strip() if UNAVAILABLE.exists() else error.message)
     with closing(found):
-        try:
-            found.images.get(default_tag())
-        except ImageNotFound:
+        if (image := find_image(found, default_tag())) is None:
             pytest.skip(f"the engine has no image {default_tag()}; make image builds it")
-        if is_outdated(found, default_tag()):
+        if are_others(image.labels.get(SOURCES_LABEL)):
             pytest.skip(f"the image {default_tag()} is of other sources; make image builds it anew")
         yield found
