@@ -263,13 +263,22 @@ def test_the_compiled_loop_is_kept_where_it_can_be_written(monkeypatch: pytest.M
     # Not even root can write there.
     monkeypatch.setattr(loop, "_DIRECTORY", Path("/proc/self"))
     assert loop._keep("1", lambda: b"code") == (b"code", "compiled")
-    assert [path.read_bytes() for path in state.iterdir()] == [b"code"]
+    (kept,) = state.iterdir()
     assert loop._keep("1", refuse) == (b"code", "compiled")
+    # LLVM would crash on a file that was cut, or whose content is another.
+    whole = kept.read_bytes()
+    for damaged in (b"", whole[:-1], whole[:-4] + b"done"):
+        kept.write_bytes(damaged)
+        assert loop._keep("1", lambda: b"code") == (b"code", "compiled")
+        assert kept.read_bytes() == whole
     # Another LLVM compiles it anew.
     assert loop._keep("2", lambda: b"other") == (b"other", "compiled")
     monkeypatch.setattr(loop, "_DIRECTORY", tmp_path / "own" / "__pycache__")
     (tmp_path / "own").mkdir()
     assert loop._keep("3", lambda: b"code") == (b"code", "compiled")
+    assert loop._keep("4", lambda: b"code") == (b"code", "compiled")
+    assert loop._keep("4", refuse) == (b"code", "compiled")
+    # What an earlier version has left there goes.
     assert len(list((tmp_path / "own" / "__pycache__").iterdir())) == 1
 
 

@@ -37,7 +37,7 @@ _OFF = "NUMBA_DISABLE_JIT"
 
 _NAME = "take_steps"
 _DIRECTORY = Path(__file__).parent / "__pycache__"
-_LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco.*"))
+_DIGEST_BYTES = hashlib.sha256().digest_size
 _C_TYPES = {"int": ctypes.c_int64, "float": ctypes.c_double}
 """Types of the arguments of `stepping.take_steps` that are no addresses."""
 
@@ -102,14 +102,16 @@ def _make_compiled() -> Loop:
 
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
-    library = ctypes.CDLL(str(_LIBRARY))
+    path = next(Path(mujoco.__file__).parent.glob("libmujoco.*"))
+    library = ctypes.CDLL(str(path))
     for name in ("mj_step1", "mj_step2", "mj_rne", "sqrt"):
         binding.add_symbol(name, ctypes.cast(getattr(library, name), ctypes.c_void_p).value)
     # MuJoCo would look at the clock a dozen times in each step, for statistics that nobody reads.
     ctypes.c_void_p.in_dll(library, "mjcb_time").value = None
     # No processor is named, so that another one of this kind can use the result.
     machine = binding.Target.from_default_triple().create_target_machine(opt=3)
-    content, made = _keep(__version__, lambda: machine.emit_object(binding.parse_assembly(_compile())))
+    facts = f"{path.name} {path.stat().st_size} {__version__} {platform.machine()}"
+    content, made = _keep(facts, lambda: machine.emit_object(binding.parse_assembly(_compile())))
     executor = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
     executor.add_object_file(binding.ObjectFileRef.from_data(content))
     executor.finalize_object()
@@ -125,22 +127,26 @@ def _make_compiled() -> Loop:
     return Loop(take_steps, list_world, lambda numbers: numbers.ctypes.data, True, made)
 
 
-def _keep(version: str, compile_loop: Callable[[], bytes]) -> tuple[bytes, str]:
+def _keep(facts: str, compile_loop: Callable[[], bytes]) -> tuple[bytes, str]:
     """Read the compiled loop, or compile and keep it; return its content, and how that was done."""
-    facts = [path.read_bytes() for path in (Path(stepping.__file__), Path(__file__))]
-    facts += [f"{_LIBRARY.name} {_LIBRARY.stat().st_size} {version} {platform.machine()}".encode()]
-    name = f"{_NAME}.{hashlib.sha256(b''.join(facts)).hexdigest()[:16]}.o"
+    sources = [path.read_bytes() for path in (Path(stepping.__file__), Path(__file__))]
+    name = f"{_NAME}.{hashlib.sha256(b''.join(sources) + facts.encode()).hexdigest()[:16]}.o"
     paths = [_DIRECTORY / name]
     with suppress(ConfigError):
         paths.append(state_directory() / name)
     for path in paths:
         with suppress(OSError):
-            return path.read_bytes(), "compiled"
+            kept = path.read_bytes()
+            # LLVM would crash on a damaged file.
+            if hashlib.sha256(kept[_DIGEST_BYTES:]).digest() == kept[:_DIGEST_BYTES]:
+                return kept[_DIGEST_BYTES:], "compiled"
     content = compile_loop()
     for path in paths:
         with suppress(OSError, ThrowcollectError):
             path.parent.mkdir(exist_ok=True)
-            write_file(path, content)
+            for old in _DIRECTORY.glob(f"{_NAME}.*.o"):
+                old.unlink()
+            write_file(path, hashlib.sha256(content).digest() + content)
             return content, "compiled"
     return content, "compiled by each process anew, as neither its own directory nor that of runs can be written"
 
