@@ -24,6 +24,7 @@ TOPICS = EVERY_NODE | {
     "/sim_0/clock": "rosgraph_msgs/msg/Clock",
     "/sim_0/robot_description": "std_msgs/msg/String",
     "/sim_0/episode": "std_msgs/msg/UInt8MultiArray",
+    "/sim_0/sensors": "std_msgs/msg/String",
 }
 CONTROL = [
     "GetSimulatorFeatures",
