@@ -93,7 +93,10 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         ("sensors:\n  eye: {kind: camera, rate_hz: 30}", "s.yaml:2: sensors.eye.rate_hz: should divide record.rate"),
         ("sensors:\n\n  eye: {kind: camera, link: hed_2_link}", "s.yaml:3: sensors.eye.link: there is no link"),
-        ("sensors: {}", "s.yaml:1: sensors.eye.vertical_fov_rad: the dataset sweeps it, so the sensors should have it: unknown key"),
+        (
+            "sensors: {}",
+            "s.yaml:1: sensors.eye.vertical_fov_rad: the dataset sweeps it, so the sensors should have it: unknown key",
+        ),
         ("sensors: {eye: {kind: camera},\n  ball: {kind: camera}}", "s.yaml:2: sensors.ball: should have another name"),
         ("sensors: {}\ntrials: 3", "s.yaml:2: trials: unknown key; known: sensors"),
         ("trials: 3", "s.yaml: sensors: missing"),
