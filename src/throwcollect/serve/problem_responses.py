@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fastapi import Request
+from fastapi import WebSocket
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
 
 from throwcollect.errors import (
     ConfigError,
@@ -21,6 +22,7 @@ from throwcollect.errors import (
     WorkerError,
 )
 from throwcollect.extras import MissingExtraError
+from throwcollect.serve.sockets import close
 
 _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (NotFoundError, 404),
@@ -72,9 +74,12 @@ def answer(error: ThrowcollectError) -> ProblemResponse:
     )
 
 
-async def answer_any(_: Request, error: Exception) -> ProblemResponse:
+async def answer_any(connection: HTTPConnection, error: Exception) -> ProblemResponse | None:
     """Answer an error of any kind: our own, one that FastAPI or Starlette raises, or an unexpected one."""
     match error:
+        case ThrowcollectError() if isinstance(connection, WebSocket):
+            await close(connection, error)
+            return None
         case ThrowcollectError():
             return answer(error)
         case RequestValidationError():

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from fastapi import APIRouter, WebSocket
 
-from throwcollect.errors import ConflictError, ThrowcollectError, UnreachableError
+from throwcollect.errors import ConflictError, NotFoundError, UnreachableError
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
-from throwcollect.serve.sockets import close, refuse, refuse_ended, wait_for_end
 from throwcollect.serve.throws import ThrowWatch
+
+_LOOK_S = 1.0
 
 
 @dataclass
@@ -75,29 +76,37 @@ def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
 
 
 async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Run]) -> None:
-    async with AsyncExitStack() as stack:
-        try:
-            run = await asyncio.to_thread(find_run)
-            bridge = (await stack.enter_async_context(bridges.share(run))).bridge
-        except ThrowcollectError as error:
-            await refuse(socket, error)
-            return
-        ending = asyncio.create_task(_close_at_end(socket, run, bridge))
-        stack.callback(ending.cancel)
-        await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
+    run = await asyncio.to_thread(find_run)
+    async with bridges.share(run) as shared:
+        await socket.accept()
+        read_only = not socket.state.may_change
+        await attend(socket, shared.bridge, wait_for_end(run, shared.bridge), read_only=read_only)
 
 
-async def _close_at_end(socket: WebSocket, run: Run, bridge: Bridge) -> None:
-    try:
-        await wait_for_end(run, bridge)
-    except ThrowcollectError as error:
-        await close(socket, error)
+async def wait_for_end(run: Run, bridge: Bridge | None = None) -> None:
+    """Wait until a run has ended, or its bridge is over, and raise an error then.
+
+    Raises:
+        NotFoundError: If the run has ended, or was forgotten.
+        ConfigError: If its record is damaged.
+        UnreachableError: If the router has gone; the one that comes next needs another bridge.
+    """
+    while bridge is None or not bridge.is_over:
+        _refuse_ended(await asyncio.to_thread(run.now))
+        await asyncio.sleep(_LOOK_S)
+    raise UnreachableError("the router of the run has gone; connect again")
+
+
+def _refuse_ended(run: Run) -> None:
+    """Refuse a run that has ended, so that nobody would ever answer."""
+    if run.status == "ended":
+        raise NotFoundError(f"run {run.id} has ended")
 
 
 def _find(instances: Instances, instance: str) -> Run:
     """The run of an id."""
     run = instances.get(instance)
-    refuse_ended(run)
+    _refuse_ended(run)
     return run
 
 

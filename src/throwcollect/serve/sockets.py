@@ -1,21 +1,16 @@
-"""Sockets on which the server sends and the client only listens, until their run has ended."""
+"""Sockets of clients: what ends them, and the codes with which they are closed."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, MutableMapping
 from contextlib import suppress
 from typing import Any
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
-from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError, UnreachableError
-from throwcollect.runs.run import Run
-from throwcollect.serve.rosbridge import Bridge
-
-_LOOK_S = 1.0
-
+from throwcollect.errors import ConfigError, ThrowcollectError
 
 NOT_FOUND = 4404
 """Close code of a socket to something that does not exist."""
@@ -32,12 +27,6 @@ _MOST_REASON = 123
 _logger = logging.getLogger(__name__)
 
 
-async def refuse(socket: WebSocket, error: ThrowcollectError) -> None:
-    """Accept a socket and close it at once, because a page learns nothing about a socket that was not accepted."""
-    await socket.accept()
-    await close(socket, error)
-
-
 async def close(socket: WebSocket, error: ThrowcollectError) -> None:
     """Close a socket because of an error, with the first line of its message, cut to the size that fits."""
     # A record that is damaged, too, describes no run any more.
@@ -47,19 +36,31 @@ async def close(socket: WebSocket, error: ThrowcollectError) -> None:
     reason = first.encode()[:_MOST_REASON].decode(errors="ignore")
     # If the client has left meanwhile, the socket is closed already.
     with suppress(RuntimeError, WebSocketDisconnect):
+        if socket.application_state is WebSocketState.CONNECTING:
+            # A page learns nothing about a socket that was not accepted.
+            await socket.accept()
         await socket.close(code, reason)
 
 
-async def keep_telling(socket: WebSocket, *telling: Coroutine[Any, Any, object]) -> None:
+async def ignore(_: MutableMapping[str, Any]) -> None:
+    """Ignore a message of a client."""
+
+
+async def keep_telling(
+    socket: WebSocket,
+    *telling: Coroutine[Any, Any, object],
+    hear: Callable[[MutableMapping[str, Any]], Awaitable[None]] = ignore,
+) -> None:
     """Let coroutines send to a client until the client has left, or one of them has nothing more to send.
 
-    If one of them fails, the socket is closed with a code; an unexpected error gets into the log, too.
+    `hear` gets the messages of the client. If something fails, the socket is closed with a code; an unexpected error
+    gets into the log, too.
     """
 
     async def wait_until_gone() -> None:
-        # Messages of the client are ignored, but only reading shows that it has left.
-        while (await socket.receive())["type"] != "websocket.disconnect":
-            pass
+        # Only reading shows that the client has left.
+        while (message := await socket.receive())["type"] != "websocket.disconnect":
+            await hear(message)
 
     tasks = [asyncio.create_task(each) for each in (wait_until_gone(), *telling)]
     try:
@@ -79,23 +80,3 @@ async def keep_telling(socket: WebSocket, *telling: Coroutine[Any, Any, object])
                 if isinstance(error, RuntimeError):
                     continue
             _logger.error("telling a client failed", exc_info=error)
-
-
-def refuse_ended(run: Run) -> None:
-    """Refuse a run that has ended, so that nobody would ever answer."""
-    if run.status == "ended":
-        raise NotFoundError(f"run {run.id} has ended")
-
-
-async def wait_for_end(run: Run, bridge: Bridge | None = None) -> None:
-    """Wait until a run has ended, or its bridge is over, and raise an error then.
-
-    Raises:
-        NotFoundError: If the run has ended, or was forgotten.
-        ConfigError: If its record is damaged.
-        UnreachableError: If the router has gone; the one that comes next needs another bridge.
-    """
-    while bridge is None or not bridge.is_over:
-        refuse_ended(await asyncio.to_thread(run.now))
-        await asyncio.sleep(_LOOK_S)
-    raise UnreachableError("the router of the run has gone; connect again")

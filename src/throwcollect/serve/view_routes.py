@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from contextlib import AsyncExitStack
 
 from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
-from throwcollect.errors import ThrowcollectError
-from throwcollect.runs.run import Run
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import slow_down
@@ -23,8 +20,8 @@ from throwcollect.serve.robot_files import (
     list_meshes,
     scene_of,
 )
-from throwcollect.serve.rosbridge_routes import Bridges
-from throwcollect.serve.sockets import MAY_NOT, keep_telling, refuse, wait_for_end
+from throwcollect.serve.rosbridge_routes import Bridges, wait_for_end
+from throwcollect.serve.sockets import MAY_NOT, keep_telling
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
@@ -78,41 +75,27 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
 
     @router.websocket("/instances/{instance}/shown")
     async def stream_throws(socket: WebSocket, instance: str) -> None:
-        async with AsyncExitStack() as stack:
-            try:
-                run = await asyncio.to_thread(instances.get, instance)
-                shared = await stack.enter_async_context(bridges.share(run))
-            except ThrowcollectError as error:
-                await refuse(socket, error)
-                return
+        run = await asyncio.to_thread(instances.get, instance)
+        async with bridges.share(run) as shared, shared.throws.throws() as next_throw:
             await socket.accept()
-            next_throw = await stack.enter_async_context(shared.throws.throws())
             await keep_telling(socket, _send_throws(socket, next_throw), wait_for_end(run, shared.bridge))
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
-        await _keep_slow(socket, lambda: instances.get(instance), simulation)
+        """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
+        if not socket.state.may_change:
+            await socket.accept()
+            await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
+            return
+        run = await asyncio.to_thread(instances.get, instance)
+        hold = await asyncio.to_thread(slow_down, run, simulation)
+        try:
+            await socket.accept()
+            await keep_telling(socket, wait_for_end(run))
+        finally:
+            await asyncio.to_thread(hold.restore_speed)
 
     return router
-
-
-async def _keep_slow(socket: WebSocket, find_run: Callable[[], Run], simulation: str) -> None:
-    """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
-    if not socket.state.may_change:
-        await socket.accept()
-        await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
-        return
-    try:
-        run = await asyncio.to_thread(find_run)
-        hold = await asyncio.to_thread(slow_down, run, simulation)
-    except ThrowcollectError as error:
-        await refuse(socket, error)
-        return
-    try:
-        await socket.accept()
-        await keep_telling(socket, wait_for_end(run))
-    finally:
-        await asyncio.to_thread(hold.restore_speed)
 
 
 async def _send_throws(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:

@@ -10,7 +10,7 @@ from starlette.websockets import WebSocketDisconnect
 from tests.unit.serve.conftest import Remember, Served
 
 from throwcollect.ros.router import router
-from throwcollect.serve import sockets
+from throwcollect.serve import rosbridge_routes
 
 
 def end_of(served: Served, path: str) -> tuple[int, str]:
@@ -29,7 +29,7 @@ def test_a_client_without_a_living_run_is_turned_away_with_the_reason(served: Se
 def test_a_socket_is_closed_with_the_reason_when_its_run_ends_or_is_forgotten(
     path: str, served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sockets, "_LOOK_S", 0.05)
+    monkeypatch.setattr(rosbridge_routes, "_LOOK_S", 0.05)
     with router("tcp/127.0.0.1:0") as endpoint:
         run = remember("small", endpoint=endpoint)
         with served.socket(path, served.keys.full) as socket:

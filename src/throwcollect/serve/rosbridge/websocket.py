@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import deque
+from collections.abc import Coroutine, MutableMapping
 from contextlib import suppress
+from typing import Any
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.codec import Frame, json_text
 from throwcollect.serve.rosbridge.requests import Requests
+from throwcollect.serve.sockets import keep_telling
 
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20
@@ -72,40 +75,28 @@ class Outbox:
         self._bytes += len(frame)
 
 
-async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool) -> None:
-    """Accept the WebSocket of a client, and connect it to a bridge until it leaves."""
-    await websocket.accept()
+async def attend(websocket: WebSocket, bridge: Bridge, *until: Coroutine[Any, Any, object], read_only: bool) -> None:
+    """Connect the accepted WebSocket of a client to a bridge until it leaves, or one of the coroutines ends."""
     outbox = Outbox(asyncio.get_running_loop())
     requests = Requests(bridge, outbox.put, read_only=read_only)
-    sending = asyncio.create_task(_send_all(websocket, outbox))
-    try:
-        await _receive_all(websocket, bridge, requests)
-    finally:
-        requests.close()
-        sending.cancel()
-        with suppress(asyncio.CancelledError):
-            await sending
 
-
-async def _receive_all(websocket: WebSocket, bridge: Bridge, requests: Requests) -> None:
-    while True:
-        message = await websocket.receive()
-        if message["type"] == "websocket.disconnect":
-            return
+    async def hear(message: MutableMapping[str, Any]) -> None:
         text: str | None = message.get("text")
-        frame: Frame = message["bytes"] if text is None else text
-        requests.receive(frame)
+        requests.receive(message["bytes"] if text is None else text)
         # If a client sends faster than the bridge works, its frames are not read for a while, so TCP makes it wait.
         while requests.waiting > _MOST_WAITING and not bridge.is_over:
             await asyncio.sleep(_POLL_S)
 
+    try:
+        await keep_telling(websocket, _send_all(websocket, outbox), *until, hear=hear)
+    finally:
+        requests.close()
+
 
 async def _send_all(websocket: WebSocket, outbox: Outbox) -> None:
-    # The errors mean that the client has left, which `_receive_all` handles.
-    with suppress(WebSocketDisconnect, RuntimeError):
-        while True:
-            frame = await outbox.take()
-            if isinstance(frame, str):
-                await websocket.send_text(frame)
-            else:
-                await websocket.send_bytes(frame)
+    while True:
+        frame = await outbox.take()
+        if isinstance(frame, str):
+            await websocket.send_text(frame)
+        else:
+            await websocket.send_bytes(frame)

@@ -128,6 +128,7 @@ def serve_by_websocket(bridge: Bridge) -> Iterator[str]:
     """Serve a bridge over WebSockets, and give its address."""
 
     async def route(websocket: WebSocket) -> None:
+        await websocket.accept()
         await attend(websocket, bridge, read_only=False)
 
     app = Starlette(routes=[WebSocketRoute("/", route)])
