@@ -5,27 +5,28 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Hashable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.controller_reports import (
     ControllerState,
+    ErrorCode,
     GoalResult,
     GoalStatus,
     JointState,
     TrajectoryRefusal,
     TrajectoryState,
 )
-from throwcollect.control.decision import CANCELED, Decision, Judge
+from throwcollect.control.decision import Judge
 from throwcollect.control.followed_curve import Motion
 from throwcollect.control.goal import Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.control.interpolation import interpolate
 from throwcollect.control.parameters import ControllerParameters
-from throwcollect.control.stopping import brake
 from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
 from throwcollect.control.validation import refusal
-from throwcollect.control.waypoints import Waypoints, arrange
+from throwcollect.control.waypoints import Waypoints, arrange, brake
 
 REPEATED = "repeated"
 """Attribute of log records that clients can cause as often as they like; its value is the subject of the record. A log
@@ -123,7 +124,7 @@ class JointTrajectoryController:
 
     def reset(self, time_ns: int, measured: JointState) -> None:
         """Begin now [ns], or anew after a reset of the simulation: abort the goal, and hold the measured positions."""
-        self._finish(Decision.invalid("simulation was reset"))
+        self._abort("simulation was reset")
         self._time_ns, self._measured, self._scaling = time_ns, measured, 1.0
         self._begin(Waypoints.single(measured.positions), measured)
         self.command = self._motion.command
@@ -142,7 +143,7 @@ class JointTrajectoryController:
         """
         if reason := self._find_refusal(goal.trajectory, now_ns):
             return reason
-        self._finish(Decision.invalid("Current goal preempted by new incoming action."))
+        self._abort("Current goal preempted by new incoming action.")
         self.goal_id = goal_id
         tolerances = goal_tolerances(goal, self._defaults, self._parameters.joints, logger=self.logger)
         self._follow(goal.trajectory, self._judge_with(tolerances))
@@ -153,7 +154,7 @@ class JointTrajectoryController:
         if reason := self._find_refusal(trajectory, now_ns):
             return reason
         if self._topic_aborts_goal:
-            self._finish(Decision.invalid("Current goal preempted by a trajectory on the topic."))
+            self._abort("Current goal preempted by a trajectory on the topic.")
         # An open goal keeps its own tolerances, which the new trajectory has to meet.
         self._follow(trajectory, self._judge if self.goal_id is not None else self._judge_with(self._defaults))
         return None
@@ -172,7 +173,7 @@ class JointTrajectoryController:
         if self.goal_id is None or self.goal_id != goal_id:
             return False
         self._stop()
-        self._finish(CANCELED)
+        self._finish(GoalResult(GoalStatus.CANCELED, ErrorCode.SUCCESSFUL, ""))
         return True
 
     def update(self, time_ns: int, measured: JointState) -> NDArray[np.float64]:
@@ -291,13 +292,13 @@ class JointTrajectoryController:
             curve, start_ns=start_ns, first_ns=self._time_ns, period_ns=self._period_ns, scaling=self._scaling
         )
 
-    def _decide(self, *, first: bool) -> Decision | None:
+    def _decide(self, *, first: bool) -> GoalResult | None:
         motion = self._motion
         if (decision := self._judge.decide(motion, self._measured, first=first)) is None:
             return None
         if decision.status is GoalStatus.ABORTED:
             remark = "" if self.goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
-            self.logger.warning("%s: %s%s", self.name, decision.text, remark)
+            self.logger.warning("%s: %s%s", self.name, decision.error_string, remark)
             self._stop()
         # An end that no goal waits for is judged again in each update until its goal time is over.
         elif self.goal_id is not None or self._judge.is_settled(motion):
@@ -319,9 +320,13 @@ class JointTrajectoryController:
         else:
             self._hold(Waypoints.single(self.command if self._holds_command else measured.positions))
 
-    def _finish(self, decision: Decision) -> None:
+    def _abort(self, reason: str) -> None:
+        """Drop the goal for a reason outside of its trajectory."""
+        self._finish(GoalResult(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, reason))
+
+    def _finish(self, result: GoalResult) -> None:
         if self.goal_id is not None:
-            self._results.append(GoalResult(self.goal_id, decision.status, decision.error_code, decision.text))
+            self._results.append(replace(result, goal_id=self.goal_id))
             self.goal_id = None
 
     def _judge_with(self, tolerances: Tolerances) -> Judge:

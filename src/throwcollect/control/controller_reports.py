@@ -47,19 +47,19 @@ class TrajectoryRefusal:
 
 @dataclass(frozen=True)
 class GoalResult:
-    """The end of a goal.
+    """The end of a goal, or of a trajectory that no goal asks for.
 
     Attributes:
-        goal_id: Identity of the goal, as it was submitted.
         status: How it ended.
         error_code: Why.
-        error_string: Why, in words; empty for a cancelled goal.
+        error_string: Why, in words that begin with upstream's text, which clients know; empty for a cancelled goal.
+        goal_id: Identity of the goal, as it was submitted; None without a goal.
     """
 
-    goal_id: Hashable
     status: GoalStatus
     error_code: ErrorCode
     error_string: str
+    goal_id: Hashable | None = None
 
 
 @dataclass(frozen=True)

@@ -5,33 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from throwcollect.control.controller_reports import ErrorCode, GoalStatus, JointState
+from throwcollect.control.controller_reports import ErrorCode, GoalResult, GoalStatus, JointState
 from throwcollect.control.followed_curve import Motion
 from throwcollect.control.tolerances import Limits, Tolerances, violations
-
-
-@dataclass(frozen=True)
-class Decision:
-    """Why a trajectory is over.
-
-    Attributes:
-        status: Whether its end was reached or a tolerance was broken.
-        error_code: Which tolerance was broken.
-        text: The reason in words; it begins with upstream's text, which clients know.
-    """
-
-    status: GoalStatus
-    error_code: ErrorCode
-    text: str
-
-    @classmethod
-    def invalid(cls, text: str) -> Decision:
-        """Make the decision to drop a goal, for a reason outside of the trajectory."""
-        return cls(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, text)
-
-
-CANCELED = Decision(GoalStatus.CANCELED, ErrorCode.SUCCESSFUL, "")
-"""A goal was cancelled by its client."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +24,7 @@ class Judge:
     timeout_ns: int
     joints: Sequence[str]
 
-    def decide(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
+    def decide(self, motion: Motion, measured: JointState, *, first: bool) -> GoalResult | None:
         """Judge one update; None while the trajectory goes on, or has ended but the joints are not there yet.
 
         In the `first` update of a motion, the path is checked even if the end has come.
@@ -58,7 +34,7 @@ class Judge:
             broken = self._find_violations(motion, measured, self.tolerances.path)
             if broken:
                 text = f"Aborted due to path tolerance violation: {broken}"
-                return Decision(GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, text)
+                return GoalResult(GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, text)
         if not past_end:
             return None
         # As ros2_controllers do: a timeout of 0, and a tolerance of time of 0, mean that there is none.
@@ -66,14 +42,14 @@ class Judge:
         late_ns = motion.since_end_ns
         if 0 < self.timeout_ns < late_ns:
             text = f"Aborted due to command timeout: {late_ns / 1e9:f} seconds after the end"
-            return Decision(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
+            return GoalResult(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
         goal = self.tolerances.goal
         broken = self._find_violations(motion, measured, goal) if goal.any() else ""
         if not broken:
-            return Decision(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "Goal successfully reached!")
+            return GoalResult(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "Goal successfully reached!")
         if 0 < self.tolerances.goal_time_ns < late_ns:
             text = f"Aborted due to goal_time_tolerance exceeding by {late_ns / 1e9:f} seconds: {broken}"
-            return Decision(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
+            return GoalResult(GoalStatus.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
         return None
 
     def updates_to_skip(self, motion: Motion, *, goal: bool) -> int | None:

@@ -7,23 +7,20 @@ not finite and a negative first time are refused, as upstream would command nons
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from throwcollect.control.controller_reports import ErrorCode, TrajectoryRefusal
-from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
+from throwcollect.control.goal import Trajectory, Values
 from throwcollect.control.parameters import ControllerParameters
 
 END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
 """Largest magnitude of a last point's velocity that counts as zero [rad/s] (ros2_controllers)."""
 
 
-_FIELDS: tuple[tuple[str, Callable[[TrajectoryPoint], Values]], ...] = (
-    ("position", lambda point: point.positions),
-    ("velocity", lambda point: point.velocities),
-    ("acceleration", lambda point: point.accelerations),
-)
+_FIELDS = {"positions": "Position", "velocities": "Velocity", "accelerations": "Acceleration"}
+"""Fields of a point that are commanded, with the word for one value of each."""
 
 
 def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> TrajectoryRefusal | None:
@@ -76,11 +73,7 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> st
     expected = len(trajectory.joint_names)
     integrates = parameters.allow_integration_in_goal_trajectories
     for index, point in enumerate(trajectory.points):
-        fields = [
-            ("positions", point.positions),
-            ("velocities", point.velocities),
-            ("accelerations", point.accelerations),
-        ]
+        fields: list[tuple[str, Values]] = [(field, getattr(point, field)) for field in _FIELDS]
         # `len` is asked for, because fields of a message may be NumPy arrays, which have no truth value.
         if integrates and not any(len(values) for _, values in fields):
             return f"The given trajectory has no position, velocity, or acceleration points. (point #{index})"
@@ -92,13 +85,14 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> st
 
 
 def _not_finite(trajectory: Trajectory) -> str | None:
-    for field, values_of in _FIELDS:
-        present = [(index, values) for index, point in enumerate(trajectory.points) if len(values := values_of(point))]
+    for field, word in _FIELDS.items():
+        fields: list[Values] = [getattr(point, field) for point in trajectory.points]
+        present = [(index, values) for index, values in enumerate(fields) if len(values)]
         # Their sizes have been checked, so these rows make a table.
         table = np.array([values for _, values in present], dtype=np.float64)
         if not np.isfinite(table).all():
             row, column = np.argwhere(~np.isfinite(table))[0]
-            where = f"{field.capitalize()} of joint {trajectory.joint_names[column]} at point #{present[row][0]}"
+            where = f"{word} of joint {trajectory.joint_names[column]} at point #{present[row][0]}"
             return f"{where} is not finite: {table[row, column]}"
     return None
 

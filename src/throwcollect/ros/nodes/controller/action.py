@@ -120,7 +120,7 @@ class ControllerAction:
         self._published_ns = self._simulation.now_ns
         self._goals[self._count] = _Goal(Future())
         if refusal is not None:
-            self.finish(GoalResult(self._count, GoalStatus.ABORTED, refusal.error_code, refusal.text))
+            self.finish(GoalResult(GoalStatus.ABORTED, refusal.error_code, refusal.text, self._count))
         return GoalResponse.ACCEPT
 
     def _accept(self, handle: Any) -> None:
