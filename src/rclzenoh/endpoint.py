@@ -1,4 +1,4 @@
-"""The identity, the token and the end of publishers, subscriptions, services and clients, and what they send along."""
+"""What publishers, subscriptions, services and clients have in common, and what they send along."""
 
 from __future__ import annotations
 
@@ -22,18 +22,20 @@ _ENCODING = "application/cdr;key="
 
 
 class Endpoint:
-    """Identity of one publisher, subscription, service or client, made from names as a node has them.
+    """A publisher, subscription, service or client, made from names as a node has them.
 
     Attributes:
         name: Absolute name of the topic or service.
+        qos_profile: Quality of service.
         key: Key on which samples or requests travel.
         token: Token that announces the endpoint.
         gid: Identifier that is part of every attachment.
         encoding: Encoding of all that is sent; rmw_zenoh_cpp neither sets encodings nor reads them.
     """
 
-    def __init__(self, node: NodeBase, kind: EntityKind, name: str, type_name: str, qos: QoSProfile) -> None:
+    def __init__(self, node: NodeBase, kind: EntityKind, name: str, type_name: str, qos_profile: QoSProfile) -> None:
         self.node = node
+        self.qos_profile = qos_profile
         self.name = node.resolve_topic_name(name)
         self.type = dds_type(type_name)
         self.session = node.context.session
@@ -50,7 +52,7 @@ class Endpoint:
             name=self.name,
             type=self.type,
             type_hash=hashed,
-            qos=encode(qos),
+            qos=encode(qos_profile),
         )
         self.gid = self.token.gid
         # It has a digest of the key, because Zenoh panics at encodings of more than 255 bytes, and keys can be longer.
@@ -62,8 +64,12 @@ class Endpoint:
         """Declare the endpoint's token; called when its Zenoh object works, so that others may use it."""
         self._declared = [self.session.liveliness().declare_token(self.token.key()), declared]
 
-    def close(self) -> None:
-        """Withdraw the token, then the endpoint; does nothing the second time."""
+    def count(self, kind: EntityKind) -> int:
+        """Number of endpoints of a kind in the whole graph that have this name and type."""
+        return self.node.context.graph.count(kind, self.name, self.type)
+
+    def destroy(self) -> None:
+        """Withdraw the token, then the endpoint; does nothing the second time; see `Node.destroy_publisher`."""
         declared, self._declared = self._declared, []
         if not self.session.is_closed():
             for declaration in declared:
@@ -110,8 +116,9 @@ class Attachment(NamedTuple):
         return _LAYOUT.pack(self.sequence, self.source_timestamp, GID_LENGTH, self.gid)
 
 
-def unpack(data: bytes) -> Attachment:
-    """Attachment from its bytes."""
+def unpack(attachment: zenoh.ZBytes | None) -> Attachment:
+    """Attachment of something that was received."""
+    data = b"" if attachment is None else attachment.to_bytes()
     if len(data) != _LAYOUT.size or data[16] != GID_LENGTH:
         raise ValueError(f"attachment of {len(data)} bytes is not that of a ROS 2 Jazzy node")
     sequence, timestamp, _, gid = _LAYOUT.unpack(data)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from rclzenoh.context import Context
+from rclzenoh.endpoint import Endpoint
 from rclzenoh.interfaces import Message
 from rclzenoh.interfaces import Service as ServiceType
 from rclzenoh.node_base import NodeBase
@@ -14,7 +15,7 @@ from rclzenoh.service import Client, Service
 from rclzenoh.time import S_TO_NS, Timer
 from rclzenoh.topic import Publisher, Subscription
 
-_E = TypeVar("_E", Publisher, Subscription, Service, Client)
+_E = TypeVar("_E", bound=Endpoint)
 
 
 class NodeEndpoints(NodeBase):
@@ -22,7 +23,7 @@ class NodeEndpoints(NodeBase):
 
     def __init__(self, node_name: str, namespace: str, context: Context | None) -> None:
         super().__init__(node_name, namespace, context)
-        self._entities: list[Publisher | Subscription | Service | Client] = []
+        self._entities: list[Endpoint] = []
 
     def create_publisher(self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int) -> Publisher:
         """Make a publisher, with a profile or only a depth."""
@@ -76,7 +77,7 @@ class NodeEndpoints(NodeBase):
         self.mailbox.submit(None)
         return timer
 
-    def _destroy(self, entity: Publisher | Subscription | Service | Client) -> bool:
+    def _destroy(self, entity: Endpoint) -> bool:
         """Withdraw an endpoint; returns whether it belonged to this node."""
         known = entity in self._entities
         if known:

@@ -27,7 +27,7 @@ _ENDLESS_S = 1e9
 Callback = Callable[[Any, Any], Any]
 
 
-class Service(Receiver):
+class Service(Endpoint, Receiver):
     """Answers requests. Made by `Node.create_service`.
 
     While a callback that is a coroutine function waits, other callbacks are called.
@@ -36,33 +36,27 @@ class Service(Receiver):
     def __init__(
         self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, callback: Callback, qos_profile: QoSProfile
     ) -> None:
+        Endpoint.__init__(self, node, EntityKind.SERVICE, srv_name, srv_type.TYPE, qos_profile)
         # The queue has no limit, whatever is announced: clients would wait for ever for an answer to a dropped request.
-        super().__init__(node.mailbox, None)
+        Receiver.__init__(self, node.mailbox, None)
+        self.service_name = self.name
         self.srv_type = srv_type
-        self.qos_profile = qos_profile
         self.callback = callback
         self._open: set[zenoh.Query] = set()
         self._is_destroyed = False
-        self._endpoint = Endpoint(node, EntityKind.SERVICE, srv_name, srv_type.TYPE, qos_profile)
         handler = zenoh.handlers.Callback(self.deliver, indirect=False)
         # It is declared complete because clients of rmw_zenoh_cpp ask only complete queryables.
-        queryable = self._endpoint.session.declare_queryable(self._endpoint.key, handler, complete=True)
-        self._endpoint.announce(queryable)
-
-    @property
-    def service_name(self) -> str:
-        """Absolute name of the service."""
-        return self._endpoint.name
+        self.announce(self.session.declare_queryable(self.key, handler, complete=True))
 
     def handle(self, item: zenoh.Query) -> None:
         """Decode a request, call back, and answer when the response is there."""
         try:
-            self._endpoint.check_key(item.encoding)
-            attachment = unpack(item.attachment.to_bytes() if item.attachment is not None else b"")
+            self.check_key(item.encoding)
+            attachment = unpack(item.attachment)
             payload = item.payload.to_bytes() if item.payload is not None else b""
             request = deserialize(payload, self.srv_type.Request)
         except ValueError as error:
-            self._endpoint.complain(error)
+            self.complain(error)
             _refuse(item, str(error))
             return
         self._open.add(item)
@@ -88,15 +82,15 @@ class Service(Receiver):
         if self._is_destroyed:
             return
         try:
-            query.reply(self._endpoint.key, serialize(response), attachment=attachment)
+            query.reply(self.key, serialize(response), attachment=attachment)
         except zenoh.ZError as error:
-            self._endpoint.complain(f"a response could not be sent, the client may be gone: {error}")
+            self.complain(f"a response could not be sent, the client may be gone: {error}")
 
     def destroy(self) -> None:
         """Withdraw the service; requests without an answer get none. See `Node.destroy_service`."""
         # This is set first, because the thread that spins may be about to answer a request.
         self._is_destroyed = True
-        self._endpoint.close()
+        super().destroy()
         for query in [*self.take_all(), *self._open]:
             query.drop()
         self._open.clear()
@@ -112,42 +106,36 @@ def _refuse(query: zenoh.Query, reason: str) -> None:
         query.drop()  # type: ignore[no-untyped-call]
 
 
-class Client(Receiver):
+class Client(Endpoint, Receiver):
     """Calls a service. Made by `Node.create_client`."""
 
     def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, qos_profile: QoSProfile) -> None:
+        Endpoint.__init__(self, node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
         # There is at most one response per request, and a dropped one would be waited for in vain.
-        super().__init__(node.mailbox, None)
+        Receiver.__init__(self, node.mailbox, None)
+        self.service_name = self.name
         self.srv_type = srv_type
-        self.qos_profile = qos_profile
         self._pending: dict[int, tuple[Future, Callable[[Any], Any]]] = {}
         self._numbers = count(1)
-        self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
         # As in rmw_zenoh_cpp, every complete queryable of this key is asked, and Zenoh must not merge or drop replies.
-        self._querier: Any = self._endpoint.session.declare_querier(
-            self._endpoint.key,
+        self._querier: Any = self.session.declare_querier(
+            self.key,
             target=zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=_ENDLESS_S if self.service_name.endswith(_PATIENT_SERVICE) else None,
         )
-        self._endpoint.announce(self._querier)
-
-    @property
-    def service_name(self) -> str:
-        """Absolute name of the service."""
-        return self._endpoint.name
+        self.announce(self._querier)
 
     def service_is_ready(self) -> bool:
         """Whether somebody offers the service."""
-        endpoint = self._endpoint
-        return endpoint.node.context.graph.count(EntityKind.SERVICE, endpoint.name, endpoint.type) > 0
+        return self.count(EntityKind.SERVICE) > 0
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until somebody offers the service, for at most ``timeout_sec``; return whether somebody does.
 
         None or a negative time is no limit.
         """
-        context = self._endpoint.node.context
+        context = self.node.context
         return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
 
     def call_async(self, request: Message, convert: Callable[[Any], Any] = lambda response: response) -> Future:
@@ -165,12 +153,12 @@ class Client(Receiver):
         self._pending[sequence] = future, convert
         # Zenoh drops the handler after the last reply, which puts the number into the queue after all replies.
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
-        attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
+        attachment = Attachment(sequence, time.time_ns(), self.gid).pack()
         try:
-            querier.get(handler, payload=payload, encoding=self._endpoint.encoding, attachment=attachment)
+            querier.get(handler, payload=payload, encoding=self.encoding, attachment=attachment)
         except zenoh.ZError as error:
             del self._pending[sequence]
-            raise self._endpoint.invalid(error) from error
+            raise self.invalid(error) from error
         return future
 
     def handle(self, item: zenoh.Reply | int) -> None:
@@ -180,17 +168,17 @@ class Client(Receiver):
             return
         sample = item.ok
         if sample is None:
-            self._endpoint.complain(f"the service answered with an error: {item.err and item.err.payload.to_bytes()!r}")
+            self.complain(f"the service answered with an error: {item.err and item.err.payload.to_bytes()!r}")
             return
         try:
-            attachment = unpack(sample.attachment.to_bytes() if sample.attachment is not None else b"")
+            attachment = unpack(sample.attachment)
             response = deserialize(sample.payload.to_bytes(), self.srv_type.Response)
         except ValueError as error:
-            self._endpoint.complain(error)
+            self.complain(error)
             return
         # Numbers of requests are mixed up, too, while a lost link is replaced (`Endpoint.check_key`).
-        if attachment.gid != self._endpoint.gid or attachment.sequence not in self._pending:
-            self._endpoint.complain("unexpected response; there may be more than one server of this name")
+        if attachment.gid != self.gid or attachment.sequence not in self._pending:
+            self.complain("unexpected response; there may be more than one server of this name")
             return
         future, convert = self._pending.pop(attachment.sequence)
         future.call_back_through(self.mailbox)
@@ -200,6 +188,6 @@ class Client(Receiver):
     def destroy(self) -> None:
         """Withdraw the client; pending futures stay pending. See `Node.destroy_client`."""
         self._querier = None
-        self._endpoint.close()
+        super().destroy()
         self._pending.clear()
         self.take_all()

@@ -31,23 +31,18 @@ HEARTBEAT_S = 0.5
 """Period [s] in which rmw_zenoh_cpp announces the last sample of a reliable, transient local topic."""
 
 
-class Publisher:
+class Publisher(Endpoint):
     """Publishes messages on a topic. Made by `Node.create_publisher`."""
 
     def __init__(self, node: NodeBase, msg_type: type[Message], topic: str, qos_profile: QoSProfile) -> None:
+        super().__init__(node, EntityKind.PUBLISHER, topic, msg_type.TYPE, qos_profile)
+        self.topic_name = self.name
         self.msg_type = msg_type
-        self.qos_profile = qos_profile
-        self._endpoint = Endpoint(node, EntityKind.PUBLISHER, topic, msg_type.TYPE, qos_profile)
         self._sequence = 0
         # Genuine subscribers drop samples that arrive out of order, so one lock covers numbering and sending.
         self._lock = threading.Lock()
-        self._publisher: Any = _declare(self._endpoint, qos_profile)
-        self._endpoint.announce(self._publisher)
-
-    @property
-    def topic_name(self) -> str:
-        """Absolute name of the topic."""
-        return self._endpoint.name
+        self._publisher: Any = _declare(self)
+        self.announce(self._publisher)
 
     def publish(self, msg: Message | bytes) -> None:
         """Publish a message, or its CDR bytes."""
@@ -61,25 +56,25 @@ class Publisher:
             if self._publisher is None:
                 raise InvalidHandle(f"{self.topic_name}: the publisher was destroyed")
             self._sequence += 1
-            attachment = Attachment(self._sequence, time.time_ns(), self._endpoint.gid).pack()
+            attachment = Attachment(self._sequence, time.time_ns(), self.gid).pack()
             try:
                 self._publisher.put(data, attachment=attachment)
             except zenoh.ZError as error:
-                raise self._endpoint.invalid(error) from error
+                raise self.invalid(error) from error
 
     def get_subscription_count(self) -> int:
         """Number of subscriptions to the topic in the whole graph; asking costs a fraction of a microsecond."""
-        endpoint = self._endpoint
-        return endpoint.node.context.graph.count(EntityKind.SUBSCRIPTION, endpoint.name, endpoint.type)
+        return self.count(EntityKind.SUBSCRIPTION)
 
     def destroy(self) -> None:
         """Withdraw the publisher; see `Node.destroy_publisher`."""
         with self._lock:
             self._publisher = None
-        self._endpoint.close()
+        super().destroy()
 
 
-def _declare(endpoint: Endpoint, qos: QoSProfile) -> Any:
+def _declare(endpoint: Endpoint) -> Any:
+    qos = endpoint.qos_profile
     # As in rmw_zenoh_cpp, only a reliable topic that keeps all messages waits for slow subscribers.
     keeps_all = qos.is_reliable and qos.history is HistoryPolicy.KEEP_ALL
     congestion = zenoh.CongestionControl.BLOCK if keeps_all else zenoh.CongestionControl.DROP
@@ -107,7 +102,7 @@ _ENDLESS = 2**31
 """Cache size that stands for no limit."""
 
 
-class Subscription(Receiver):
+class Subscription(Endpoint, Receiver):
     """Calls back with the messages of a topic. Made by `Node.create_subscription`."""
 
     def __init__(
@@ -120,19 +115,19 @@ class Subscription(Receiver):
         *,
         raw: bool,
     ) -> None:
-        super().__init__(node.mailbox, qos_profile.queue_length)
+        Endpoint.__init__(self, node, EntityKind.SUBSCRIPTION, topic, msg_type.TYPE, qos_profile)
+        Receiver.__init__(self, node.mailbox, qos_profile.queue_length)
+        self.topic_name = self.name
         self.msg_type = msg_type
-        self.qos_profile = qos_profile
         self.raw = raw
         self.callback = callback
         # As in rclpy, a callback whose second argument is optional gets the message alone.
         self._wants_info = _takes(callback, 2) and not _takes(callback, 1)
-        self._endpoint = Endpoint(node, EntityKind.SUBSCRIPTION, topic, msg_type.TYPE, qos_profile)
         # `handle` may be called with earlier messages before `_declare` returns, so it must not use anything set below.
-        self._endpoint.announce(self._declare())
+        self.announce(self._declare())
 
     def _declare(self) -> Any:
-        session, key = self._endpoint.session, self._endpoint.key
+        session, key = self.session, self.key
         handler = zenoh.handlers.Callback(self.deliver, indirect=False)
         if not self.qos_profile.is_transient_local:
             return session.declare_subscriber(key, handler)
@@ -145,20 +140,15 @@ class Subscription(Receiver):
             subscriber_detection=True,
         )
 
-    @property
-    def topic_name(self) -> str:
-        """Absolute name of the topic."""
-        return self._endpoint.name
-
     def handle(self, item: zenoh.Sample) -> None:
         """Decode a sample and call back."""
         try:
-            self._endpoint.check_key(item.encoding)
-            attachment = unpack(item.attachment.to_bytes() if item.attachment is not None else b"")
+            self.check_key(item.encoding)
+            attachment = unpack(item.attachment)
             data = item.payload.to_bytes()
             message = data if self.raw else deserialize(data, self.msg_type)
         except ValueError as error:
-            self._endpoint.complain(error)
+            self.complain(error)
             return
         if not self._wants_info:
             call(self.mailbox, self.callback, message)
@@ -173,7 +163,7 @@ class Subscription(Receiver):
 
     def destroy(self) -> None:
         """Withdraw the subscription; see `Node.destroy_subscription`."""
-        self._endpoint.close()
+        super().destroy()
         self.take_all()
 
 

@@ -55,7 +55,7 @@ def test_a_service_answers_on_the_wire_as_rmw_zenoh_does(rig, pair):
     assert rig.spin(lambda: replies and replies[-1] is None)
     assert str(replies[0].ok.key_expr) == key
     assert replies[0].ok.payload.to_bytes() == serialize(SetBool.Response(success=True, message="done"))
-    received = unpack(replies[0].ok.attachment.to_bytes())
+    received = unpack(replies[0].ok.attachment)
     assert (received.sequence, received.gid) == (7, bytes(range(16)))
 
 
@@ -91,7 +91,7 @@ def test_a_request_to_another_key_is_answered_with_an_error(rig, pair):
         data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE)),
         zenoh.handlers.Callback(replies.append, drop=lambda: replies.append(None), indirect=False),
         payload=serialize(SetBool.Request()),
-        encoding=other._endpoint.encoding,
+        encoding=other.encoding,
         attachment=Attachment(1, 0, bytes(16)).pack(),
     )
     assert rig.spin(lambda: replies and replies[-1] is None)

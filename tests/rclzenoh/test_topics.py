@@ -32,7 +32,7 @@ def test_a_publisher_sends_samples_as_rmw_zenoh_does(rig):
     publisher = node.create_publisher(String, "chatter", 10)
     before = time.time_ns()
     assert rig.spin(lambda: publisher.publish(String(data="x")) or len(samples) > 2)
-    first, second = (unpack(sample.attachment.to_bytes()) for sample in samples[:2])
+    first, second = (unpack(sample.attachment) for sample in samples[:2])
     assert second.sequence == first.sequence + 1
     (info,) = node.get_publishers_info_by_topic("chatter")
     assert first.gid == second.gid == bytes(info.endpoint_gid)
@@ -50,7 +50,7 @@ def test_a_sample_for_another_key_is_ignored(rig, durability):
     listener.create_subscription(String, "t", lambda message: heard.append(message.data), qos)
     publisher, other = talker.create_publisher(String, "t", qos), talker.create_publisher(String, "other", qos)
     assert rig.spin(lambda: publisher.get_subscription_count() == 1)
-    publisher._publisher.put(serialize(String(data="stray")), attachment=VALID, encoding=other._endpoint.encoding)
+    publisher._publisher.put(serialize(String(data="stray")), attachment=VALID, encoding=other.encoding)
     publisher.publish(String(data="own"))
     assert rig.spin(lambda: "own" in heard)
     assert heard == ["own"]
@@ -64,7 +64,7 @@ def test_an_advanced_subscriber_of_zenoh_loses_no_message(rig, durability):
     sequences = []
     session = rig.context().session
     handler = zenoh.handlers.Callback(
-        lambda s: sequences.append(unpack(s.attachment.to_bytes()).sequence), indirect=False
+        lambda s: sequences.append(unpack(s.attachment).sequence), indirect=False
     )
     subscriber = zenoh.ext.declare_advanced_subscriber(session, key, handler)
     publisher = node.create_publisher(String, "t", qos)
