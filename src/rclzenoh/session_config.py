@@ -10,9 +10,8 @@ import json
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 import zenoh
 
@@ -45,17 +44,16 @@ _SETTINGS = {
 }
 
 
-@dataclass(frozen=True)
-class Key:
-    """The key of a router and its clients, which all show the same certificate and trust no other (mutual TLS).
+class Key(Protocol):
+    """The key of a router and its clients, which all show the same certificate and trust no other (mutual TLS)."""
 
-    Attributes:
-        private_key: File of the private key, in PEM.
-        certificate: File of the certificate, in PEM.
-    """
+    @property
+    def private_key(self) -> Path:
+        """File of the private key, in PEM."""
 
-    private_key: Path
-    certificate: Path
+    @property
+    def certificate(self) -> Path:
+        """File of the certificate, in PEM."""
 
 
 def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:

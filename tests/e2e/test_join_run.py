@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from rclzenoh.session_config import OVERRIDE_VARIABLE, Key, client_override
+from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
 from tests.commands import Command, command, start_command
 from tests.e2e.collection import (
     CONFIG,
@@ -240,9 +240,7 @@ def test_a_machine_without_the_token_cannot_join(tmp_path: Path, machines: list[
     own.create()
     ways = {
         "without a key": client_override(f"tls/{machine.gateway}:{port}", None),
-        "with a key of its own": client_override(
-            f"tls/{machine.gateway}:{port}", Key(own.private_key, own.certificate)
-        ),
+        "with a key of its own": client_override(f"tls/{machine.gateway}:{port}", own),
         "without TLS": client_override(f"tcp/{machine.gateway}:{port}", None),
     }
     for name, way in ways.items():

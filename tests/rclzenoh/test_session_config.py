@@ -1,12 +1,13 @@
 """The router and the protection that the environment configures for a session."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from rclzenoh.exceptions import ConfigurationError
 from rclzenoh.session_config import (
     CONFIG_FILE_VARIABLE,
     OVERRIDE_VARIABLE,
-    Key,
     client_config,
     client_override,
     connect_endpoint,
@@ -26,7 +27,7 @@ def _nothing_said(monkeypatch):
 
 @pytest.fixture
 def key(tmp_path):
-    made = Key(tmp_path / "key.pem", tmp_path / "certificate.pem")
+    made = SimpleNamespace(private_key=tmp_path / "key.pem", certificate=tmp_path / "certificate.pem")
     for path in (made.private_key, made.certificate):
         path.write_text("")
     return made

@@ -63,9 +63,7 @@ def test_an_advanced_subscriber_of_zenoh_loses_no_message(rig, durability):
     key = data_key(node.context.get_domain_id(), "/t", String.TYPE, type_hash(String.TYPE))
     sequences = []
     session = rig.context().session
-    handler = zenoh.handlers.Callback(
-        lambda s: sequences.append(unpack(s.attachment).sequence), indirect=False
-    )
+    handler = zenoh.handlers.Callback(lambda s: sequences.append(unpack(s.attachment).sequence), indirect=False)
     subscriber = zenoh.ext.declare_advanced_subscriber(session, key, handler)
     publisher = node.create_publisher(String, "t", qos)
     while not sequences:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from rclzenoh.exceptions import ConfigurationError, NoRouterError
-from rclzenoh.session_config import DOMAIN_VARIABLE, OVERRIDE_VARIABLE, PROTECTED, Key, client_override
+from rclzenoh.session_config import DOMAIN_VARIABLE, OVERRIDE_VARIABLE, client_override
 from throwcollect.errors import ConfigError, UnreachableError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import KEY_VARIABLE, RunKey
@@ -39,7 +39,7 @@ class Connection:
         """Environment variables by which our processes join the run; they name the key's files and hold no secret."""
         return {
             **self.middleware.environment(),
-            OVERRIDE_VARIABLE: client_override(self.endpoint, session_key(self.endpoint, self.key)),
+            OVERRIDE_VARIABLE: client_override(self.endpoint, self.key),
             DOMAIN_VARIABLE: str(self.domain_id),
             KEY_VARIABLE: str(self.key.directory),
         }
@@ -51,11 +51,6 @@ class Connection:
                 f"the run at {self.endpoint} is on {self.middleware.rmw}, and this process on {rmw}",
                 hint="join it from a process of its own",
             )
-
-
-def session_key(endpoint: str, key: RunKey) -> Key | None:
-    """The key of a run as a Zenoh session takes it; None if the router at the endpoint lets anybody in."""
-    return Key(key.private_key, key.certificate) if endpoint.startswith(PROTECTED) else None
 
 
 @contextmanager

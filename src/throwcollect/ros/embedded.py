@@ -7,7 +7,7 @@ from rclzenoh import api
 from rclzenoh.api import *  # noqa: F403
 from rclzenoh.context import Context
 from rclzenoh.session_config import client_config, is_protected
-from throwcollect.ros.connection import Connection, session_key, zenoh_errors
+from throwcollect.ros.connection import Connection, zenoh_errors
 from throwcollect.ros.middleware import EMBEDDED_RMW
 
 
@@ -23,7 +23,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
         if connection is not None:
             connection.check(EMBEDDED_RMW)
             domain_id = connection.domain_id
-            config = client_config(connection.endpoint, session_key(connection.endpoint, connection.key))
+            config = client_config(connection.endpoint, connection.key)
         rclzenoh.context.init(context=context, domain_id=domain_id, config=config)
 
 

@@ -50,7 +50,7 @@ from rclzenoh.session_config import (
     is_protected,
 )
 from throwcollect.errors import ThrowcollectError, WorkerError
-from throwcollect.ros.connection import Connection, session_key, zenoh_errors
+from throwcollect.ros.connection import Connection, zenoh_errors
 from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile, write_temporarily
 from throwcollect.ros.middleware import RMW_VARIABLE, Middleware
 
@@ -78,7 +78,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
         connection.check(middleware.rmw)
         endpoint = connection.endpoint
         domain_id = connection.domain_id
-        variables = {OVERRIDE_VARIABLE: client_override(endpoint, session_key(connection.endpoint, connection.key))}
+        variables = {OVERRIDE_VARIABLE: client_override(endpoint, connection.key)}
     if middleware.is_fast_dds and endpoint is not None and not endpoint.startswith(OPEN):
         _use_discovery_server(endpoint)
     try:

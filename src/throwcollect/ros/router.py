@@ -28,7 +28,7 @@ from rclzenoh.session_config import OPEN, PROTECTED, in_words, router_config
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import die_with_parent, stop_signals
-from throwcollect.ros.connection import session_key, zenoh_errors
+from throwcollect.ros.connection import zenoh_errors
 from throwcollect.ros.fast_dds import server_profile, write_temporarily
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
@@ -65,7 +65,7 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
         attempts_left -= 1
         endpoint = _choose_port(listen)
         with zenoh_errors():
-            config = router_config(endpoint, session_key(endpoint, key) if key is not None else None)
+            config = router_config(endpoint, key)
         if endpoint.startswith(PROTECTED) and key is None:
             raise ConfigError(
                 f"the router cannot listen on {endpoint}: no key is named",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from threading import Lock
 from typing import Annotated, Any
@@ -16,6 +15,7 @@ from throwcollect.config.values import with_sensors
 from throwcollect.dataset.directory import config_path
 from throwcollect.episode.sensor_topics import SensorDescription, describe_sensor
 from throwcollect.errors import ConflictError, NotFoundError, WorkerError
+from throwcollect.ros import Future
 from throwcollect.ros.msg import String
 from throwcollect.ros.nodes.sensors.node import LATCHED, NAME
 from throwcollect.runs.control import set_parameter
@@ -94,12 +94,10 @@ def _read(run: Run, topic: str) -> Any:
     if run.connection is None:
         raise ConflictError(f"run {run.id}: is still starting", hint="try again in a moment")
     run.record.middleware.joining.settle()
-    heard: list[String] = []
+    heard = Future()
     with take_part(run.connection) as (node, executor):
-        node.create_subscription(String, topic, heard.append, LATCHED)
-        end_s = time.monotonic() + _ANSWER_S
-        while not heard:
-            if time.monotonic() > end_s:
-                raise WorkerError(f"run {run.id}: {topic} does not answer")
-            executor.spin_once(timeout_sec=0.1)
-    return json.loads(heard[-1].data)
+        node.create_subscription(String, topic, heard.set_result, LATCHED)
+        executor.spin_until_future_complete(heard, timeout_sec=_ANSWER_S)
+    if not heard.done():
+        raise WorkerError(f"run {run.id}: {topic} does not answer")
+    return json.loads(heard.result().data)

@@ -16,6 +16,7 @@ from typing import Literal
 import uvicorn
 
 from throwcollect.errors import ConfigError
+from throwcollect.ros.router_endpoint import reach_from_here
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.finding import Address, publish
@@ -67,12 +68,12 @@ def serve(
     with _listen(host, port) as listener:
         bound = listener.getsockname()[1]
         scheme = "https" if tls else "http"
-        known = {"127.0.0.1", "localhost", "[::1]", host if ":" not in host else f"[{host}]", *names}
+        known = {"127.0.0.1", "localhost", "[::1]", _bracket(host), *names}
         hosts = frozenset(f"{name}:{bound}" for name in known)
         if bound in (80, 443):
             # Clients leave the default port of a scheme out of the header Host.
             hosts |= known
-        url = f"{scheme}://{_find_reachable_address(host)}:{bound}"
+        url = f"{scheme}://{_bracket(reach_from_here(host))}:{bound}"
         certificate = None if tls is None else str(tls.certificate.absolute())
         address = Address(url, keys.full, keys.read_only, os.getpid(), certificate)
         app = Access(make_app(instances, models, keys), keys, hosts, origins)
@@ -150,7 +151,6 @@ def _listen(host: str, port: int | None) -> socket.socket:
         ) from error
 
 
-def _find_reachable_address(host: str) -> str:
-    """Address at which programs of this machine reach a server that listens at ``host``."""
-    own = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - nothing is bound here
-    return f"[{own}]" if ":" in own else own
+def _bracket(host: str) -> str:
+    """A host as it stands in URLs."""
+    return f"[{host}]" if ":" in host else host

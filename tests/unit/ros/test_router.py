@@ -10,7 +10,6 @@ from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override, is_prote
 from throwcollect import ros
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import VARIABLE
-from throwcollect.ros.connection import session_key
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 
@@ -39,7 +38,7 @@ def key(tmp_path):
 
 
 def override_of(endpoint, key):
-    return client_override(endpoint, session_key(endpoint, key))
+    return client_override(endpoint, key)
 
 
 def test_a_protected_router_admits_only_clients_with_its_key(environment, rig, monkeypatch, key, tmp_path):
