@@ -8,7 +8,6 @@ from rclzenoh.context import Context
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces.msg import Clock, Log, ParameterEvent
 from rclzenoh.node_endpoints import NodeEndpoints
-from rclzenoh.node_graph import NodeGraph
 from rclzenoh.node_parameters import NodeParameters, offer_parameters
 from rclzenoh.parameter import Parameter
 from rclzenoh.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events, qos_profile_rosout
@@ -19,7 +18,7 @@ _CLOCK_TOPIC = "/clock"
 _USE_SIM_TIME = "use_sim_time"
 
 
-class Node(NodeEndpoints, NodeGraph, NodeParameters):
+class Node(NodeEndpoints, NodeParameters):
     """A node of the ROS graph.
 
     Args:

@@ -154,9 +154,8 @@ class NodeParameters:
         """Set parameters, if descriptors and callbacks agree; ``declared`` has the descriptors of new ones."""
         descriptors = self._descriptors if declared is None else declared
         for parameter in parameters:
-            result = check(parameter, descriptors[parameter.name], is_declared=declared is None)
-            if not result.successful:
-                return result
+            if reason := find_refusal(parameter, descriptors[parameter.name], is_declared=declared is None):
+                return SetParametersResult(successful=False, reason=reason)
         # All parameters are set or none: nothing is stored before descriptors and callbacks have accepted each of them.
         for callback in list(self._on_set):
             result = callback(parameters)
@@ -183,49 +182,45 @@ class NodeParameters:
         return SetParametersResult(successful=True)
 
 
-def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared: bool) -> SetParametersResult:
-    """Check whether a parameter may get a new value (its first one, if it is not declared yet); if not, say why."""
+def find_refusal(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared: bool) -> str | None:
+    """Find why a parameter may not get a new value (its first one, if it is not declared yet); None if it may."""
     if is_declared and descriptor.read_only:
-        return _refuse(f"Trying to set a read-only parameter: {parameter.name}.")
+        return f"Trying to set a read-only parameter: {parameter.name}."
     if not descriptor.dynamic_typing:
         if is_declared and parameter.type_ is ParameterKind.NOT_SET:
-            return _refuse("Static parameter cannot be undeclared")
+            return "Static parameter cannot be undeclared"
         if parameter.type_ is not ParameterKind.NOT_SET and parameter.type_.value != descriptor.type:
             expected = ParameterKind(descriptor.type).name
-            return _refuse(f"Wrong parameter type of {parameter.name}, expected {expected}, got {parameter.type_.name}")
+            return f"Wrong parameter type of {parameter.name}, expected {expected}, got {parameter.type_.name}"
     if parameter.type_ is ParameterKind.INTEGER and len(descriptor.integer_range):
         return _check_integer(parameter, descriptor.integer_range[0])
     if parameter.type_ is ParameterKind.DOUBLE and len(descriptor.floating_point_range):
         return _check_double(parameter, descriptor.floating_point_range[0])
-    return SetParametersResult(successful=True)
+    return None
 
 
-def _refuse(reason: str) -> SetParametersResult:
-    return SetParametersResult(successful=False, reason=reason)
-
-
-def _check_integer(parameter: Parameter, allowed: IntegerRange) -> SetParametersResult:
+def _check_integer(parameter: Parameter, allowed: IntegerRange) -> str | None:
     low, high = sorted((allowed.from_value, allowed.to_value))
     value = parameter.value
     if not low <= value <= high:
-        return _refuse(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
+        return f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}"
     if value not in (low, high) and allowed.step and (value - low) % allowed.step:
-        return _refuse(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
-    return SetParametersResult(successful=True)
+        return f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}"
+    return None
 
 
-def _check_double(parameter: Parameter, allowed: FloatingPointRange) -> SetParametersResult:
+def _check_double(parameter: Parameter, allowed: FloatingPointRange) -> str | None:
     low, high = sorted((allowed.from_value, allowed.to_value))
     value = parameter.value
     if any(math.isclose(value, bound, rel_tol=_RELATIVE_TOLERANCE) for bound in (low, high)):
-        return SetParametersResult(successful=True)
+        return None
     if not low < value < high:
-        return _refuse(f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}")
+        return f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}"
     if allowed.step:
         nearest = low + round((value - low) / allowed.step) * allowed.step
         if not math.isclose(nearest, value, rel_tol=_RELATIVE_TOLERANCE):
-            return _refuse(f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}")
-    return SetParametersResult(successful=True)
+            return f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}"
+    return None
 
 
 def offer_parameters(node: NodeEndpoints, parameters: NodeParameters) -> None:

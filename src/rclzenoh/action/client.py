@@ -12,8 +12,8 @@ from rclzenoh.interfaces import Action, AnyMessage, Message
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray, Time
 from rclzenoh.interfaces.srv import CancelGoal
 from rclzenoh.keys import EntityKind, dds_type
+from rclzenoh.node_base import NamesAndTypes, NodeBase
 from rclzenoh.node_endpoints import NodeEndpoints
-from rclzenoh.node_graph import NamesAndTypes, NodeGraph
 from rclzenoh.qos import QoSProfile, qos_profile_action_status_default
 from rclzenoh.task import Future
 from rclzenoh.topic import Subscription
@@ -169,20 +169,20 @@ class ActionClient:
                 goal_handle.update(status.status)
 
 
-def get_action_names_and_types(node: NodeGraph) -> NamesAndTypes:
+def get_action_names_and_types(node: NodeBase) -> NamesAndTypes:
     """All actions that somebody offers or uses."""
     return _list_actions(node.get_topic_names_and_types())
 
 
 def get_action_server_names_and_types_by_node(
-    node: NodeGraph, remote_node_name: str, remote_node_namespace: str
+    node: NodeBase, remote_node_name: str, remote_node_namespace: str
 ) -> NamesAndTypes:
     """Actions that one node offers."""
     return _list_actions(node.get_publisher_names_and_types_by_node(remote_node_name, remote_node_namespace))
 
 
 def get_action_client_names_and_types_by_node(
-    node: NodeGraph, remote_node_name: str, remote_node_namespace: str
+    node: NodeBase, remote_node_name: str, remote_node_namespace: str
 ) -> NamesAndTypes:
     """Actions that one node has clients of."""
     return _list_actions(node.get_subscriber_names_and_types_by_node(remote_node_name, remote_node_namespace))

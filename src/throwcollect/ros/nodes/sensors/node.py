@@ -24,7 +24,7 @@ from throwcollect.own_process import make_command
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.ros import DurabilityPolicy, Node, Parameter, Publisher, QoSProfile, get_message, graph_changes
-from throwcollect.ros.msg import SetParametersResult, String
+from throwcollect.ros.msg import JointState, Odometry, SetParametersResult, String
 from throwcollect.ros.nodes import descriptors
 from throwcollect.ros.serving import begin_to_serve
 from throwcollect.sensing.pose import Pose
@@ -134,21 +134,20 @@ class SensorNode(Node):
         # A new subscriber gets a frame even if time stands still.
         self._shown_ns: dict[str, int] = {}
         if any(self._listened.values()) and not self._states:
-            joint_state, moved = get_message("sensor_msgs/msg/JointState"), get_message("nav_msgs/msg/Odometry")
-            self._states = [self.create_subscription(joint_state, "joint_states", self._take_joints, _NEWEST)]
+            self._states = [self.create_subscription(JointState, "joint_states", self._take_joints, _NEWEST)]
             for number, body in enumerate(moving_bodies_of(self._config)):
                 topic, take = odometry(body, number).name.lstrip("/"), partial(self._take_body, body)
-                self._states.append(self.create_subscription(moved, topic, take, _NEWEST))
+                self._states.append(self.create_subscription(Odometry, topic, take, _NEWEST))
         elif not any(self._listened.values()):
             for subscription in self._states:
                 self.destroy_subscription(subscription)
             self._states = []
 
-    def _take_joints(self, message: Any) -> None:
+    def _take_joints(self, message: JointState) -> None:
         self._positions = list(message.position)
         self._stamp_ns = message.header.stamp.sec * NS_PER_S + message.header.stamp.nanosec
 
-    def _take_body(self, body: str, message: Any) -> None:
+    def _take_body(self, body: str, message: Odometry) -> None:
         at, turn = message.pose.pose.position, message.pose.pose.orientation
         self._poses[body] = Pose.of((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
 
