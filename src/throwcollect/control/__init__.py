@@ -4,17 +4,20 @@ A `JointTrajectoryController` is driven by a clock and measured states; it knows
 """
 
 from throwcollect.control.controller import REPEATED, JointTrajectoryController
-from throwcollect.control.controller_reports import (
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
+from throwcollect.control.values import (
     ControllerState,
     ErrorCode,
     GoalResult,
     GoalStatus,
     JointState,
+    JointTolerance,
+    Trajectory,
+    TrajectoryGoal,
+    TrajectoryPoint,
     TrajectoryRefusal,
     TrajectoryState,
 )
-from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
 
 __all__ = [
     "REPEATED",

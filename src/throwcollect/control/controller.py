@@ -10,22 +10,24 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.controller_reports import (
+from throwcollect.control.decision import Judge
+from throwcollect.control.followed_curve import Motion
+from throwcollect.control.interpolation import interpolate
+from throwcollect.control.parameters import ControllerParameters
+from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
+from throwcollect.control.validation import refusal
+from throwcollect.control.values import (
     ControllerState,
     ErrorCode,
     GoalResult,
     GoalStatus,
     JointState,
+    Trajectory,
+    TrajectoryGoal,
+    TrajectoryPoint,
     TrajectoryRefusal,
     TrajectoryState,
 )
-from throwcollect.control.decision import Judge
-from throwcollect.control.followed_curve import Motion
-from throwcollect.control.goal import Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.control.interpolation import interpolate
-from throwcollect.control.parameters import ControllerParameters
-from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
-from throwcollect.control.validation import refusal
 from throwcollect.control.waypoints import Waypoints, arrange, brake
 
 REPEATED = "repeated"

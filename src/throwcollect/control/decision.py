@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from throwcollect.control.controller_reports import ErrorCode, GoalResult, GoalStatus, JointState
 from throwcollect.control.followed_curve import Motion
 from throwcollect.control.tolerances import Limits, Tolerances, violations
+from throwcollect.control.values import ErrorCode, GoalResult, GoalStatus, JointState
 
 
 @dataclass(frozen=True)

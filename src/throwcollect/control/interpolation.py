@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.controller_reports import JointState
+from throwcollect.control.values import JointState
 from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, Waypoints
 
 

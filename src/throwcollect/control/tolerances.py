@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.goal import JointTolerance, TrajectoryGoal
 from throwcollect.control.parameters import Constraints, to_nanoseconds
+from throwcollect.control.values import JointTolerance, TrajectoryGoal
 
 _ERASE = -1.0
 """A goal switches a tolerance off with this number (control_msgs); upstream compares with the width below."""
@@ -60,7 +60,7 @@ def goal_tolerances(
         path = _merge(goal.path_tolerance, defaults.path, joints, "path_tolerance")
         end = _merge(goal.goal_tolerance, defaults.goal, joints, "goal_tolerance")
         goal_time_ns = _resolve_time(goal.goal_time_tolerance_ns, defaults.goal_time_ns)
-    except _IllegalToleranceError as error:
+    except ValueError as error:
         logger.error("%s Using default tolerances.", error)
         return defaults
     return Tolerances(path, end, goal_time_ns)
@@ -81,15 +81,11 @@ def _describe(error: float, tolerance: float) -> str:
     return f"error {error:.{digits}g} rad, tolerance {tolerance:.{digits}g} rad"
 
 
-class _IllegalToleranceError(Exception):
-    """A goal's tolerance that has no meaning; never leaves this module."""
-
-
 def _merge(asked: Sequence[JointTolerance], defaults: Limits, joints: Sequence[str], field: str) -> Limits:
     limits = defaults.copy()
     for tolerance in asked:
         if tolerance.name not in joints:
-            raise _IllegalToleranceError(f"joint '{tolerance.name}' specified in goal.{field} does not exist.")
+            raise ValueError(f"joint '{tolerance.name}' specified in goal.{field} does not exist.")
         index = joints.index(tolerance.name)
         where = f"joint '{tolerance.name}' specified in goal.{field} has a invalid"
         limits[index] = _resolve(tolerance.position, float(defaults[index]), f"{where} position tolerance")
@@ -110,5 +106,5 @@ def _resolve(asked: float, default: float, what: str) -> float:
     if abs(asked - _ERASE) < _ERASE_WIDTH:
         return 0.0
     if asked < 0:
-        raise _IllegalToleranceError(f"{what}: {asked:g} (expected 0, -1 or more than 0).")
+        raise ValueError(f"{what}: {asked:g} (expected 0, -1 or more than 0).")
     return default

@@ -11,9 +11,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from throwcollect.control.controller_reports import ErrorCode, TrajectoryRefusal
-from throwcollect.control.goal import Trajectory, Values
 from throwcollect.control.parameters import ControllerParameters
+from throwcollect.control.values import ErrorCode, Trajectory, TrajectoryRefusal, Values
 
 END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
 """Largest magnitude of a last point's velocity that counts as zero [rad/s] (ros2_controllers)."""

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.controller_reports import JointState
-from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
+from throwcollect.control.values import JointState, Trajectory, TrajectoryPoint, Values
 
 _LONGEST_BRAKING_S = 60.0
 """Longest time for which a joint brakes: at a speed far above that of any robot, the points would fill all memory."""

@@ -12,24 +12,19 @@ import logging
 import re
 import secrets
 import time
-from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass, field
 from enum import Enum
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any
 from urllib.parse import parse_qs, quote
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
 from throwcollect.serve.problem_responses import problem
-
-Message = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[Message]]
-Send = Callable[[Message], Awaitable[None]]
 
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
@@ -132,13 +127,13 @@ class Access:
 
     # Middleware of Starlette would not do: TrustedHostMiddleware knows neither ports nor IPv6, and CORSMiddleware lets
     # requests of other origins through.
-    def __init__(self, app: Any, keys: Keys, hosts: frozenset[str], origins: frozenset[str] = frozenset()) -> None:
+    def __init__(self, app: ASGIApp, keys: Keys, hosts: frozenset[str], origins: frozenset[str] = frozenset()) -> None:
         self._app = app
         self._keys = keys
         self._hosts = hosts
         self._origins = origins | {f"{scheme}://{host}" for scheme in ("http", "https") for host in hosts}
 
-    async def __call__(self, scope: MutableMapping[str, Any], receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle a request or a socket, as ASGI defines it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
@@ -156,7 +151,7 @@ class Access:
             # For a socket, this refuses the handshake with a status and a body.
             await problem(status, title, headers=more)(scope, receive, send)
 
-    def _judge(self, scope: MutableMapping[str, Any], headers: Headers) -> tuple[tuple[int, str] | None, Rights]:
+    def _judge(self, scope: Scope, headers: Headers) -> tuple[tuple[int, str] | None, Rights]:
         """Decide on a request.
 
         Returns:
@@ -183,7 +178,7 @@ def _is_public(path: str) -> bool:
     return path in ("/api/v1/health", "/api/v1/exchange") or not path.startswith(("/api/", "/openapi.json"))
 
 
-def _read_token(scope: MutableMapping[str, Any], headers: Headers) -> str:
+def _read_token(scope: Scope, headers: Headers) -> str:
     """The token of a request; empty if it has none."""
     scheme, _, given = headers.get("authorization", "").partition(" ")
     if scheme.lower() == "bearer":
@@ -196,7 +191,7 @@ def _read_token(scope: MutableMapping[str, Any], headers: Headers) -> str:
     return str(parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0])
 
 
-def _find_protocol(scope: MutableMapping[str, Any]) -> str | None:
+def _find_protocol(scope: Scope) -> str | None:
     return next((str(each) for each in scope.get("subprotocols", ()) if each.startswith(_SUBPROTOCOL)), None)
 
 
@@ -215,7 +210,7 @@ def _limit_body(receive: Receive) -> Receive:
     return receive_some
 
 
-def _add_headers(scope: MutableMapping[str, Any], send: Send, rights: Rights, host: str | None) -> Send:
+def _add_headers(scope: Scope, send: Send, rights: Rights, host: str | None) -> Send:
     """Make a function that sends as ``send`` does, with the headers that all answers have, and a line in the log.
 
     The policy lets the page connect to this server only; without a ``host``, the page gets no sockets.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine, MutableMapping
+from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import suppress
 from typing import Any
 
+from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from throwcollect.errors import ConfigError, ThrowcollectError
@@ -42,14 +43,10 @@ async def close(socket: WebSocket, error: ThrowcollectError) -> None:
         await socket.close(code, reason)
 
 
-async def ignore(_: MutableMapping[str, Any]) -> None:
-    """Ignore a message of a client."""
-
-
 async def keep_telling(
     socket: WebSocket,
     *telling: Coroutine[Any, Any, object],
-    hear: Callable[[MutableMapping[str, Any]], Awaitable[None]] = ignore,
+    hear: Callable[[Message], Awaitable[None]] | None = None,
 ) -> None:
     """Let coroutines send to a client until the client has left, or one of them has nothing more to send.
 
@@ -60,7 +57,8 @@ async def keep_telling(
     async def wait_until_gone() -> None:
         # Only reading shows that the client has left.
         while (message := await socket.receive())["type"] != "websocket.disconnect":
-            await hear(message)
+            if hear is not None:
+                await hear(message)
 
     tasks = [asyncio.create_task(each) for each in (wait_until_gone(), *telling)]
     try:

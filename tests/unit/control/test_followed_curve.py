@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from throwcollect.control.controller_reports import JointState
 from throwcollect.control.followed_curve import Motion
-from throwcollect.control.goal import Trajectory, TrajectoryPoint
 from throwcollect.control.interpolation import interpolate
+from throwcollect.control.values import JointState, Trajectory, TrajectoryPoint
 from throwcollect.control.waypoints import arrange
 
 PERIOD_NS = 10

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from throwcollect.control.controller_reports import JointState
-from throwcollect.control.goal import Trajectory, TrajectoryPoint
 from throwcollect.control.interpolation import Curve, interpolate
+from throwcollect.control.values import JointState, Trajectory, TrajectoryPoint
 from throwcollect.control.waypoints import Waypoints, arrange
 
 from .bench import seconds

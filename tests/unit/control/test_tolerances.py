@@ -7,9 +7,9 @@ import logging
 import numpy as np
 import pytest
 
-from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal
 from throwcollect.control.parameters import Constraints, JointConstraints
 from throwcollect.control.tolerances import default_tolerances, goal_tolerances, violations
+from throwcollect.control.values import JointTolerance, Trajectory, TrajectoryGoal
 
 from .bench import JOINTS, seconds
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import deque
-from collections.abc import Coroutine, MutableMapping
+from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any
 
+from starlette.types import Message
 from starlette.websockets import WebSocket
 
 from throwcollect.serve.rosbridge.bridge import Bridge
@@ -80,7 +81,7 @@ async def attend(websocket: WebSocket, bridge: Bridge, *until: Coroutine[Any, An
     outbox = Outbox(asyncio.get_running_loop())
     requests = Requests(bridge, outbox.put, read_only=read_only)
 
-    async def hear(message: MutableMapping[str, Any]) -> None:
+    async def hear(message: Message) -> None:
         text: str | None = message.get("text")
         requests.receive(message["bytes"] if text is None else text)
         # If a client sends faster than the bridge works, its frames are not read for a while, so TCP makes it wait.

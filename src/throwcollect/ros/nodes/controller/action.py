@@ -149,12 +149,7 @@ class ControllerAction:
         return FollowJointTrajectory.Result(error_code=int(result.error_code), error_string=result.error_string)
 
     def _find_key(self, handle: Any) -> Hashable | None:
-        uuid = _read_uuid(handle)
-        return next((key for key, goal in self._goals.items() if goal.handle and _read_uuid(goal.handle) == uuid), None)
-
-
-def _read_uuid(handle: Any) -> bytes:
-    return bytes(bytearray(handle.goal_id.uuid))
+        return next((key for key, goal in self._goals.items() if goal.handle is handle), None)
 
 
 def nanoseconds(time: Time | Duration) -> int:

@@ -49,12 +49,11 @@ class ControllerParameterServer:
 
     def restore(self) -> None:
         """Undo what clients have changed, so that the next trial is simulated with the configured parameters."""
-        stray = {name: value for name, value in self._configured.items() if self._get_value(name) != value}
+        stray = {
+            name: value for name, value in self._configured.items() if self._node.get_parameter(name).value != value
+        }
         if stray:
             self._node.set_parameters_atomically([Parameter(name, value=value) for name, value in stray.items()])
-
-    def _get_value(self, name: str) -> Any:
-        return self._node.get_parameter(name).value
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         if self._trial.leased:

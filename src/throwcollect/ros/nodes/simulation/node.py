@@ -191,7 +191,8 @@ class SimulationNode(Node):
         if not self._listened:
             return
         samples: Samples = self._simulation.fresh_samples()
-        if not len(samples) and self._repeats():
+        if not len(samples) and self._rests and time.monotonic() - self._published_at >= _REPEAT_S:
+            # Robots go on to publish their state while they rest.
             samples = self._simulation.last_sample()
         if len(samples):
             self._published_at = time.monotonic()
@@ -200,10 +201,6 @@ class SimulationNode(Node):
             for publisher, messages in columns:
                 publisher.publish(messages[index].tobytes())
         self._publish_steps(samples)
-
-    def _repeats(self) -> bool:
-        """Say whether to publish the last sample once more, as robots go on to publish their state while they rest."""
-        return self._rests and time.monotonic() - self._published_at >= _REPEAT_S
 
     @property
     def _rests(self) -> bool:
@@ -359,8 +356,8 @@ class SimulationNode(Node):
         for controller in self._controllers.values():
             controller.parameter_server.restore()
         configured = {NUMBER: NO_TRIAL, CONTROLLERS: _NO_CONTROLLERS, **self._physics}
-        stray = {key: value for key, value in configured.items() if self._get_value(key) != value}
-        if self._hangs(self._get_value(_FACTOR)):
+        stray = {key: value for key, value in configured.items() if self.get_parameter(key).value != value}
+        if self._hangs(self.get_parameter(_FACTOR).value):
             stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
         if stray:
             # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these parameters.
@@ -369,9 +366,6 @@ class SimulationNode(Node):
                 self.set_parameters([Parameter(key, value=value) for key, value in stray.items()])
             finally:
                 self._restoring = False
-
-    def _get_value(self, key: str) -> Any:
-        return self.get_parameter(key).value
 
 
 def _record_all_topics(config: Config) -> Config:
