@@ -49,7 +49,9 @@ class Node(NodeEndpoints, NodeParameters):
         self._parameter_events = self.create_publisher(
             ParameterEvent, "/parameter_events", qos_profile_parameter_events
         )
-        self._time_source = _TimeSource(self)
+        self._clock_subscription: Subscription | None = None
+        self.add_post_set_parameters_callback(self._choose_clock)
+        self.declare_parameter(_USE_SIM_TIME, False)
         if start_parameter_services:
             offer_parameters(self, self)
         if is_taken:
@@ -78,33 +80,20 @@ class Node(NodeEndpoints, NodeParameters):
         except InvalidHandle:
             self._logger.sink = None  # The node or its session has ended; standard error has the message anyway.
 
-
-class _TimeSource:
-    """Sets the clock of a node by the topic ``/clock`` while its parameter ``use_sim_time`` is true."""
-
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._clock = node.get_clock()
-        self._subscription: Subscription | None = None
-        node.add_post_set_parameters_callback(self._on_parameters)
-        node.declare_parameter(_USE_SIM_TIME, False)
-
-    def _on_parameters(self, parameters: list[Parameter]) -> None:
+    def _choose_clock(self, parameters: list[Parameter]) -> None:
+        """Set the clock by the topic ``/clock`` while the parameter ``use_sim_time`` is true."""
         for parameter in parameters:
-            if parameter.name == _USE_SIM_TIME:
-                self._use_sim_time(bool(parameter.value))
-
-    def _use_sim_time(self, active: bool) -> None:
-        if active == (self._subscription is not None):
+            active = bool(parameter.value)
             # A node that sets its clock itself goes on if it is told what it does already.
-            return
-        self._clock.activate(active)
-        if self._subscription is None:
-            qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-            self._subscription = self._node.create_subscription(Clock, _CLOCK_TOPIC, self._on_clock, qos)
-        else:
-            self._node.destroy_subscription(self._subscription)
-            self._subscription = None
+            if parameter.name != _USE_SIM_TIME or active == (self._clock_subscription is not None):
+                continue
+            self._clock.activate(active)
+            if self._clock_subscription is None:
+                qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+                self._clock_subscription = self.create_subscription(Clock, _CLOCK_TOPIC, self._take_clock, qos)
+            else:
+                self.destroy_subscription(self._clock_subscription)
+                self._clock_subscription = None
 
-    def _on_clock(self, message: Clock) -> None:
+    def _take_clock(self, message: Clock) -> None:
         self._clock.set_ros_time_override(Time.from_msg(message.clock))

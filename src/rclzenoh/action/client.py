@@ -32,25 +32,21 @@ class ClientGoalHandle:
         self.goal_id = goal_id
         self.accepted: bool = response.accepted
         self.stamp: Time = response.stamp
-        self._status: int = GoalStatus.STATUS_UNKNOWN
+        self.heard_status: int = GoalStatus.STATUS_UNKNOWN
 
     @property
     def status(self) -> int:
         """Last state of the goal that the server has published; the client listens to states from the first call on."""
         self._client.listen_to_status()
-        return self._status
-
-    def update(self, status: int) -> None:
-        """Take over a state that the server has published."""
-        self._status = status
+        return self.heard_status
 
     def get_result_async(self) -> Future:
         """Ask for the result; the response has ``status`` and ``result``."""
-        return self._client.request_result(self)
+        return self._client.request_result(self.goal_id)
 
     def cancel_goal_async(self) -> Future:
         """Ask for the goal to be cancelled; the response is that of action_msgs/srv/CancelGoal."""
-        return self._client.request_cancel(self)
+        return self._client.cancel_client.call_async(CancelGoal.Request(goal_info=GoalInfo(goal_id=self.goal_id)))
 
 
 class ActionClient:
@@ -68,7 +64,7 @@ class ActionClient:
         self._feedback_callbacks: dict[bytes, FeedbackCallback] = {}
         protocol, prefix = action_type.Impl, f"{action_name}/_action"
         self._goal_client = node.create_client(protocol.SendGoalService, f"{prefix}/send_goal")
-        self._cancel_client = node.create_client(CancelGoal, f"{prefix}/cancel_goal")
+        self.cancel_client = node.create_client(CancelGoal, f"{prefix}/cancel_goal")
         self._result_client = node.create_client(protocol.GetResultService, f"{prefix}/get_result")
         self._feedback_topic, self._status_topic = f"{prefix}/feedback", f"{prefix}/status"
         self._feedback: Subscription | None = None
@@ -80,7 +76,7 @@ class ActionClient:
 
     def server_is_ready(self) -> bool:
         """Whether somebody offers the action, with all its services and topics."""
-        clients = (self._goal_client, self._cancel_client, self._result_client)
+        clients = (self._goal_client, self.cancel_client, self._result_client)
         graph = self._node.context.graph
         return all(client.service_is_ready() for client in clients) and all(
             graph.count(EntityKind.PUBLISHER, name, type_name) for name, type_name in self._topics
@@ -122,23 +118,19 @@ class ActionClient:
         request = self._action_type.Impl.SendGoalService.Request(goal_id=goal_id, goal=goal)
         return self._goal_client.call_async(request, handle)
 
-    def request_result(self, goal_handle: ClientGoalHandle) -> Future:
+    def request_result(self, goal_id: UUID) -> Future:
         """Ask for a goal's result; see `ClientGoalHandle.get_result_async`."""
 
         def take(response: Message) -> Message:
-            self._feedback_callbacks.pop(bytes(goal_handle.goal_id.uuid), None)
+            self._feedback_callbacks.pop(bytes(goal_id.uuid), None)
             return response
 
-        request = self._action_type.Impl.GetResultService.Request(goal_id=goal_handle.goal_id)
+        request = self._action_type.Impl.GetResultService.Request(goal_id=goal_id)
         return self._result_client.call_async(request, take)
-
-    def request_cancel(self, goal_handle: ClientGoalHandle) -> Future:
-        """Ask for a goal to be cancelled; see `ClientGoalHandle.cancel_goal_async`."""
-        return self._cancel_client.call_async(CancelGoal.Request(goal_info=GoalInfo(goal_id=goal_handle.goal_id)))
 
     def destroy(self) -> None:
         """Withdraw the client; pending futures stay pending."""
-        for client in (self._goal_client, self._cancel_client, self._result_client):
+        for client in (self._goal_client, self.cancel_client, self._result_client):
             self._node.destroy_client(client)
         for subscription in (self._feedback, self._status):
             if subscription is not None:
@@ -166,7 +158,7 @@ class ActionClient:
         for status in message.status_list:
             goal_handle = self._handles.get(bytes(status.goal_info.goal_id.uuid))
             if goal_handle is not None:
-                goal_handle.update(status.status)
+                goal_handle.heard_status = status.status
 
 
 def get_action_names_and_types(node: NodeBase) -> NamesAndTypes:

@@ -22,7 +22,7 @@ from throwcollect.ros.nodes.coordinator.showing import make_shown_topic
 from throwcollect.run_key import Signer
 from throwcollect.runs.run import Run
 from throwcollect.serve.rosbridge import Bridge
-from throwcollect.serve.rosbridge.feed import Feed, Listener, Sample
+from throwcollect.serve.rosbridge.feed import Sample
 from throwcollect.serve.state import simulations_of
 from throwcollect.sweep.plan import Plan
 from throwcollect.units import NS_PER_S
@@ -100,7 +100,8 @@ class ThrowWatch:
         self._loop = asyncio.get_running_loop()
         self._queues: list[asyncio.Queue[bytes]] = []
         self._newest: bytes | None = None
-        self._feeds: dict[str, tuple[Feed, Listener]] = {}
+        self._feeds: dict[str, Callable[[], None]] = {}
+        """What ends the subscription to each simulation."""
         self._is_on = False
 
     @asynccontextmanager
@@ -128,16 +129,16 @@ class ThrowWatch:
     def _listen(self) -> None:
         """Subscribe to all simulations of the run, now and again, because some may be started later."""
         if not self._queues:
-            for feed, listener in self._feeds.values():
-                feed.remove(listener)
+            for stop in self._feeds.values():
+                stop()
             self._feeds, self._newest, self._is_on = {}, None, False
             return
         # A run that was forgotten has no simulations; clients see that in the state.
         with suppress(ThrowcollectError):
             for name in set(simulations_of(self._run.now().record.nodes)) - self._feeds.keys():
-                listener = partial(self._hear, name)
-                feed = self._bridge.listen(make_shown_topic(name), "std_msgs/msg/UInt8MultiArray", listener)
-                self._feeds[name] = feed, listener
+                self._feeds[name] = self._bridge.listen(
+                    make_shown_topic(name), "std_msgs/msg/UInt8MultiArray", partial(self._hear, name)
+                )
         self._bridge.later(_LOOK_S, self._listen)
 
     def _hear(self, simulation: str, sample: Sample) -> None:

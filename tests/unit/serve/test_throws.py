@@ -7,7 +7,6 @@ import json
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -41,10 +40,10 @@ class Graph:
     def later(self, _seconds: float, action: Callable[[], None]) -> None:
         self._timers.append(action)
 
-    def listen(self, topic: str, _type: str, listener: Listener) -> Any:
+    def listen(self, topic: str, _type: str, listener: Listener) -> Callable[[], object]:
         assert topic not in self.hear
         self.hear[topic] = listener
-        return SimpleNamespace(remove=lambda _: self.hear.pop(topic))
+        return lambda: self.hear.pop(topic)
 
     def look(self) -> None:
         timers, self._timers = self._timers, []

@@ -110,8 +110,11 @@ class Bridge:
             raise ConfigError(f"{topic} is no {name}", expected=", ".join(types))
         return name
 
-    def listen(self, topic: str, type_name: str, listener: Listener) -> Feed:
-        """Give the messages of a topic to a listener; a latched topic begins with its earlier messages."""
+    def listen(self, topic: str, type_name: str, listener: Listener) -> Callable[[], None]:
+        """Give the messages of a topic to a listener, until the function that is returned is called.
+
+        A latched topic begins with its earlier messages.
+        """
         # Earlier messages of a latched topic come only with a new subscription, so a later listener gets its own.
         alone = (topic, type_name, listener)
         shared = (topic, type_name, None)
@@ -120,7 +123,7 @@ class Bridge:
             key = shared if feed is None else alone
             feed = self._feeds[key] = Feed(self.node, topic, type_name, lambda: self._feeds.pop(key, None))
         feed.add(listener)
-        return feed
+        return partial(feed.remove, listener)
 
     def service_client(self, service: str, type_name: str) -> Any:
         """A client of a service, given by its absolute name; all clients of the bridge share it."""

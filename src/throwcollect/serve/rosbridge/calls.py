@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, full_name
@@ -13,7 +13,7 @@ from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.guarded import refuse_secrets
-from throwcollect.serve.rosbridge.operations import CallService, describe_error
+from throwcollect.serve.rosbridge.operations import CallService, read_fields
 from throwcollect.serve.rosbridge.pending import call_service
 
 
@@ -44,12 +44,8 @@ class Call:
     def arguments(self) -> Arguments:
         """Arguments for the bridge."""
         given = self.asked.args if isinstance(self.asked.args, Mapping) else {}
-        try:
-            return Arguments.model_validate({name: value for name, value in given.items() if value is not None})
-        except ValidationError as error:
-            raise ConfigError(
-                "; ".join(f"{self.asked.name}: {describe_error(each)}" for each in error.errors())
-            ) from error
+        given = {name: value for name, value in given.items() if value is not None}
+        return read_fields(Arguments.model_validate, given, f"{self.asked.name}: ")
 
     def reply(self, values: object) -> None:
         """Answer with the fields of the response."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import (
     AliasChoices,
@@ -19,6 +19,7 @@ from pydantic import (
 
 from throwcollect.errors import ConfigError
 
+_T = TypeVar("_T")
 Compression = Literal["none", "cbor", "cbor-raw"]
 """``none`` is JSON. If the subscriptions of a client to a topic differ, the one that comes last here is used."""
 COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
@@ -154,12 +155,13 @@ _OPERATIONS: TypeAdapter[AnyOperation] = TypeAdapter(Annotated[AnyOperation, Fie
 
 def read_operation(fields: Mapping[str, Any]) -> AnyOperation:
     """Read an operation from its fields."""
+    return read_fields(_OPERATIONS.validate_python, fields)
+
+
+def read_fields(read: Callable[[Any], _T], fields: Mapping[str, Any], where: str = "") -> _T:
+    """Read fields by a function of pydantic; errors name each field that is wrong, after `where`."""
     try:
-        return _OPERATIONS.validate_python(fields)
+        return read(fields)
     except ValidationError as error:
-        raise ConfigError("; ".join(describe_error(each) for each in error.errors())) from error
-
-
-def describe_error(error: Any) -> str:
-    """Describe an error of pydantic in one line: the field, and what is wrong with it."""
-    return f"{'.'.join(map(str, error['loc'])) or 'frame'}: {error['msg']}"
+        wrong = [f"{where}{'.'.join(map(str, each['loc'])) or 'frame'}: {each['msg']}" for each in error.errors()]
+        raise ConfigError("; ".join(wrong)) from error

@@ -87,7 +87,7 @@ class SubscribedTopic:
         self._asked: dict[RequestId, Subscribe] = {}
         self._pace = RateLimit(self._send, client.bridge.later)
         self.add(asked)
-        self._feed = client.bridge.listen(topic, type_name, self._pace.offer)
+        self._stop = client.bridge.listen(topic, type_name, self._pace.offer)
 
     def add(self, asked: Subscribe) -> None:
         """Add one subscription of the client, or change it."""
@@ -107,7 +107,7 @@ class SubscribedTopic:
 
     def close(self) -> None:
         """Listen no more."""
-        self._feed.remove(self._pace.offer)
+        self._stop()
         # Nothing may come after the client has unsubscribed, also no message that waits for its time.
         self._pace.clear()
 

@@ -61,12 +61,16 @@ class SimulationControl:
 
     def __init__(self, node: Node, simulation: LiveSimulator) -> None:
         self._simulation = simulation
+        self._robot = simulation.config.robot.name
         # This service has no result code, unlike all others.
         node.create_service(GetSimulatorFeatures, "get_simulator_features", self._get_features)
         offer(node, GetSimulationState, "get_simulation_state", self._get_state)
         offer(node, SetSimulationState, "set_simulation_state", self._set_state)
         offer(node, ResetSimulation, "reset_simulation", self._reset)
-        EntityServices(node, simulation)
+        offer(node, GetEntities, "get_entities", self._list)
+        offer(node, GetEntitiesStates, "get_entities_states", self._list_states)
+        offer(node, GetEntityState, "get_entity_state", self._get_entity_state)
+        offer(node, SetEntityState, "set_entity_state", self._set_entity_state)
 
     def _get_features(
         self, _request: GetSimulatorFeatures.Request, response: GetSimulatorFeatures.Response
@@ -109,18 +113,6 @@ class SimulationControl:
             if scope & (_TIME | _STATE):
                 self._simulation.reset(time=bool(scope & _TIME), state=bool(scope & _STATE))
 
-
-class EntityServices:
-    """Offers the services under relative names, so that they stand in the simulation's namespace."""
-
-    def __init__(self, node: Node, simulation: LiveSimulator) -> None:
-        self._simulation = simulation
-        self._robot = simulation.config.robot.name
-        offer(node, GetEntities, "get_entities", self._list)
-        offer(node, GetEntitiesStates, "get_entities_states", self._list_states)
-        offer(node, GetEntityState, "get_entity_state", self._get_state)
-        offer(node, SetEntityState, "set_entity_state", self._set_state)
-
     def _list(self, request: GetEntities.Request, response: GetEntities.Response) -> None:
         response.entities = self._select(request.filters)
 
@@ -128,10 +120,10 @@ class EntityServices:
         response.entities = self._select(request.filters)
         response.states = [self._read_state(name) for name in response.entities]
 
-    def _get_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
+    def _get_entity_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
         response.state = self._read_state(request.entity)
 
-    def _set_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:
+    def _set_entity_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:
         self._simulation.trial.require_free()
         self._require(request.entity)
         if request.entity not in self._simulation.world.free:
