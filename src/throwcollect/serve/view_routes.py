@@ -82,20 +82,24 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
-        """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
-        if not socket.state.may_change:
-            await socket.accept()
-            await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
-            return
-        run = await asyncio.to_thread(instances.get, instance)
-        hold = await asyncio.to_thread(slow_down, run, simulation)
-        try:
-            await socket.accept()
-            await keep_telling(socket, wait_for_end(run))
-        finally:
-            await asyncio.to_thread(hold.restore_speed)
+        await _keep_slow(socket, instances, instance, simulation)
 
     return router
+
+
+async def _keep_slow(socket: WebSocket, instances: Instances, instance: str, simulation: str) -> None:
+    """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
+    if not socket.state.may_change:
+        await socket.accept()
+        await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
+        return
+    run = await asyncio.to_thread(instances.get, instance)
+    hold = await asyncio.to_thread(slow_down, run, simulation)
+    try:
+        await socket.accept()
+        await keep_telling(socket, wait_for_end(run))
+    finally:
+        await asyncio.to_thread(hold.restore_speed)
 
 
 async def _send_throws(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:

@@ -33,11 +33,12 @@ class Call:
     """One call of a client, which is answered once.
 
     Attributes:
-        asked: What the client has sent.
+        client: The client.
+        asked: What it has sent.
     """
 
     def __init__(self, client: Client, asked: CallService) -> None:
-        self._client = client
+        self.client = client
         self.asked = asked
 
     @property
@@ -50,16 +51,16 @@ class Call:
     def reply(self, values: object) -> None:
         """Answer with the fields of the response."""
         fields = {"op": "service_response", "id": self.asked.id, "service": self.asked.name}
-        self._client.answer({**fields, "values": values, "result": True}, self.asked)
+        self.client.answer({**fields, "values": values, "result": True}, self.asked)
 
     def fail(self, reason: object) -> None:
         """Answer that the call has failed."""
-        self._client.fail(self.asked, reason)
+        self.client.fail(self.asked, reason)
 
 
-def call_node(client: Client, call: Call) -> None:
+def call_node(call: Call) -> None:
     """Call a service of a node, and answer the client when the node has answered."""
-    service, arguments = absolute_name(call.asked.name), call.asked.args
+    client, service, arguments = call.client, absolute_name(call.asked.name), call.asked.args
     types = dict(client.bridge.node.get_service_names_and_types()).get(service, [])
     if not types:
         raise ConfigError(f"nobody offers a service {service}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 from throwcollect.errors import ConfigError, ThrowcollectError
@@ -103,7 +102,7 @@ class Requests:
         name = asked.name.lstrip("/")
         if name not in self._services or name == SET_PARAMETER:
             self._require_writing(asked.name)
-        self._services.get(name, partial(call_node, self._client))(Call(self._client, asked))
+        self._services.get(name, call_node)(Call(self._client, asked))
 
     def _require_writing(self, what: str) -> None:
         if self._read_only:
