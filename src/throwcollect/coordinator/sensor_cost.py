@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from throwcollect.dataset.sensors import SensorFrames
+from throwcollect.engines.engine import GROUND
 from throwcollect.episode.channels import Channels
+from throwcollect.episode.sensor_topics import NOTHING
 from throwcollect.sensing.recorder import SensorRecorder
-from throwcollect.sensing.scene import GROUND, NOTHING, Scene
+from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.sensor import CameraSensor, make_sensor
 from throwcollect.sim.simulator import Simulator
 from throwcollect.sweep.plan import Plan

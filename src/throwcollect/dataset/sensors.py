@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -26,17 +26,11 @@ from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.drawn_robot import DrawnRobot
 from throwcollect.sensing.noise import Noise
 from throwcollect.sensing.pose import OPTICAL, Pose
-from throwcollect.sensing.scene import Scene
+from throwcollect.sensing.scene import make_scene
 from throwcollect.units import NS_PER_S
 
 FRAMES = {"color": "images", "depth": "depth_m", "segmentation": "labels", "scan": "ranges", "points": "points"}
 """What `SensorFrames` calls the frames of each stream."""
-
-
-@lru_cache(maxsize=8)
-def _make_skeleton(description: str, joints: tuple[str, ...], base_height_m: float, moving: tuple[str, ...]) -> Scene:
-    """Make a scene of links and bodies without their shapes."""
-    return Scene(DrawnRobot(description, (), Path), joints, base_height_m, moving=moving)
 
 
 class Frames:
@@ -144,7 +138,7 @@ class SensorFrames:
         """Links and bodies by their numbers in `labels`, as ``/<name>/segmentation/labels`` has them."""
         base_height_m = self._whole.robot.base_height_m
         tree = frames.read_frames(full_description(self._whole), base_height=base_height_m)
-        return label_names(self._whole, tree.links)
+        return label_names(tree.links, self._whole.acted_on, self._whole.bodies)
 
     @property
     def intrinsics(self) -> NDArray[np.float64]:
@@ -164,8 +158,10 @@ class SensorFrames:
 
     def _find_pose(self, number: int) -> NDArray[np.float64]:
         config, frame = self._whole, frame_of(self.name, self.config)
-        robot = full_description(config), tuple(robot_of(config).joints), config.robot.base_height_m
-        link = _make_skeleton(*robot, moving_bodies_of(config)).place_sample(self._samples, number).find(frame.parent)
+        # Where links are does not depend on their shapes.
+        robot, joints = DrawnRobot(full_description(config), (), Path), robot_of(config).joints
+        scene = make_scene(robot, joints, config.robot.base_height_m, (), moving_bodies_of(config))
+        link = scene.place_sample(self._samples, number).find(frame.parent)
         pose = link * Pose.of(frame.translation, frame.rotation_xyzw)
         rows, origin = pose * OPTICAL if isinstance(self.config, PictureConfig) else pose
         return np.array([(*row, part) for row, part in zip(rows, origin, strict=True)] + [(0.0, 0.0, 0.0, 1.0)])

@@ -154,7 +154,7 @@ class Channels:
         """Encode the CDR messages of the latched channels; `stamp_ns` is the stamp of the static transforms [ns]."""
         description, static, *labelled = self.latched
         fixed = (*self._frames.fixed, *optical_frames(self._config))
-        labels = label_names(self._config, self._frames.links)
+        labels = label_names(self._frames.links, self._config.acted_on, self._config.bodies)
         return {
             description: serialize(get_message(description.type_name)(data=self.robot)),
             static: serialize(make_fixed_transforms(fixed, stamp_ns)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -16,6 +16,7 @@ from pydantic import JsonValue
 from rclzenoh.interfaces import get_message
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig, SensorConfig
+from throwcollect.engines.engine import GROUND
 from throwcollect.episode.frames import Frame, quaternion_of
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.topics import make_fixed_transforms, make_header
@@ -27,6 +28,8 @@ _IDS_OF_SENSOR = 16
 _LABELS_ID = 15
 TF_ID = 6
 """Number of the channel of ``/tf``."""
+NOTHING = "background"
+"""Label of what no sensor reaches, with the number 0."""
 _ENCODINGS = {"color": "rgb8", "depth": "", "segmentation": "mono16"}
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
 """A point of a cloud [m]; the intensity is the number of the link or body that it lies on."""
@@ -208,10 +211,15 @@ def _make_ranges(name: str, lidar: LidarConfig) -> Iterator[tuple[int, SensorTop
     yield 0, SensorTopic(name, "points", f"/{name}/points", kind, MessageLayout(message, [*stamps, "data"]))
 
 
-def label_names(config: Config, links: Sequence[str]) -> tuple[str, ...]:
-    """List what the numbers of a segmentation mean, given the links in the order of the robot's description."""
-    others = (name for name in config.bodies if name != config.acted_on)
-    return ("background", *links, config.acted_on, "ground", *others)
+def label_names(links: Sequence[str], acted_on: str, bodies: Iterable[str]) -> tuple[str, ...]:
+    """List what the numbers of a segmentation mean.
+
+    Args:
+        links: The links in the order of the robot's description.
+        acted_on: The object.
+        bodies: The bodies of the world, with or without the object.
+    """
+    return (NOTHING, *links, acted_on, GROUND, *(name for name in bodies if name != acted_on))
 
 
 def make_labels(names: Sequence[str]) -> Any:

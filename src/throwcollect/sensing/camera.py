@@ -68,12 +68,6 @@ class Camera:
         """Focal length in pixels, across and down."""
         return focal_length(self.height, self.vertical_fov_rad)
 
-    @property
-    def matrix(self) -> tuple[Vector, Vector, Vector]:
-        """The intrinsic matrix K of ROS and OpenCV, for which the middle of the first pixel is at 0, 0."""
-        focal = self.focal_px
-        return (focal, 0.0, (self.width - 1) / 2), (0.0, focal, (self.height - 1) / 2), (0.0, 0.0, 1.0)
-
     def find_optical(self, placed: PlacedScene) -> Pose:
         """Find the pose in world of the optical frame: x right, y down, z forward.
 

@@ -7,6 +7,7 @@ import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +110,7 @@ def draw_robot_of(config: Config, description: str | None = None) -> DrawnRobot:
     return read_drawn_robot(text, tool_of(config).link, robot_of(config).locate, config.robot.mount_height_m)
 
 
+@lru_cache(maxsize=4)
 def read_drawn_robot(description: str, tool: str, locate: Callable[[str], Path], mount_m: float = 0.0) -> DrawnRobot:
     """Read a URDF text as viewers draw it, on a column of that height; the link of the tool has a colour of its own."""
     try:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from throwcollect.engines.body import Vector
-from throwcollect.episode.frames import quaternion_of
 
 Rows = tuple[Vector, Vector, Vector]
 """The rows of a rotation matrix, frame to parent."""
@@ -46,11 +45,6 @@ class Pose(NamedTuple):
             (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
         )
         return cls(rows, (a, b, c))
-
-    @classmethod
-    def from_rpy(cls, origin: Sequence[float], rpy_rad: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
-        """Make the pose of an origin [m] and of rotations about the parent's axes x, y, z in this order [rad]."""
-        return cls.of(origin, quaternion_of(*rpy_rad))
 
     @classmethod
     def looking_at(cls, eye: Sequence[float], target: Sequence[float]) -> Pose:

@@ -14,7 +14,7 @@ from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.message_table import MOST_FRAMES_BYTES, MessageTable, make_row
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import put_stamps
-from throwcollect.sensing.scene import Scenes
+from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.sensor import make_sensor
 from throwcollect.units import NS_PER_S
 
@@ -33,7 +33,6 @@ class SensorRecorder:
     def __init__(self, channels: Channels, on_frame: Callable[[], None] = lambda: None) -> None:
         self._on_frame = on_frame
         self._topics = channels.sensors
-        self._scenes = Scenes()
         self._compressor = zstandard.ZstdCompressor(level=_LEVEL)
 
     def record(self, config: Config, trial: int, samples: Samples) -> tuple[Chunk, ...]:
@@ -47,7 +46,7 @@ class SensorRecorder:
         """
         if not self._topics:
             return ()
-        scene, chunks = self._scenes.of(config), []
+        scene, chunks = Scene.of(config), []
         for name, topics in self._topics.items():
             sensor = make_sensor(name, config, scene, trial)
             numbers = np.arange(0, len(samples), config.record.rate_hz // sensor.rate_hz)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,20 +14,18 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import Vector
+from throwcollect.engines.engine import GROUND
 from throwcollect.episode.frames import WORLD, Frame, FrameTree, MovingFrame, read_frames
 from throwcollect.episode.record import Samples
+from throwcollect.episode.sensor_topics import label_names
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import cos, sin
-from throwcollect.robots.description import full_description, robot_of
+from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.decimation import Points, cross, dot
 from throwcollect.sensing.drawn_robot import DrawnRobot, DrawnShape, draw_bodies_of, draw_robot_of
 from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.surface import COARSE, Surface, surfaces_of
-
-NOTHING = "background"
-"""Label of what no sensor reaches, with the number 0."""
-GROUND = "ground"
 
 
 class Joint(NamedTuple):
@@ -45,8 +44,7 @@ class Scene:
     moves. Corners and triangles are listed part by part.
 
     Attributes:
-        labels: What the numbers in pictures of labels mean: nothing, the links in the order of the robot's description,
-            the object, the ground, and the other bodies.
+        labels: What the numbers in pictures of labels mean (`label_names`).
         ground: Number in `labels` of the ground.
         links: The part that each link belongs to, and its pose in it; with bodies that move and the world.
         n_moving: Number of bodies that move.
@@ -67,8 +65,8 @@ class Scene:
         robot: DrawnRobot,
         joints: Sequence[str],
         base_height_m: float,
-        bodies: Sequence[DrawnShape] = (),
-        moving: Sequence[str] = (),
+        bodies: Sequence[DrawnShape],
+        moving: Sequence[str],
         *,
         triangles: int = COARSE,
     ) -> None:
@@ -91,8 +89,7 @@ class Scene:
         free = {name: (1 + len(self._joints) + number, Pose()) for number, name in enumerate(moving)}
         # A robot may have a link with the name of the world, too, which then stands at the height of the base.
         self.links = {**links, **free, WORLD: (0, Pose())}
-        others = dict.fromkeys(shape.name for shape in bodies if shape.name not in moving[:1])
-        self.labels = (NOTHING, *robot.links, *moving[:1], GROUND, *others)
+        self.labels = label_names(robot.links, moving[0], dict.fromkeys(shape.name for shape in bodies))
         self.ground = self.labels.index(GROUND)
         self.n_moving = len(moving)
         drawn = [(links[shape.link], shape) for shape in robot.shapes]
@@ -107,8 +104,8 @@ class Scene:
         colors = np.array([shape.rgba[:3] for _, shape in drawn], np.float32).reshape(-1, 3).T
         self.labels_of, self.colors = np.repeat(numbers, many), np.repeat(colors, many, axis=1)
 
-    @classmethod
-    def of(cls, config: Config, *, description: str | None = None, triangles: int = COARSE) -> Scene:
+    @staticmethod
+    def of(config: Config, *, description: str | None = None, triangles: int = COARSE) -> Scene:
         """Make the scene of a configuration.
 
         Args:
@@ -122,7 +119,8 @@ class Scene:
             MissingExtraError: If a file of the robot needs a package that is not installed.
         """
         robot, bodies, moving = draw_robot_of(config, description), draw_bodies_of(config), moving_bodies_of(config)
-        return cls(robot, robot_of(config).joints, config.robot.base_height_m, bodies, moving, triangles=triangles)
+        joints, base_height_m = robot_of(config).joints, config.robot.base_height_m
+        return make_scene(robot, joints, base_height_m, bodies, moving, triangles=triangles)
 
     def _find_parts(self, tree: FrameTree, columns: Mapping[str, int]) -> dict[str, tuple[int, Pose]]:
         """Find the part of each link, and its pose in it; number 0 is all that stands."""
@@ -184,18 +182,8 @@ class Scene:
         return self.place(samples.position[number], [Pose.of(place[0], turn[0]) for place, turn, *_ in parts])
 
 
-class Scenes:
-    """Makes the scenes of trials; a scene is kept as long as nothing differs in it but what moves."""
-
-    def __init__(self) -> None:
-        self._kept: tuple[object, Scene] | None = None
-
-    def of(self, config: Config) -> Scene:
-        """Make the scene of a trial; see `Scene.of`."""
-        drawn = full_description(config), draw_bodies_of(config)
-        if self._kept is None or self._kept[0] != drawn:
-            self._kept = drawn, Scene.of(config)
-        return self._kept[1]
+make_scene = lru_cache(maxsize=4)(Scene)
+"""Makes a `Scene`, or returns an earlier one in which nothing differs but what moves, such as that of another trial."""
 
 
 # Scenes in one state are keys of a cache.

@@ -22,7 +22,7 @@ from throwcollect.robots.description import joint_offsets, robot_of, start_postu
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.pose import Pose
-from throwcollect.sensing.scene import Scenes
+from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.sensor import CameraSensor, make_sensor
 from throwcollect.sim.world import World
 from throwcollect.wording import join_names, suggest
@@ -152,7 +152,6 @@ class PolicyLoop:
         self._robot = robot
         parts = [part for part, _ in _PICTURES.values()]
         self._seen_by = [name for name in config.sensors if any(f"{name}_{part}" in self._names for part in parts)]
-        self._scenes = Scenes()
 
     def begin(self, config: Config, number: int, seed: int, target: Mapping[str, float]) -> None:
         """Begin a trial, in the start state of its configuration."""
@@ -167,7 +166,7 @@ class PolicyLoop:
         self._observed: tuple[int, Observation] = (-1, {})
         self._cameras: dict[str, CameraSensor] = {}
         if self._seen_by:
-            self._scene = self._scenes.of(config)
+            self._scene = Scene.of(config)
             made = {name: make_sensor(name, config, self._scene, number) for name in self._seen_by}
             self._cameras = {name: sensor for name, sensor in made.items() if isinstance(sensor, CameraSensor)}
         if missing := [name for name in self._section.observation if name not in self.observe()]:

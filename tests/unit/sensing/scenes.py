@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from throwcollect.episode.frames import WORLD
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.episode.frames import WORLD, quaternion_of
+from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.drawn_robot import DrawnShape, read_drawn_robot
 from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import PlacedScene, Scene
@@ -16,6 +20,17 @@ NO_ROBOT = '<robot name="none"><link name="root"/></robot>'
 def make_shape(name: str, kind: str, size: Sequence[float], at: Sequence[float], link: str = WORLD) -> DrawnShape:
     """Make an orange body."""
     return DrawnShape(link, tuple(at), (0.0, 0.0, 0.0, 1.0), tuple(size), kind, "", (1.0, 0.5, 0.0, 1.0), name)
+
+
+def make_pose(origin: Sequence[float], rpy_rad: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
+    """Make the pose of an origin [m] and of rotations about the parent's axes x, y, z in this order [rad]."""
+    return Pose.of(origin, quaternion_of(*rpy_rad))
+
+
+def make_matrix(camera: Camera) -> NDArray[np.float64]:
+    """Make the intrinsic matrix of ROS and OpenCV, for which the middle of the first pixel is at 0, 0."""
+    focal = camera.focal_px
+    return np.array([[focal, 0, (camera.width - 1) / 2], [0, focal, (camera.height - 1) / 2], [0, 0, 1]])
 
 
 def make_scene(*shapes: DrawnShape, urdf: str = NO_ROBOT, joints: Sequence[str] = ()) -> Scene:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.unit.sensing.scenes import make_matrix, make_pose
 
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import WORLD
@@ -126,10 +127,10 @@ def test_a_camera_sees_what_rays_hit(posed: Posed, number: int) -> None:
     placed = posed.place(number)
     pose = Pose.looking_at(EYE, CENTRE)
     rpy = (0.0, np.arcsin(-pose.rows[2][0]), np.arctan2(pose.rows[1][0], pose.rows[0][0]))
-    camera = Camera(160, 120, 1.05, pose=Pose.from_rpy(EYE, rpy), far_m=1e3)
+    camera = Camera(160, 120, 1.05, pose=make_pose(EYE, rpy), far_m=1e3)
     frame = camera.render(placed, color=False)
     row, column = np.mgrid[:120, :160]
-    inverse = np.linalg.inv(np.array(camera.matrix))
+    inverse = np.linalg.inv(make_matrix(camera))
     rays = np.stack([column.ravel(), row.ravel(), np.ones(160 * 120)], axis=1) @ inverse.T
     _compare(posed, frame.labels, frame.depth, posed.trace(EYE, rays @ np.array((pose * OPTICAL).rows).T))
 
@@ -137,7 +138,7 @@ def test_a_camera_sees_what_rays_hit(posed: Posed, number: int) -> None:
 def test_a_lidar_measures_what_rays_hit(posed: Posed) -> None:
     placed = posed.place(0)
     azimuths = tuple(-np.pi + 2 * np.pi / 360 * np.arange(360))
-    lidar = Lidar(azimuths, tuple(np.radians(-15 + 2 * np.arange(16))), pose=Pose.from_rpy((0.9, 0.0, 1.0)), far_m=1e3)
+    lidar = Lidar(azimuths, tuple(np.radians(-15 + 2 * np.arange(16))), pose=make_pose((0.9, 0.0, 1.0)), far_m=1e3)
     scan = lidar.scan(placed)
     _compare(posed, scan.labels, scan.ranges, posed.trace((0.9, 0.0, 1.0), lidar.directions.reshape(3, -1).T))
 

@@ -7,22 +7,22 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.unit.sensing.scenes import make_scene, make_shape, place_ball
+from tests.unit.sensing.scenes import make_matrix, make_pose, make_scene, make_shape, place_ball
 
 from throwcollect.errors import ConfigError
 from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.pose import Pose
 
-CAMERA = Camera(320, 240, 1.0, pose=Pose.from_rpy((0.1, -0.2, 1.0), (0.0, 0.1, 0.2)))
+CAMERA = Camera(320, 240, 1.0, pose=make_pose((0.1, -0.2, 1.0), (0.0, 0.1, 0.2)))
 RADIUS = 0.1
-FORWARD = Camera(160, 120, 1.0, pose=Pose.from_rpy((0.0, 0.0, 1.0)))
+FORWARD = Camera(160, 120, 1.0, pose=make_pose((0.0, 0.0, 1.0)))
 
 
 def find_rays(camera: Camera) -> NDArray[np.float64]:
     """Directions of the rays through all pixels in the optical frame, shape ``(height, width, 3)``."""
     row, column = np.mgrid[: camera.height, : camera.width]
     pixels = np.stack([column, row, np.ones_like(row)], axis=-1)
-    rays: NDArray[np.float64] = pixels @ np.linalg.inv(np.array(camera.matrix)).T
+    rays: NDArray[np.float64] = pixels @ np.linalg.inv(make_matrix(camera)).T
     return rays
 
 
@@ -62,7 +62,7 @@ def test_the_ground_has_its_depth_and_nothing_lies_below_it() -> None:
     assert not ground[:60].any()
     assert frame.depth[ground] == pytest.approx((1.0 / rays[..., 1])[ground], rel=1e-6)
     assert np.isinf(frame.depth[~ground]).all()
-    below = Camera(64, 48, 1.0, pose=Pose.from_rpy((0.0, 0.0, -1.0)))
+    below = Camera(64, 48, 1.0, pose=make_pose((0.0, 0.0, -1.0)))
     assert not below.render(placed, color=False).labels.any()
 
 
@@ -84,7 +84,7 @@ def test_what_reaches_behind_the_camera_is_cut_off_in_front_of_it() -> None:
     table = make_shape("table", "box", (20.0, 20.0, 0.5), (0.0, 0.0, 0.35))
     placed = place_ball((2.0, 0.0, 3.0), table)
     for roll in (0.0, 0.7):
-        camera = Camera(160, 120, 1.0, pose=Pose.from_rpy((0.0, 0.0, 1.0), (roll, 0.0, 0.0)), far_m=8.0)
+        camera = Camera(160, 120, 1.0, pose=make_pose((0.0, 0.0, 1.0), (roll, 0.0, 0.0)), far_m=8.0)
         frame, falls = camera.render(placed, color=False), -find_rays(camera) @ camera.find_optical(placed).rows[2]
         depth = 0.4 / np.where(falls > 0, falls, 1e-9)
         expected = depth < 8.0
@@ -105,7 +105,7 @@ def test_a_near_plane_cuts_into_a_body() -> None:
 
 
 def test_a_shadow_lies_on_the_ground_and_edges_are_smooth() -> None:
-    above = Camera(160, 120, 1.0, pose=Pose.from_rpy((0.0, 0.0, 3.0), (0.0, math.pi / 2, 0.0)))
+    above = Camera(160, 120, 1.0, pose=make_pose((0.0, 0.0, 3.0), (0.0, math.pi / 2, 0.0)))
     with_ball, without = (above.render(place_ball(at)) for at in ((0.3, 0.0, 1.0), (0.0, 0.0, -1.0)))
     assert with_ball.color is not None
     assert without.color is not None

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.unit.sensing.scenes import make_shape, place_ball
+from tests.unit.sensing.scenes import make_pose, make_shape, place_ball
 
 from throwcollect.sensing.lidar import Lidar
-from throwcollect.sensing.pose import Pose
 
 AROUND = tuple((-np.pi + 2 * np.pi / 360 * np.arange(360)).tolist())
-AT = Pose.from_rpy((0.0, 0.0, 1.0))
+AT = make_pose((0.0, 0.0, 1.0))
 FAR_AWAY = (0.0, 50.0, 1.0)
 
 
