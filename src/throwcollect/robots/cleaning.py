@@ -6,7 +6,6 @@ import copy
 import hashlib
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,16 +14,14 @@ from throwcollect.engines.body import BodyJoint, BodyModel, LinkShape, to_text
 from throwcollect.engines.mesh import Mesh
 from throwcollect.errors import ConfigError
 from throwcollect.members import load_member, names_of
-from throwcollect.robots.imported import SRDF, URDF, list_shares, make_error, package_of
+from throwcollect.robots.imported import SRDF, URDF, find_mesh, make_error, package_of
 from throwcollect.robots.joint_model import move_joint
-from throwcollect.robots.urdf import PACKAGE, locate_mesh, read_urdf, read_xml
+from throwcollect.robots.urdf import PACKAGE, read_urdf, read_xml
 from throwcollect.wording import suggest
 
 _TURN = 6.283185307179586
 _LARGEST_M = 10.0
 """No part of a robot is larger; meshes in millimetres are."""
-_MOST_MESH_BYTES = 50_000_000
-"""As many as a million triangles have in a binary STL."""
 _LARGE_BYTES = 100_000
 _HOLDING = 3
 """So many links before the flange hold the tool."""
@@ -48,7 +45,6 @@ class Cleaning:
     Attributes:
         notes: Where each key of the complete section comes from.
         files: Contents of the meshes, by the names of the files.
-        sources: The files of meshes that were read.
 
     Raises:
         ConfigError: If something in the URDF or the section is wrong.
@@ -59,7 +55,6 @@ class Cleaning:
         self._source = read_xml(path)
         self.notes: dict[str, str] = {}
         self.files: dict[str, bytes] = {}
-        self.sources: set[Path] = set()
         self.urdf = read_urdf(self._source, str(path), find_mesh=self._find_mesh)
         self.name = self._find_name()
         if section.flange not in self.urdf.links:
@@ -79,9 +74,7 @@ class Cleaning:
         return name
 
     def _find_mesh(self, filename: str) -> Path:
-        found = find_mesh(filename, self._path, self._section.packages)
-        self.sources.add(found)
-        return found
+        return find_mesh(filename, self._path, self._section.packages)
 
     def _find_chain(self, tip: str, base: str | None = None) -> list[BodyJoint]:
         """List the joints from the root, or from a link, to a link."""
@@ -285,30 +278,3 @@ class Cleaning:
     @property
     def _moving(self) -> set[str]:
         return {name for names in self.controllers.values() for name in names}
-
-
-def find_mesh(filename: str, urdf: Path, packages: Mapping[str, str] | None = None) -> Path:
-    """Find the mesh that a URDF names; packages lie in given directories, above it, or in ROS.
-
-    Raises:
-        ConfigError: If there is no such file, or it is too large.
-    """
-    if filename.startswith(PACKAGE):
-        package, _, rest = filename.removeprefix(PACKAGE).lstrip("/").partition("/")
-        places = [Path(given) for name, given in (packages or {}).items() if name == package]
-        # A package is a directory of its name, mostly one of those that the URDF lies in.
-        places += [above / package for above in urdf.resolve().parents]
-        places += [above for above in urdf.resolve().parents if above.name == package]
-        places += list_shares(package)
-        # The meshes of an imported robot lie in the directory of its URDF.
-        found = next((place / rest for place in places if (place / rest).is_file()), urdf.parent / rest)
-        missing = "not found" if packages is None else f"not found; robot.packages takes the directory of {package}"
-    else:
-        found = locate_mesh(filename, urdf.parent, urdf.parent)
-        missing = f"there is no file {found}"
-    if not found.is_file():
-        raise ConfigError(f"{filename}: {missing}")
-    if (size := found.stat().st_size) > _MOST_MESH_BYTES:
-        most = f"at most {_MOST_MESH_BYTES // 10**6} MB, which is a million triangles of STL"
-        raise ConfigError(f"{found}: should have {most}, has {size // 10**6} MB")
-    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.engines.body import Placement
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.robot import Robot
+from throwcollect.robots.urdf import PACKAGE, locate_mesh
 
 URDF, SRDF = "robot.urdf", "robot.srdf"
 """Names of an imported robot's files; its meshes have names made of their digests."""
@@ -19,6 +20,8 @@ HOME = "home"
 """Name of the posture at rest in the SRDF of an imported robot."""
 _NAME = 16
 """Length of the names of meshes."""
+_MOST_MESH_BYTES = 50_000_000
+"""As many as a million triangles have in a binary STL."""
 _KEYS = {"name", "urdf", "srdf", "flange", "tool_pose", "controllers", "prismatic", "holding", "sha256"}
 """Keys that the robot depends on."""
 
@@ -100,6 +103,33 @@ def list_shares(package: str) -> Iterator[Path]:
     for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
         if prefix and (share := Path(prefix, "share", package)).is_dir():
             yield share
+
+
+def find_mesh(filename: str, urdf: Path, packages: Mapping[str, str] | None = None) -> Path:
+    """Find the mesh that a URDF names; packages lie in given directories, above it, or in ROS.
+
+    Raises:
+        ConfigError: If there is no such file, or it is too large.
+    """
+    if filename.startswith(PACKAGE):
+        package, _, rest = filename.removeprefix(PACKAGE).lstrip("/").partition("/")
+        places = [Path(given) for name, given in (packages or {}).items() if name == package]
+        # A package is a directory of its name, mostly one of those that the URDF lies in.
+        places += [above / package for above in urdf.resolve().parents]
+        places += [above for above in urdf.resolve().parents if above.name == package]
+        places += list_shares(package)
+        # The meshes of an imported robot lie in the directory of its URDF.
+        found = next((place / rest for place in places if (place / rest).is_file()), urdf.parent / rest)
+        missing = "not found" if packages is None else f"not found; robot.packages takes the directory of {package}"
+    else:
+        found = locate_mesh(filename, urdf.parent, urdf.parent)
+        missing = f"there is no file {found}"
+    if not found.is_file():
+        raise ConfigError(f"{filename}: {missing}")
+    if (size := found.stat().st_size) > _MOST_MESH_BYTES:
+        most = f"at most {_MOST_MESH_BYTES // 10**6} MB, which is a million triangles of STL"
+        raise ConfigError(f"{found}: should have {most}, has {size // 10**6} MB")
+    return found
 
 
 def make_error(key: str, sentence: str, hint: str | None = None) -> ConfigError:

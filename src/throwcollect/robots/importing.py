@@ -8,7 +8,6 @@ value, with a comment on where it came from.
 from __future__ import annotations
 
 import hashlib
-import json
 import shutil
 import tempfile
 import xml.etree.ElementTree as ElementTree
@@ -23,13 +22,12 @@ from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
 from throwcollect.files import suggest_path
-from throwcollect.robots.imported import SRDF, URDF, hash_files, list_shares, make_error, make_robot
+from throwcollect.robots.imported import SRDF, URDF, find_mesh, hash_files, list_shares, make_error, make_robot
 from throwcollect.robots.urdf import PACKAGE, read_xml
 from throwcollect.state_directory import state_directory
 from throwcollect.version import __version__
 
 SECTION = "robot.yaml"
-_SOURCES = "sources.json"
 _EXAMPLES = "example-robot-data:"
 
 
@@ -41,8 +39,7 @@ def import_robot(section: DescribedRobotConfig) -> DescribedRobotConfig:
     """
     path = find_urdf(section.urdf)
     directory = _find_cache(section, path)
-    if not _is_current(directory):
-        shutil.rmtree(directory, ignore_errors=True)
+    if not directory.is_dir():
         _fill(directory, section, path)
     found = Document(directory / SECTION).values["robot"]
     files = {"urdf": str(directory / URDF), "srdf": str(directory / SRDF), "sha256": hash_files(directory)}
@@ -81,25 +78,16 @@ def _find_examples() -> Path:
 
 
 def _find_cache(section: DescribedRobotConfig, path: Path) -> Path:
-    """Find the directory of an import: its name is a digest of the section, the URDF and the SRDF."""
+    """Find the directory of an import: its name is a digest of the section, the URDF, the SRDF and all meshes."""
     digest = hashlib.sha256(f"{__version__}\n{section.model_dump_json(include=_DERIVED)}\n{path}".encode())
-    for file in (path, *([Path(section.srdf)] if section.srdf else ())):
-        digest.update(ElementTree.tostring(read_xml(file)))
+    urdf = read_xml(path)
+    for root in (urdf, *([read_xml(Path(section.srdf))] if section.srdf else ())):
+        digest.update(ElementTree.tostring(root))
+    for filename in sorted({mesh.get("filename", "") for mesh in urdf.iterfind("link/*/geometry/mesh")} - {""}):
+        # Meshes may be large, so their contents are not looked at.
+        status = find_mesh(filename, path, section.packages).stat()
+        digest.update(f"\n{filename} {status.st_size} {status.st_mtime_ns}".encode())
     return state_directory() / "robots" / digest.hexdigest()[:16]
-
-
-def _is_current(directory: Path) -> bool:
-    """Whether an import is there, and its meshes are still those that it was made of."""
-    try:
-        sources = json.loads((directory / _SOURCES).read_bytes())
-        return all(_describe_file(Path(path)) == known for path, known in sources.items())
-    except (OSError, ValueError):
-        return False
-
-
-def _describe_file(path: Path) -> list[int]:
-    status = path.stat()
-    return [status.st_size, status.st_mtime_ns]
 
 
 def _fill(directory: Path, section: DescribedRobotConfig, path: Path) -> None:
@@ -119,14 +107,12 @@ def _fill(directory: Path, section: DescribedRobotConfig, path: Path) -> None:
         robot = make_robot(DescribedRobotConfig.model_validate({**keys, "urdf": str(scratch / URDF)}))
         srdf, made.notes["srdf"] = derive(robot, section)
         (scratch / SRDF).write_text(srdf, encoding="utf-8")
-        sources = {str(source): _describe_file(source) for source in made.sources}
-        (scratch / _SOURCES).write_text(json.dumps(sources), encoding="utf-8")
         (scratch / SECTION).write_text("".join(_write_section(keys, made.notes)), encoding="utf-8")
         try:
             scratch.rename(directory)
         except OSError:
             # Another process has imported the same robot meanwhile.
-            if not _is_current(directory):
+            if not directory.is_dir():
                 raise
     except ConfigError as error:
         # The user knows the source, and not the copy.
