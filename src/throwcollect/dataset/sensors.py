@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig
+from throwcollect.engines.pose import OPTICAL, Pose
 from throwcollect.episode import frames
 from throwcollect.episode.chunk import Chunk, count_indexed
 from throwcollect.episode.message_table import MessageTable, read_frames
@@ -25,7 +26,6 @@ from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.drawn_robot import DrawnRobot
 from throwcollect.sensing.noise import Noise
-from throwcollect.sensing.pose import OPTICAL, Pose
 from throwcollect.sensing.scene import make_scene
 from throwcollect.units import NS_PER_S
 

@@ -9,7 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.body import BodyJoint
+from throwcollect.engines.body import BodyJoint, turn_of
+from throwcollect.engines.pose import multiply
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import cos, sin
 from throwcollect.robots.urdf import parse_xml, read_urdf
@@ -64,18 +65,9 @@ class MovingFrame(Frame):
         """Compute unit quaternions (x, y, z, w), frame to parent, ``(n, 4)``, at angles [rad] of shape ``(n,)``."""
         half = angle / 2
         sine, w2 = sin(half), cos(half)
-        # This is the product of two quaternions: that of the frame at angle 0, and the turn about the joint's axis.
-        x2, y2, z2 = (component * sine for component in self.axis)
-        x1, y1, z1, w1 = self.rotation_xyzw
-        return np.stack(
-            [
-                w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
-                w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
-                w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
-                w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
-            ],
-            axis=-1,
-        )
+        # The turn about the joint's axis comes first, and then that of the frame at angle 0.
+        x, y, z = (component * sine for component in self.axis)
+        return np.stack(multiply(self.rotation_xyzw, (x, y, z, w2)), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -115,7 +107,7 @@ def _frame_of(joint: BodyJoint) -> Frame:
             f"robot description: joint {joint.name} is {joint.kind}",
             expected="fixed, revolute, continuous or prismatic",
         )
-    translation, rotation = joint.placement.xyz, quaternion_of(*joint.placement.rpy)
+    translation, rotation = joint.placement.xyz, turn_of(joint.placement)
     if not joint.moves:
         return Frame(joint.parent, joint.child, translation, rotation)
     x, y, z = joint.axis
@@ -123,15 +115,4 @@ def _frame_of(joint: BodyJoint) -> Frame:
     axis = x / length, y / length, z / length
     return MovingFrame(
         joint.parent, joint.child, translation, rotation, joint.name, axis, slides=joint.kind == "prismatic"
-    )
-
-
-def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Make the unit quaternion (x, y, z, w) of rotations about the fixed axes x, y, z in this order, as in URDF."""
-    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in (roll, pitch, yaw))
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
     )

@@ -16,8 +16,9 @@ from pydantic import JsonValue
 from rclzenoh.interfaces import get_message
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig, SensorConfig
+from throwcollect.engines.body import Placement, turn_of
 from throwcollect.engines.engine import GROUND
-from throwcollect.episode.frames import Frame, quaternion_of
+from throwcollect.episode.frames import Frame
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.topics import make_fixed_transforms, make_header
 from throwcollect.reproducible_math import cos, sin
@@ -114,7 +115,8 @@ def frame_of(name: str, sensor: SensorConfig) -> Frame:
     """Make the frame of a sensor in its link: x forward, y to the left, z upwards."""
     (x, y, z), look_at_m = sensor.place
     if look_at_m is None:
-        turn = quaternion_of(*(sensor.rpy_rad or (0.0, 0.0, 0.0)))
+        roll, pitch, yaw = sensor.rpy_rad or (0.0, 0.0, 0.0)
+        turn = turn_of(Placement(rpy=(roll, pitch, yaw)))
     else:
         dx, dy, dz = (at - here for at, here in zip(look_at_m, (x, y, z), strict=True))
         # Half angles of yaw and pitch by square roots alone, which every processor rounds alike.

@@ -25,6 +25,7 @@ from throwcollect.engines.body import (
 )
 from throwcollect.engines.engine import SceneBody
 from throwcollect.engines.mesh import Mesh
+from throwcollect.engines.pose import Pose
 from throwcollect.reproducible_math import cos, matmul, sin
 from throwcollect.robots.body_files import inertia_of, shapes_of
 
@@ -227,13 +228,7 @@ def _find_placement(section: AnyBody, sections: Mapping[str, AnyBody]) -> Placem
 
 def _turn_back(direction: Vector, placement: Placement) -> Vector:
     """Write a direction of a parent along the axes of a frame in it."""
-    x, y, z, w = turn_of(placement)
-    a, b, c = direction
-    return (
-        a * (1 - 2 * (y * y + z * z)) + b * 2 * (x * y + w * z) + c * (2 * (x * z - w * y)),
-        a * 2 * (x * y - w * z) + b * (1 - 2 * (x * x + z * z)) + c * (2 * (y * z + w * x)),
-        a * 2 * (x * z + w * y) + b * 2 * (y * z - w * x) + c * (1 - 2 * (x * x + y * y)),
-    )
+    return Pose.of(placement.xyz, turn_of(placement)).inverse().turn(direction)
 
 
 def _reach(shape: LinkShape, direction: Vector) -> float:

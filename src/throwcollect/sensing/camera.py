@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
+from throwcollect.engines.pose import OPTICAL, Pose
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.sensor_topics import focal_length
-from throwcollect.sensing.pose import OPTICAL, Pose
 from throwcollect.sensing.raster import NONE, Outlines, clip_near, find_nearest
 from throwcollect.sensing.scene import PlacedScene
 from throwcollect.sensing.shading import Seen, shade

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.engines.body import BodyModel, Placement, Vector
+from throwcollect.engines.body import BodyModel, Placement, Vector, turn_of
 from throwcollect.engines.engine import Quaternion
-from throwcollect.episode.frames import WORLD, quaternion_of
+from throwcollect.engines.pose import multiply
+from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import rotate
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description, robot_of
@@ -140,7 +141,7 @@ def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
     """Make the shapes of the bodies in the world of a trial: in the frame of the world, or of a body that moves."""
     moving, shapes = moving_bodies_of(config), []
     for look in looks_of(config):
-        frame, (place, turn) = look.name, (look.within.xyz, quaternion_of(*look.within.rpy))
+        frame, (place, turn) = look.name, (look.within.xyz, turn_of(look.within))
         if look.name not in moving:
             frame, (place, turn) = WORLD, _move(Placement(look.position_m, look.rpy_rad), look.within)
         shapes.append(
@@ -151,16 +152,10 @@ def draw_bodies_of(config: Config) -> tuple[DrawnShape, ...]:
 
 def _move(body: Placement, within: Placement) -> tuple[Vector, Quaternion]:
     """Find the pose of something in a body in the frame of that body's pose: position [m], and rotation."""
-    (x1, y1, z1, w1), (x2, y2, z2, w2) = quaternion_of(*body.rpy), quaternion_of(*within.rpy)
-    turn = (
-        w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
-        w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
-        w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
-        w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
-    )
-    ((offset,),) = rotate(np.array([[x1, y1, z1, w1]]), np.array([within.xyz]), inverse=False)
+    turn = turn_of(body)
+    ((offset,),) = rotate(np.array([turn]), np.array([within.xyz]), inverse=False)
     x, y, z = (np.array(body.xyz) + offset).tolist()
-    return (x, y, z), turn
+    return (x, y, z), multiply(turn, turn_of(within))
 
 
 def draw_object_of(config: Config) -> str:
@@ -217,8 +212,8 @@ def _read_shape(link: ElementTree.Element, visual: ElementTree.Element, colors: 
     # A material need not have a name, so the colour that the shape itself defines comes first.
     found = {} if material is None else colors | _read_color(material)
     rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
-    place, turn = shape.placement
-    return DrawnShape(link.attrib["name"], place, quaternion_of(*turn), size, shape.kind, mesh, rgba)
+    place, turn = shape.placement.xyz, turn_of(shape.placement)
+    return DrawnShape(link.attrib["name"], place, turn, size, shape.kind, mesh, rgba)
 
 
 def _read_numbers(text: str) -> tuple[float, ...]:

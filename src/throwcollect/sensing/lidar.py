@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
+from throwcollect.engines.pose import Pose
 from throwcollect.episode.frames import WORLD
 from throwcollect.reproducible_math import cos, sin
 from throwcollect.sensing.decimation import Points, dot
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.raster import NONE, Integers, Numbers, choose_nearest, spread
 from throwcollect.sensing.scene import PlacedScene
 from throwcollect.sensing.view import View

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import GROUND
+from throwcollect.engines.pose import Pose
 from throwcollect.episode.frames import WORLD, Frame, FrameTree, MovingFrame, read_frames
 from throwcollect.episode.record import Samples
 from throwcollect.episode.sensor_topics import label_names
@@ -24,7 +25,6 @@ from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.decimation import Points, cross, dot
 from throwcollect.sensing.drawn_robot import DrawnRobot, DrawnShape, draw_bodies_of, draw_robot_of
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.surface import COARSE, Surface, surfaces_of
 
 

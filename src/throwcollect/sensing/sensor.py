@@ -11,6 +11,7 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import CameraConfig, LayersConfig, LidarConfig, PictureConfig, SensorConfig
+from throwcollect.engines.pose import Pose
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.sensor_topics import POINT, frame_of, intrinsics_of
 from throwcollect.errors import ConfigError, Problem
@@ -18,7 +19,6 @@ from throwcollect.robots.description import full_description
 from throwcollect.sensing.camera import Camera, Frame
 from throwcollect.sensing.lidar import Lidar, Ranges
 from throwcollect.sensing.noise import Noise
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import PlacedScene, Scene
 from throwcollect.wording import suggest
 

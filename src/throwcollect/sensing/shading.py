@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.engines.pose import OPTICAL, Pose
 from throwcollect.sensing.decimation import dot
-from throwcollect.sensing.pose import OPTICAL, Pose
 from throwcollect.sensing.raster import NONE, Integers, Numbers, Outlines, find_nearest
 from throwcollect.sensing.scene import PlacedScene, Scene
 from throwcollect.sensing.view import View

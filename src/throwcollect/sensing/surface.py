@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.mesh import Mesh
+from throwcollect.engines.pose import Pose
 from throwcollect.sensing.decimation import Faces, Points, cross, decimate, dot, weld
 from throwcollect.sensing.drawn_robot import DrawnShape
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.raster import spread
 
 COARSE = 12_000

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import Vector
+from throwcollect.engines.pose import Pose
 from throwcollect.sensing.decimation import Points, cross, dot
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import PlacedScene
 
 

@@ -16,12 +16,12 @@ from throwcollect.config.schema import Config
 from throwcollect.config.sensors import PictureConfig
 from throwcollect.config.values import column_of
 from throwcollect.engines.engine import BODY_NUMBERS
+from throwcollect.engines.pose import Pose
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.members import explain_failure, load_member, load_part, names_of
 from throwcollect.robots.description import joint_offsets, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.surroundings import moving_bodies_of
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.sensor import CameraSensor, make_sensor
 from throwcollect.sim.world import World

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.throw import Throw
+from throwcollect.engines.pose import Pose
 from throwcollect.episode.record import Samples
 from throwcollect.extras import lazily
 from throwcollect.robots.surroundings import looks_of
 from throwcollect.sensing.camera import Camera, Frame
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import PlacedScene, Scene
 from throwcollect.tasks.outcome_styles import style_of
 

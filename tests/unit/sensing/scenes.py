@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.episode.frames import WORLD, quaternion_of
+from throwcollect.engines.body import Placement, Vector, turn_of
+from throwcollect.engines.pose import Pose
+from throwcollect.episode.frames import WORLD
 from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.drawn_robot import DrawnShape, read_drawn_robot
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import PlacedScene, Scene
 
 NO_ROBOT = '<robot name="none"><link name="root"/></robot>'
@@ -22,9 +23,9 @@ def make_shape(name: str, kind: str, size: Sequence[float], at: Sequence[float],
     return DrawnShape(link, tuple(at), (0.0, 0.0, 0.0, 1.0), tuple(size), kind, "", (1.0, 0.5, 0.0, 1.0), name)
 
 
-def make_pose(origin: Sequence[float], rpy_rad: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
+def make_pose(origin: Vector, rpy_rad: Vector = (0.0, 0.0, 0.0)) -> Pose:
     """Make the pose of an origin [m] and of rotations about the parent's axes x, y, z in this order [rad]."""
-    return Pose.of(origin, quaternion_of(*rpy_rad))
+    return Pose.of(origin, turn_of(Placement(rpy=rpy_rad)))
 
 
 def make_matrix(camera: Camera) -> NDArray[np.float64]:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from tests.unit.sensing.scenes import make_matrix, make_pose
 
 from throwcollect.config.loader import load
+from throwcollect.engines.pose import OPTICAL, Pose
 from throwcollect.episode.frames import WORLD
 from throwcollect.extras import is_installed
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.joint_model import joint_model
 from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.lidar import Lidar
-from throwcollect.sensing.pose import OPTICAL, Pose
 from throwcollect.sensing.scene import PlacedScene, Scene
 
 CONFIGS = Path(__file__).parents[3] / "configs"

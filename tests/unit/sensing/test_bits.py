@@ -17,7 +17,7 @@ from throwcollect.config.loader import load
 from throwcollect.robots.description import robot_of
 from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.lidar import Lidar
-from throwcollect.sensing.pose import Pose
+from throwcollect.engines.pose import Pose
 from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.view import View
 

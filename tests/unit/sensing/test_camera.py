@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from tests.unit.sensing.scenes import make_matrix, make_pose, make_scene, make_shape, place_ball
 
+from throwcollect.engines.pose import Pose
 from throwcollect.errors import ConfigError
 from throwcollect.sensing.camera import Camera
-from throwcollect.sensing.pose import Pose
 
 CAMERA = Camera(320, 240, 1.0, pose=make_pose((0.1, -0.2, 1.0), (0.0, 0.1, 0.2)))
 RADIUS = 0.1

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from throwcollect.dataset.reader import Dataset
+from throwcollect.engines.pose import OPTICAL
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.sensing.pose import OPTICAL
 from throwcollect.view.animation import Rendering, render
 from throwcollect.view.throw_pictures import camera_on, project
 

@@ -16,6 +16,7 @@ from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves, with_sensors, with_values
+from throwcollect.engines.pose import Pose
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.sensor_topics import SensorTopic, describe_sensor, sensor_topics
 from throwcollect.episode.topics import odometry, put_stamps
@@ -27,7 +28,6 @@ from throwcollect.ros import DurabilityPolicy, Node, Parameter, Publisher, QoSPr
 from throwcollect.ros.msg import JointState, Odometry, SetParametersResult, String
 from throwcollect.ros.nodes import descriptors
 from throwcollect.ros.serving import begin_to_serve
-from throwcollect.sensing.pose import Pose
 from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.sensor import check_sensors, make_sensor
 from throwcollect.units import NS_PER_S

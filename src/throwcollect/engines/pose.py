@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from throwcollect.engines.body import Vector
 
@@ -27,6 +27,17 @@ def transpose(rows: Rows) -> Rows:
     """Exchange the rows of a matrix for its columns."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return (a, d, g), (b, e, h), (c, f, i)
+
+
+def multiply(one: Sequence[Any], other: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+    """Multiply quaternions xyzw, of numbers or arrays: a rotation by the other one, and then by the first one."""
+    (x1, y1, z1, w1), (x2, y2, z2, w2) = one, other
+    return (
+        w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+        w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+        w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+        w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+    )
 
 
 class Pose(NamedTuple):
