@@ -136,19 +136,7 @@ def episode_run(episode: Episode) -> RecordGroup:
     if episode.sensors:
         facts["sensors_sha256"] = " ".join(chunk.records_sha256 for chunk in episode.sensors)
     chunk = episode.chunk if episode.chunk.indexes else replace(episode.chunk, indexes=episode.message_indexes)
-    return RecordGroup.of((chunk, *episode.sensors), _encode_metadata(facts))
-
-
-def _encode_metadata(facts: Mapping[str, str]) -> bytes:
-    """Encode the Metadata record of an episode, in a tenth of the time that the library of MCAP takes."""
-    pairs = b"".join(map(_prefix, itertools.chain.from_iterable(facts.items())))
-    body = _prefix(EPISODE) + struct.pack("<I", len(pairs)) + pairs
-    return struct.pack("<BQ", Opcode.METADATA, len(body)) + body
-
-
-def _prefix(text: str) -> bytes:
-    data = text.encode()
-    return struct.pack("<I", len(data)) + data
+    return RecordGroup.of((chunk, *episode.sensors), encode_records(records.Metadata(EPISODE, facts)))
 
 
 class McapFile:

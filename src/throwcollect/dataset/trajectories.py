@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import mmap
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -48,7 +46,6 @@ Column = NDArray[Any]
 
 _ORIENTATION = "orientation_xyzw"
 
-_LARGE_BYTES = 4 << 20
 _BLOCK = 16
 """Throws that are read at once: enough to be worth an array, few enough for the caches."""
 _MOST_THREADS = 4
@@ -200,19 +197,9 @@ def read_trajectories(
 def _make_column(name: str, samples: int, joints: int) -> Column:
     """Make the array of a column, shape ``(samples,)`` or ``(samples, n)``; columns of joints have so many joints."""
     if name in (TIMES, STAMPS):
-        return _make_empty((samples,), np.int64 if name == STAMPS else np.float64)
+        return np.empty(samples, np.int64 if name == STAMPS else np.float64)
     width = joints if name in JOINT_COLUMNS else 4 if name.endswith(_ORIENTATION) else 3
-    return _make_empty((samples, width), np.float64)
-
-
-def _make_empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
-    size = math.prod(shape) * np.dtype(dtype).itemsize
-    if size < _LARGE_BYTES:
-        return np.empty(shape, dtype)
-    # NumPy asks the kernel for huge pages. A virtual machine whose host takes back free memory gets these piece by
-    # piece, which can take several times as long as everything else here, so the memory is mapped without them.
-    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    return np.frombuffer(memory, dtype).reshape(shape)
+    return np.empty((samples, width))
 
 
 def _fill(

@@ -203,13 +203,10 @@ class DatasetWriter:
         """Join the rows of all trials, in their order; all shards must be finished."""
         return pa.concat_tables(rows for _, rows in sorted(self._finished_rows.items()))
 
-    def finish(
-        self, *, wall_s: float | None = None, simulations: int | None = None, provenance: Provenance | None = None
-    ) -> dict[str, int]:
+    def finish(self, *, simulations: int | None = None, provenance: Provenance | None = None) -> dict[str, int]:
         """Write the files that describe the dataset as a whole.
 
         Args:
-            wall_s: Real time that the dataset took [s], for the data card; None if not known, or if a journal tells.
             simulations: Number of simulations that took part, for the data card; None if that is not known.
             provenance: How the dataset was collected; None if this process has collected it.
 
@@ -221,8 +218,7 @@ class DatasetWriter:
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         throws = self.throws()
-        if self._journal is not None:
-            wall_s = self._journal.measure_collected_s()
+        wall_s = self._journal.measure_collected_s() if self._journal is not None else None
         provenance = provenance or Provenance.of_this_machine(
             simulations=simulations,
             wall_s=wall_s,

@@ -166,6 +166,12 @@ class MessageTable:
             for channel, column in self.columns.items()
         }
 
+    def compress(self, compressor: zstandard.ZstdCompressor, log_times_ns: NDArray[np.int64]) -> Chunk:
+        """Make the chunk of the records, which have these times, with its message indexes."""
+        start_ns, end_ns = int(log_times_ns[0]), int(log_times_ns[-1])
+        chunk = Chunk.of(self.contents, compressor.compress(self.contents), start_ns=start_ns, end_ns=end_ns)
+        return replace(chunk, indexes=self.message_indexes)
+
     def rows(self, joints: tuple[str, ...]) -> Rows:
         """View the samples, which have these joints, shape ``(n_samples,)``: fields named as in `Samples`, as bytes.
 
@@ -265,6 +271,4 @@ class ChunkEncoder:
             headers["sequence"] = np.arange(len(samples))
             headers["log_time"] = headers["publish_time"] = samples.stamps_ns
             topic.fill(table.messages(channel).view(topic.layout.dtype)[:, 0], samples, controllers or {})
-        data, stamps = self._compressor.compress(table.contents), samples.stamps_ns
-        chunk = Chunk.of(table.contents, data, start_ns=int(stamps[0]), end_ns=int(stamps[-1]))
-        return replace(chunk, indexes=table.message_indexes), table
+        return table.compress(self._compressor, samples.stamps_ns), table

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import zstandard
@@ -69,7 +68,5 @@ class SensorRecorder:
                         for field, values in seen[stream].items():
                             messages[field][place] = values
                     self._on_frame()
-                data = self._compressor.compress(table.contents)
-                chunk = Chunk.of(table.contents, data, start_ns=int(arrived[0]), end_ns=int(arrived[-1]))
-                chunks.append(replace(chunk, indexes=table.message_indexes))
+                chunks.append(table.compress(self._compressor, arrived))
         return tuple(chunks)

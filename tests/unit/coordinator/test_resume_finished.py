@@ -42,7 +42,7 @@ class Trials:
         writer.recover(lambda trial, _: kept.add(trial) is None)
         for trial in sorted(ALL - kept):
             writer.append(self.episodes[trial], self.results[trial])
-        writer.finish(wall_s=1.0)
+        writer.finish()
         writer.close()
         return kept
 

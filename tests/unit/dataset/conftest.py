@@ -150,7 +150,7 @@ class Collection:
     ) -> Path:
         writer = create_and_open(directory, self.plan)
         self.fill(writer, range(len(self.plan.trials)) if trials is None else trials, lost=lost, change=change)
-        writer.finish(wall_s=1.5, simulations=2)
+        writer.finish(simulations=2)
         writer.close()
         return directory
 

@@ -36,6 +36,6 @@ def collect_targeted(directory: Path, text: str = LIST, *, height_m: float = 0.0
     listed = read_points(directory.with_suffix(".csv"), collection.config)
     writer = create_and_open(directory, collection.plan, listed=listed)
     collection.fill(writer, range(len(collection.plan.trials)), change=change)
-    writer.finish(wall_s=1.5, simulations=2)
+    writer.finish(simulations=2)
     writer.close()
     return directory

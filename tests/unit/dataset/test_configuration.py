@@ -69,7 +69,7 @@ def test_resuming_with_the_original_file_restores_a_missing_configuration(datase
     resume(config, dataset, sweep_directory=tmp_path)
     with closing(DatasetWriter.open(dataset)) as writer:
         writer.recover()
-        writer.finish(wall_s=None)
+        writer.finish()
     assert verify(dataset) == []
 
 

@@ -32,7 +32,6 @@ def test_the_data_card_says_how_the_collection_was_run(dataset: Path) -> None:
     for fact in (
         f"| throwcollect | {throwcollect.__version__} |",
         "| simulations | 2 |",
-        "| wall time | 1.5 s |",
     ):
         assert fact in text
 
@@ -62,10 +61,11 @@ def test_provenance_takes_the_host_from_the_variable_or_else_this_machine(
         monkeypatch.delenv(HOST_VARIABLE, raising=False)
     else:
         monkeypatch.setenv(HOST_VARIABLE, told)
-    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="<robot/>")
+    provenance = Provenance.of_this_machine(simulations=1, wall_s=1.5, was_open=False, robot="<robot/>")
     assert provenance.host == host
     card = data_card(load(dataset / "config.yaml"), pq.read_table(dataset / "throws.parquet"), provenance)
     assert "| host |" not in card
+    assert "| wall time | 1.5 s |" in card
 
 
 def test_provenance_names_revision_image_and_robot_description(monkeypatch: pytest.MonkeyPatch, dataset: Path) -> None:

@@ -49,7 +49,7 @@ def go_on(directory: Path, source: Collection) -> None:
         there: list[int] = []
         writer.recover(lambda trial, _: there.append(trial) is None)
         source.fill(writer, [trial for trial in range(len(source.plan.trials)) if trial not in there])
-        writer.finish(wall_s=1.0)
+        writer.finish()
     finally:
         writer.close()
 

@@ -76,7 +76,7 @@ class Trials:
             for trial in order or range(TRIALS):
                 if trial not in there:
                     self.append(writer, trial)
-            writer.finish(wall_s=1.0)
+            writer.finish()
         finally:
             abandon(writer)
         return set(there)
@@ -108,7 +108,7 @@ def test_a_collection_killed_at_any_instant_resumes_to_the_same_files(
         for trial in [1, 2, 0, 3]:
             trials.append(begun, trial)
             killed.appended.add(trial)
-        begun.finish(wall_s=1.0)
+        begun.finish()
         killed.copy()
     abandon(begun)
     assert len(killed.left) > 40
@@ -175,7 +175,7 @@ def test_resuming_after_any_crashes_and_power_cuts_gives_the_same_files(
             for trial in order:
                 if trial not in there:
                     trials.append(writer, trial)
-            writer.finish(wall_s=1.0)
+            writer.finish()
         abandon(writer)
         shards = sorted(directory.glob("*.mcap*"))
         for path in data.draw(st.lists(st.sampled_from(shards), unique=True) if shards else st.just([]), label="cut"):
@@ -235,7 +235,7 @@ def test_a_lost_trial_is_run_again_on_resume(trials: Trials, expected: dict[str,
     writer.append_lost(2, "gone")
     for trial in (0, 1, 3):
         trials.append(writer, trial)
-    writer.finish(wall_s=1.0)
+    writer.finish()
     writer.close()
     assert trials.go_on(directory) == {0, 1, 3}
     assert files_of(directory) == expected

@@ -164,7 +164,7 @@ def test_an_episode_that_does_not_fit_on_the_disk_leaves_the_shard_as_it_was(
     assert part.read_bytes() == before
     # When there is space again, the failure has no effect.
     collection.fill(writer, range(1, 7))
-    writer.finish(wall_s=1.0)
+    writer.finish()
     assert recordings_of(tmp_path / "dataset") == recordings_of(collected)
 
 
@@ -209,6 +209,6 @@ def test_a_dataset_with_missing_trials_is_not_finished(collection: Any, tmp_path
     writer = create_and_open(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0, 1, 3, 4, 5, 6])
     with pytest.raises(DatasetError, match="lacks 1 trial, such as 2"):
-        writer.finish(wall_s=1.0)
+        writer.finish()
     assert not (tmp_path / "dataset" / "metadata.yaml").exists()
     writer.close()

@@ -40,7 +40,7 @@ def some(tmp_path_factory: pytest.TempPathFactory) -> Path:
     writer = create_and_open(directory, collection.plan)
     collection.fill(writer, range(8))
     collection.fill(writer, range(8, 12), change=hold_ball)
-    writer.finish(wall_s=1.0)
+    writer.finish()
     writer.close()
     return directory
 
