@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.engines.body import to_text
-from throwcollect.errors import ConfigError, Problem
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import read_shapes
-from throwcollect.robots.imported import HOME
+from throwcollect.robots.imported import HOME, make_error
 from throwcollect.robots.joint_model import joint_model, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.urdf import read_xml
@@ -149,7 +148,7 @@ def derive(robot: Robot, section: DescribedRobotConfig) -> tuple[str, str]:
         lower, upper, *_ = robot.description.joints[joint].limits or (0.0, 0.0)
         if not lower <= position <= upper:
             sentence = f"{position:g} is beyond the limits of {joint}, {lower:g} to {upper:g}; from: {origin}"
-            raise ConfigError([Problem(sentence, "robot.home")])
+            raise make_error("home", sentence)
     root = ElementTree.Element("robot", name=robot.name)
     state = ElementTree.SubElement(root, "group_state", name=HOME, group="all")
     for joint, position in home.items():
@@ -177,28 +176,21 @@ def _find_home(
     if isinstance(given, dict):
         if unknown := [joint for joint in given if joint not in robot.joints]:
             sentence = f"{robot.name} has no joint {unknown[0]!r}{suggest(unknown[0], robot.joints)}"
-            raise ConfigError([Problem(sentence, f"robot.home.{unknown[0]}")])
+            raise make_error(f"home.{unknown[0]}", sentence)
         return {joint: given.get(joint, 0.0) for joint in robot.joints}, "given"
     states = {} if source is None else {each.get("name", ""): each for each in source.iter("group_state")}
     if given != "auto":
         if given not in states:
             known = f"; robot.srdf has {', '.join(states) or 'none'}"
-            raise ConfigError([Problem(f"no group_state {given!r}{known}", "robot.home")])
+            raise make_error("home", f"no group_state {given!r}{known}")
         return _read_state(robot, states[given]), f"{given} of the SRDF"
     for name, state in states.items():
         if {joint.get("name") for joint in state.iter("joint")} >= set(robot.joints):
             return _read_state(robot, state), f"{name} of the SRDF"
     found, angle = postures.find_upright()
     if not found:
-        raise ConfigError(
-            [
-                Problem(
-                    f"no posture holds the tool upright and is clear: the best angle is {math.degrees(angle):.0f}°",
-                    "robot",
-                )
-            ],
-            hint="turn the hand by robot.tool_pose, or give robot.home",
-        )
+        sentence = f"no posture holds the tool upright and is clear: the best angle is {math.degrees(angle):.0f}°"
+        raise make_error("", sentence, hint="turn the hand by robot.tool_pose, or give robot.home")
     angles = dict(zip(postures.joints, np.round(found[0], 4).tolist(), strict=True))
     return {joint: angles[joint] for joint in robot.joints}, "searched, holds the ball"
 

@@ -17,7 +17,6 @@ from throwcollect.engines.engine import (
     BodyState,
     Engine,
     Observer,
-    Physics,
     Sample,
     Scene,
     SceneBody,
@@ -77,22 +76,11 @@ class World(Observer):
         WorkerError: If the physics engine does not start.
     """
 
-    moving: tuple[str, ...]
     steps: int
     end_reason: EndReason | None
-    may_rest: bool
     _ends: EndRule
-    _scene: Scene
-    _own_bodies: tuple[SceneBody, ...]
-    _physics: Physics
-    _contacts: ContactLog
-    _start: Sequence[float]
-    _offsets: NDArray[np.float64]
-    _settled: State
     _touching: frozenset[str]
-    _targets: NDArray[np.float64]
     _sampled_target: Sequence[float]
-    _log: SampleLog
 
     def __init__(self, config: Config) -> None:
         self._name = config.sim.engine
