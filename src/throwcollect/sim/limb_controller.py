@@ -47,18 +47,17 @@ class LimbController:
         """Name of the controller in the ROS graph."""
         joints = robot.controllers[limb]
         self._configured = _configure(robot, joints, config)
-        self._controller = JointTrajectoryController(
+        self.controller = JointTrajectoryController(
             self.name,
             self._configured,
             period_ns=period_ns,
             holds_command=config.hold == "command",
             topic_aborts_goal=config.topic_aborts_goal,
         )
+        """The controller."""
         self.watched = False
         """Whether the state of every update is kept for `pop_states`."""
         self._states: list[ControllerState] = []
-        self._start_ns: int | None = None
-        self._speed = 1.0
         self._joints = joints
         self._own = [index for index, joint in enumerate(joints) if joint in moving]
         self._worlds = [moving.index(joints[index]) for index in self._own]
@@ -67,15 +66,9 @@ class LimbController:
         self._points: list[NDArray[np.float64]] = []
 
     @property
-    def controller(self) -> JointTrajectoryController:
-        """The controller; a reset that was put off until the controller is used is done first."""
-        self._wake()
-        return self._controller
-
-    @property
     def is_driven(self) -> bool:
         """Whether the commands may still change, so that the limb must be driven."""
-        return self._start_ns is None and not self._controller.at_rest
+        return not self.controller.at_rest
 
     def reset(self, time_ns: int, posture: Mapping[str, float], *, speed: float) -> None:
         """Hold a posture; a goal that is being executed is aborted.
@@ -85,22 +78,20 @@ class LimbController:
             posture: Angle of each joint [rad].
             speed: Speed of the controller's clock [-].
         """
-        self._speed = speed
         self._posture = np.array([posture[joint] for joint in self._joints], dtype=float)
-        # The controller itself is reset only when it is used, because most limbs are idle in most trials.
-        self._start_ns = time_ns
         self._elapsed_ns, self._points, self._states = [], [], []
-        if self._controller.goal_id is not None:
-            self._wake()
+        still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
+        self.controller.reset(time_ns, JointState(self._posture, still))
+        self.controller.scale_speed(speed)
 
     def restore(self) -> None:
         """Undo what clients have changed of the controller's parameters; `reset` does so with its speed."""
-        if self._controller.parameters != self._configured:
-            self._controller.parameters = self._configured
+        if self.controller.parameters != self._configured:
+            self.controller.parameters = self._configured
 
     def pop_results(self) -> tuple[GoalResult, ...]:
         """Return the results of the goals that have ended since the last call, oldest first."""
-        return self._controller.pop_results()
+        return self.controller.pop_results()
 
     def pop_states(self) -> list[ControllerState]:
         """Return the states of the updates since the last call, oldest first; there are some only if it is watched."""
@@ -116,7 +107,7 @@ class LimbController:
             for point in trajectory.points:
                 if motion := _describe_motion(point, column, held):
                     text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot {motion}"
-                    return self._controller.refuse(TrajectoryRefusal(ErrorCode.INVALID_GOAL, text))
+                    return self.controller.refuse(TrajectoryRefusal(ErrorCode.INVALID_GOAL, text))
         return None
 
     def measure(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
@@ -140,7 +131,7 @@ class LimbController:
         row = self.controller.update(time_ns, measured)
         command[self._worlds] = row[self._own]
         if self.watched:
-            self._states.append(self._controller.state())
+            self._states.append(self.controller.state())
 
     def take(self, commands: NDArray[np.float64]) -> None:
         """Make as many updates as there are rows, without a look at the measured state.
@@ -163,15 +154,6 @@ class LimbController:
         table = np.array(self._points).reshape(-1, 4, len(self._joints))
         elapsed = np.array(self._elapsed_ns, dtype=np.int64)
         return ControllerSamples(elapsed, table[:, 0], table[:, 1], table[:, 2], table[:, 3])
-
-    def _wake(self) -> None:
-        """Reset the controller now, if its reset was put off."""
-        start_ns, self._start_ns = self._start_ns, None
-        if start_ns is None:
-            return
-        still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
-        self._controller.reset(start_ns, JointState(self._posture, still))
-        self._controller.scale_speed(self._speed)
 
 
 def _describe_motion(point: TrajectoryPoint, column: int, held: float) -> str:
