@@ -22,7 +22,7 @@ from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, read_throws
-from throwcollect.dataset.trajectories import Recorded, Trajectories, list_columns, read_trajectories
+from throwcollect.dataset.trajectories import Trajectories, list_columns, read_trajectories
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
@@ -263,9 +263,9 @@ class Dataset(Sequence[Throw]):
         for joint in chosen:
             if joint not in known:
                 raise ConfigError(unknown_joint(joint, robot_of(self.config)))
-        recorded = Recorded(known, moving_bodies_of(self.config))
-        wanted = tuple(list_columns(recorded.bodies) if columns is None else columns)
-        return read_trajectories(trials, self._stored, wanted, recorded, chosen, threads=threads)
+        bodies = moving_bodies_of(self.config)
+        wanted = tuple(list_columns(bodies) if columns is None else columns)
+        return read_trajectories(trials, self._stored, wanted, known, bodies, chosen, threads=threads)
 
     @property
     def joints(self) -> tuple[str, ...]:

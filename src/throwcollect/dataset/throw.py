@@ -130,33 +130,20 @@ def _make_event(row: Row, name: str) -> BodyEvent | None:
     return None if state is None else BodyEvent(state.time_s, np.array(state.position), np.array(state.velocity))
 
 
+@dataclass(eq=False, repr=False)
 class Throw:
     """One throw; its recording is read when it is first asked for, and kept as long as the throw is.
 
-    Args:
-        table: Table of throws.
-        position: Its row there.
-        parameters: Swept keys.
-        episode: Where its episode lies, or the episode itself; None if it has none.
-        source: Directory of its dataset, or its configuration, for messages.
-        config: Configuration of its dataset.
+    It is made of a table of throws and its row there, the swept keys, its episode or where that lies (None if it has
+    none), the directory of its dataset or its configuration for messages, and the configuration of its dataset.
     """
 
-    def __init__(
-        self,
-        table: pa.Table,
-        position: int,
-        parameters: tuple[str, ...],
-        episode: EpisodePlace | Episode | None,
-        source: str,
-        config: Config,
-    ) -> None:
-        self._table = table
-        self._position = position
-        self._keys = parameters
-        self._episode = episode
-        self._source = source
-        self._config = config
+    _table: pa.Table
+    _position: int
+    _keys: tuple[str, ...]
+    _episode: EpisodePlace | Episode | None
+    _source: str
+    _config: Config
 
     def __repr__(self) -> str:
         text = f"Throw({self.trial}: {self.outcome}"

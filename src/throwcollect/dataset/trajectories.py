@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
-from typing import Any, NamedTuple, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,13 +71,6 @@ def list_columns(bodies: Sequence[str]) -> dict[str, str]:
         fields = list_body_fields(number)
         columns |= {f"{name}_{quantity}": fields[part] for quantity, part in _BODY_QUANTITIES.items()}
     return columns
-
-
-class Recorded(NamedTuple):
-    """Names of what moves in the recordings of a dataset: the joints, and bodies with the object first."""
-
-    joints: tuple[str, ...]
-    bodies: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,20 +152,22 @@ def read_trajectories(
     trials: Sequence[int],
     places: Sequence[EpisodePlace | None],
     columns: Sequence[str],
-    recorded: Recorded,
+    known: tuple[str, ...],
+    bodies: tuple[str, ...],
     joints: tuple[str, ...],
     *,
     threads: int | None = None,
 ) -> Trajectories:
     """Read the trajectories of trials, whose episodes lie at these places; None for a trial that has none.
 
-    The other arguments are those of `Dataset.trajectories`.
+    `known` are the joints, and `bodies` the bodies that are recorded, with the object first; the other arguments are
+    those of `Dataset.trajectories`.
 
     Raises:
         ConfigError: If there is no such column.
         DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
     """
-    there = list_columns(recorded.bodies)
+    there = list_columns(bodies)
     for column in columns:
         if column not in there:
             raise ConfigError(f"a trajectory has no column {column!r}{suggest(column, there, 'docs/reading.md')}")
@@ -184,7 +179,7 @@ def read_trajectories(
     starts = np.cumsum([0, *(sum(place.samples for place in block) for block in blocks)]).tolist()
 
     def read(block: Sequence[EpisodePlace], start: int, stop: int) -> None:
-        _fill({name: column[start:stop] for name, column in found.items()}, block, recorded, joints)
+        _fill({name: column[start:stop] for name, column in found.items()}, block, known, bodies, joints)
 
     threads = threads or min(_MOST_THREADS, os.cpu_count() or 1)
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:
@@ -203,20 +198,25 @@ def _make_column(name: str, samples: int, joints: int) -> Column:
 
 
 def _fill(
-    columns: Mapping[str, Column], places: Sequence[EpisodePlace], recorded: Recorded, joints: tuple[str, ...]
+    columns: Mapping[str, Column],
+    places: Sequence[EpisodePlace],
+    known: tuple[str, ...],
+    bodies: tuple[str, ...],
+    joints: tuple[str, ...],
 ) -> None:
     """Fill columns with those of some throws, one after the other.
 
     Args:
         columns: Arrays with as many rows as the throws have samples, by name, as `_make_column` makes them.
         places: The throws.
-        recorded: What moves in the throws.
+        known: Joints that are recorded.
+        bodies: Bodies that are recorded, with the object first.
         joints: Joints that the columns of joints have; some of those that are recorded.
     """
-    fields, known = list_columns(recorded.bodies), recorded.joints
+    fields = list_columns(bodies)
     velocities = {
         f"{body}_{_ORIENTATION}": [name for name in (f"{body}_velocity", f"{body}_angular_velocity") if name in columns]
-        for body in recorded.bodies
+        for body in bodies
     }
     # Velocities in world follow from orientations, and times from stamps, so these are read even if nobody asks.
     sources = {**velocities, STAMPS: [name for name in (STAMPS, TIMES) if name in columns]}

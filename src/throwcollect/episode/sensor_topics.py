@@ -41,7 +41,6 @@ class SensorTopic:
     """A topic of a sensor, with one message for each of its frames.
 
     Attributes:
-        sensor: Name of the sensor.
         stream: What is in it: ``color``, ``depth``, ``segmentation``, ``scan``, ``points``, ``pose``, or ``color_info``
             and so on for the intrinsics of pictures.
         name: Name of the topic.
@@ -49,7 +48,6 @@ class SensorTopic:
         layout: Layout of its messages.
     """
 
-    sensor: str
     stream: str
     name: str
     type_name: str
@@ -150,7 +148,7 @@ def _make_pose(name: str, link: str) -> SensorTopic:
     message, place = make_fixed_transforms([frame], 0), "transforms.0"
     fields = ("header.stamp.sec", "header.stamp.nanosec", "transform.translation", "transform.rotation")
     layout = MessageLayout(message, [f"{place}.{field}" for field in fields])
-    return SensorTopic(name, "pose", "/tf", "tf2_msgs/msg/TFMessage", layout)
+    return SensorTopic("pose", "/tf", "tf2_msgs/msg/TFMessage", layout)
 
 
 @lru_cache(maxsize=64)
@@ -172,8 +170,8 @@ def _make_pictures(
         )
         layouts = MessageLayout(message, [*stamps, "data"]), MessageLayout(intrinsics, [*stamps, "k", "r", "p"])
         made += [
-            (2 * number, SensorTopic(name, stream, f"{place}/image_raw", image, layouts[0])),
-            (2 * number + 1, SensorTopic(name, f"{stream}_info", f"{place}/camera_info", info, layouts[1])),
+            (2 * number, SensorTopic(stream, f"{place}/image_raw", image, layouts[0])),
+            (2 * number + 1, SensorTopic(f"{stream}_info", f"{place}/camera_info", info, layouts[1])),
         ]
     return tuple(made)
 
@@ -193,7 +191,7 @@ def _make_ranges(name: str, lidar: LidarConfig) -> Iterator[tuple[int, SensorTop
             range_max=lidar.range_m[1],
             ranges=np.zeros(lidar.rays, np.float32),
         )
-        yield 0, SensorTopic(name, "scan", f"/{name}/scan", kind, MessageLayout(message, [*stamps, "ranges"]))
+        yield 0, SensorTopic("scan", f"/{name}/scan", kind, MessageLayout(message, [*stamps, "ranges"]))
         return
     kind, field = "sensor_msgs/msg/PointCloud2", get_message("sensor_msgs/msg/PointField")
     step = POINT.itemsize * lidar.rays
@@ -210,7 +208,7 @@ def _make_ranges(name: str, lidar: LidarConfig) -> Iterator[tuple[int, SensorTop
         data=np.zeros(step * lidar.layers, np.uint8),
         is_dense=False,
     )
-    yield 0, SensorTopic(name, "points", f"/{name}/points", kind, MessageLayout(message, [*stamps, "data"]))
+    yield 0, SensorTopic("points", f"/{name}/points", kind, MessageLayout(message, [*stamps, "data"]))
 
 
 def label_names(links: Sequence[str], acted_on: str, bodies: Iterable[str]) -> tuple[str, ...]:
