@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig
+from throwcollect.config.sensors import LayersConfig, PictureConfig
 from throwcollect.engines.pose import OPTICAL, Pose
 from throwcollect.episode import frames
 from throwcollect.episode.chunk import Chunk, count_indexed
@@ -187,28 +187,21 @@ class SensorFrames:
 
     def _read(self, stream: str, number: int) -> NDArray[Any]:
         chunk = bisect_right(self._starts, number) - 1
-        row = self._rows(chunk, stream)[number - self._starts[chunk]]
-        sensor, noise = self.config, None
-        if self.noise:
-            noise = Noise(sensor.noise, self._whole.seed, self._header.trial, f"{self.name}/{stream}")
-        if isinstance(sensor, LidarConfig):
-            if isinstance(sensor, LayersConfig):
-                points: NDArray[Any] = row["data"].view(POINT).reshape(sensor.layers, sensor.rays)
-                return points
-            ranges: NDArray[Any] = row["ranges"]
-            return ranges if noise is None else noise.distance(ranges, number, sensor.noise.range_std_m)
-        shape = sensor.height, sensor.width
-        if stream == "color":
-            picture: NDArray[Any] = row["data"].reshape(*shape, 3)
-            return picture if noise is None else noise.color(picture, number)
-        if stream == "segmentation":
-            labels: NDArray[Any] = row["data"].view("<u2").reshape(shape)
-            return labels
-        if sensor.depth_encoding == "32FC1":
-            depth: NDArray[Any] = row["data"].view("<f4").reshape(shape)
-        else:
-            depth_mm = row["data"].view("<u2").reshape(shape)
-            depth = np.where(depth_mm == 0, np.float32(np.inf), depth_mm / np.float32(1000))
-        if noise is None:
-            return depth
-        return noise.distance(depth, number, sensor.noise.depth_std_m, sensor.noise.depth_std_share)
+        seen = self._decode(stream, self._rows(chunk, stream)[number - self._starts[chunk]])
+        if not self.noise or stream in ("segmentation", "points"):
+            return seen
+        noise = Noise(self.config.noise, self._whole.seed, self._header.trial, f"{self.name}/{stream}")
+        return noise.color(seen, number) if stream == "color" else noise.distance(seen, number)
+
+    def _decode(self, stream: str, row: Any) -> NDArray[Any]:
+        sensor, found = self.config, row["ranges" if stream == "scan" else "data"]
+        if isinstance(sensor, LayersConfig):
+            found = found.view(POINT).reshape(sensor.layers, sensor.rays)
+        elif isinstance(sensor, PictureConfig):
+            kind, *colors = {"color": ("u1", 3), "segmentation": ("<u2",)}.get(stream, ("<f4",))
+            if stream == "depth" and sensor.depth_encoding == "16UC1":
+                depth_mm = found.view("<u2")
+                found = np.where(depth_mm == 0, np.float32(np.inf), depth_mm / np.float32(1000))
+            found = found.view(kind).reshape(sensor.height, sensor.width, *colors)
+        decoded: NDArray[Any] = found
+        return decoded

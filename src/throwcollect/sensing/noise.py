@@ -9,7 +9,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.sensors import CameraNoise, SensorNoise
+from throwcollect.config.sensors import CameraNoise, LidarNoise
 
 _BITS = 12
 
@@ -24,7 +24,7 @@ class Noise:
         stream: Name of the sensor and its stream.
     """
 
-    def __init__(self, noise: SensorNoise, seed: int, trial: int, stream: str) -> None:
+    def __init__(self, noise: CameraNoise | LidarNoise, seed: int, trial: int, stream: str) -> None:
         self._noise, self._name = noise, f"{seed}/{trial}/{stream}"
 
     def color(self, picture: NDArray[np.uint8], frame: int) -> NDArray[np.uint8]:
@@ -34,10 +34,13 @@ class Noise:
         sum_ = picture + np.float32(self._noise.color_std) * self._draw_normal(frame, picture.shape)
         return np.clip(np.rint(sum_), 0, 255).astype(np.uint8)
 
-    def distance(
-        self, distance_m: NDArray[np.float32], frame: int, std_m: float, std_share: float = 0.0
-    ) -> NDArray[np.float32]:
+    def distance(self, distance_m: NDArray[np.float32], frame: int) -> NDArray[np.float32]:
         """Disturb depths or ranges of any shape; none gets below zero, and where one is dropped, it is NaN."""
+        noise, std_share = self._noise, 0.0
+        if isinstance(noise, CameraNoise):
+            std_m, std_share = noise.depth_std_m, noise.depth_std_share
+        else:
+            std_m = noise.range_std_m
         if std_m or std_share:
             spread = np.float32(std_m) + np.float32(std_share) * np.where(np.isfinite(distance_m), distance_m, 0)
             disturbed = distance_m + spread * self._draw_normal(frame, distance_m.shape)

@@ -101,8 +101,8 @@ class CameraSensor(Sensor):
 
     def see_noisily(self, placed: PlacedScene, number: int) -> Frame:
         """Render its picture of a scene in one state, with the noise of the frame of this number."""
-        seen, noise = self.see(placed), self._section.noise
-        depth = self._depth.distance(seen.depth, number, noise.depth_std_m, noise.depth_std_share)
+        seen = self.see(placed)
+        depth = self._depth.distance(seen.depth, number)
         return replace(seen, depth=depth, color=None if seen.color is None else self._color.color(seen.color, number))
 
     def look(self, placed: PlacedScene, number: int) -> Mapping[str, Fields]:
@@ -140,9 +140,9 @@ class LidarSensor(Sensor):
 
     def look(self, placed: PlacedScene, number: int) -> Mapping[str, Fields]:
         """See `Sensor.look`."""
-        seen, noise = self.see(placed), self._section.noise
-        if noise.recorded:
-            seen = replace(seen, ranges=self._noise.distance(seen.ranges, number, noise.range_std_m))
+        seen = self.see(placed)
+        if self._section.noise.recorded:
+            seen = replace(seen, ranges=self._noise.distance(seen.ranges, number))
         if not isinstance(self._section, LayersConfig):
             return {"pose": self._placed, "scan": {"ranges": seen.ranges[0]}}
         points = np.empty(seen.ranges.shape, POINT)

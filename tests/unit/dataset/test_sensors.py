@@ -165,7 +165,7 @@ def test_normal_noise_is_normal() -> None:
 
 def test_noise_makes_no_distance_negative() -> None:
     noise = Noise(load_noise(depth_std_m=0.5), 1, 2, "head/depth")
-    drawn = noise.distance(np.array([[0.01, np.inf]] * 500, np.float32), 0, 0.5)
+    drawn = noise.distance(np.array([[0.01, np.inf]] * 500, np.float32), 0)
     assert (drawn[:, 0] == 0).sum() > 200
     assert drawn[:, 0].max() > 0.5
     assert np.isposinf(drawn[:, 1]).all()
