@@ -13,16 +13,23 @@ import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from throwcollect.config.document import Document
 from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.errors import ConfigError
-from throwcollect.extras import MissingExtraError
 from throwcollect.files import suggest_path
-from throwcollect.robots.imported import SRDF, URDF, find_mesh, hash_files, list_shares, make_error, make_robot
+from throwcollect.robots.imported import (
+    SRDF,
+    URDF,
+    find_examples,
+    find_mesh,
+    hash_files,
+    list_shares,
+    make_error,
+    make_robot,
+)
 from throwcollect.robots.urdf import PACKAGE, read_xml
 from throwcollect.state_directory import state_directory
 from throwcollect.version import __version__
@@ -56,7 +63,7 @@ _DERIVED = {
 def find_urdf(urdf: str) -> Path:
     """Find the file that the key `robot.urdf` names."""
     if urdf.startswith(_EXAMPLES):
-        path = _find_examples() / urdf.removeprefix(_EXAMPLES)
+        path = find_examples() / "example-robot-data/robots" / urdf.removeprefix(_EXAMPLES)
     elif urdf.startswith(PACKAGE):
         package, _, rest = urdf.removeprefix(PACKAGE).partition("/")
         path = next((share / rest for share in list_shares(package)), Path(urdf))
@@ -68,13 +75,6 @@ def find_urdf(urdf: str) -> Path:
         where = path if path.is_absolute() else urdf
         raise make_error("urdf", f"{where}: {wrong}{near}", hint="docs/robots.md explains how to describe a robot")
     return path
-
-
-def _find_examples() -> Path:
-    try:
-        return Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")))
-    except PackageNotFoundError as error:
-        raise MissingExtraError("example-robot-data", "collect") from error
 
 
 def _find_cache(section: DescribedRobotConfig, path: Path) -> Path:

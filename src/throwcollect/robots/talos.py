@@ -7,13 +7,11 @@ configuration (talos_controller_configuration, humble-devel 2.0).
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import MappingProxyType
 
 from throwcollect.errors import ConfigError
-from throwcollect.extras import MissingExtraError
+from throwcollect.robots.imported import find_examples
 from throwcollect.robots.robot import Robot
 
 _DATA = "example-robot-data/robots/talos_data"
@@ -23,13 +21,8 @@ def _number_joints(limb: str, count: int) -> tuple[str, ...]:
     return tuple(f"{limb}_{number}_joint" for number in range(1, count + 1))
 
 
-@cache
 def _find_share() -> Path:
-    # The result is cached, because it is needed for every mesh, and takes a third of a millisecond.
-    try:
-        share = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
-    except PackageNotFoundError as error:
-        raise MissingExtraError("example-robot-data", "collect") from error
+    share = find_examples()
     if not (share / _DATA).is_dir():
         raise ConfigError(f"{share / _DATA}: the robot's description is missing", hint="reinstall example-robot-data")
     return share

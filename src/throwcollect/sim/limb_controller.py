@@ -13,7 +13,6 @@ from throwcollect.control import (
     ControllerParameters,
     ControllerState,
     ErrorCode,
-    GoalResult,
     JointConstraints,
     JointState,
     JointTrajectoryController,
@@ -88,10 +87,6 @@ class LimbController:
         """Undo what clients have changed of the controller's parameters; `reset` does so with its speed."""
         if self.controller.parameters != self._configured:
             self.controller.parameters = self._configured
-
-    def pop_results(self) -> tuple[GoalResult, ...]:
-        """Return the results of the goals that have ended since the last call, oldest first."""
-        return self.controller.pop_results()
 
     def pop_states(self) -> list[ControllerState]:
         """Return the states of the updates since the last call, oldest first; there are some only if it is watched."""

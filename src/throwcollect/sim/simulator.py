@@ -305,6 +305,6 @@ class Simulator:
 
     def _collect_results(self) -> None:
         for name, limb in self.limbs.items():
-            for result in limb.pop_results():
+            for result in limb.controller.pop_results():
                 self._results.append((name, result))
                 self.trial.note_result(name, result)

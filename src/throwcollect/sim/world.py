@@ -68,6 +68,8 @@ class World(Observer):
         steps: Number of physics steps taken in this trial.
         end_reason: Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on.
         may_rest: Whether this trial goes on when arm and object rest.
+        touching: Names of what presses on the object now.
+        physics_hz: Physics steps per simulated second.
 
     Raises:
         ConfigError: If the configuration does not describe a world (see `reset`).
@@ -79,7 +81,7 @@ class World(Observer):
     steps: int
     end_reason: EndReason | None
     _ends: EndRule
-    _touching: frozenset[str]
+    touching: frozenset[str]
     _sampled_target: Sequence[float]
 
     def __init__(self, config: Config) -> None:
@@ -106,16 +108,6 @@ class World(Observer):
     def stamp_ns(self) -> int:
         """Simulated time now [ns]."""
         return self._stamp_ns(self.steps)
-
-    @property
-    def touching(self) -> frozenset[str]:
-        """Names of what presses on the object now."""
-        return self._touching
-
-    @property
-    def physics_hz(self) -> int:
-        """Physics steps per simulated second."""
-        return self._hz
 
     @property
     def recorded(self) -> int:
@@ -148,20 +140,20 @@ class World(Observer):
             self.engine.reset(self._settled)
         sim = trial.sim
         self._base_height = trial.robot.base_height_m
-        self._hz = sim.physics_hz
+        self.physics_hz = sim.physics_hz
         self._stride = sim.physics_hz // trial.record.rate_hz
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
         self._ends = task_of(trial).end_rule()
         self._drag = drag_of(trial)
         self._release_step = round((tool_of(trial).release_s or 0.0) * sim.physics_hz)
         self._motors = self._make_motors(trial)
-        self._touching = self._settled.touching
+        self.touching = self._settled.touching
         self._begin(start_ns, self._settled.sample)
 
     def restart_clock(self, start_ns: int) -> None:
         """Begin a new record at time `start_ns` [ns], without steps and contacts; the present state stays as it is."""
         now = self.engine.state
-        self._touching = now.touching
+        self.touching = now.touching
         self._begin(start_ns, now.sample)
 
     def run(self, commands: NDArray[np.float64], *, stop_at_end: bool = True) -> int:
@@ -198,7 +190,7 @@ class World(Observer):
 
     def on_touch(self, step: int, bodies: frozenset[str]) -> None:
         """Note the bodies that press on the object since a step of the present `run`."""
-        self._touching = bodies
+        self.touching = bodies
         self._contacts.update(bodies, self._first_step + step)
 
     def on_sample(self, step: int, sample: Sample) -> bool:
@@ -221,7 +213,7 @@ class World(Observer):
         steps = np.arange(first, self.recorded, dtype=np.int64) * self._stride
         # Each stamp is computed from its step, because sums of periods would drift: a period may be no whole number of
         # nanoseconds.
-        stamps = self._start_ns + steps * NS_PER_S // self._hz
+        stamps = self._start_ns + steps * NS_PER_S // self.physics_hz
         return to_samples(self._log.table(first), stamps, self._joints, self.moving, self._locked, self._offsets)
 
     def forget_samples(self) -> None:
@@ -300,7 +292,7 @@ class World(Observer):
     @property
     def rests(self) -> bool:
         """Whether the arm has been standing still, and the object lying on something, for half a second."""
-        return self.steps - self._resting_since >= REST_S * self._hz
+        return self.steps - self._resting_since >= REST_S * self.physics_hz
 
     @property
     def object(self) -> BodyState:
@@ -315,7 +307,7 @@ class World(Observer):
         self._start_joints = present[: 3 * len(self.moving)]
         self._record_start()
         self._contacts = ContactLog()
-        self._contacts.update(self._touching, 0)
+        self._contacts.update(self.touching, 0)
         self._sampled_target = self._motors.target
         self._has_moved = False
         self._resting_since = 0
@@ -370,14 +362,14 @@ class World(Observer):
         self._log = SampleLog((*self._start_joints, *self.engine.state.sample[len(self._start_joints) :]))
 
     def _stamp_ns(self, step: int) -> int:
-        return self._start_ns + step * NS_PER_S // self._hz
+        return self._start_ns + step * NS_PER_S // self.physics_hz
 
     def _judge(self, before: Sample, now: Sample, target: Sequence[float]) -> EndReason | None:
         """Find the reason for which the trial ends with a sample, by the one before; None if the trial goes on."""
         stands_still = target == self._sampled_target
         self._sampled_target = target
         self._has_moved |= not stands_still
-        lies = stands_still and self._touching
+        lies = stands_still and self.touching
         if not (lies and math.hypot(*now[OBJECT_LINEAR_VELOCITY]) < REST_SPEED_MPS):
             self._resting_since = self.steps
         if (reason := self._ends(before[-BODY_NUMBERS:], now[-BODY_NUMBERS:], self._contacts.bodies)) is not None:
