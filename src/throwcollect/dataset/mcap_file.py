@@ -7,7 +7,6 @@ first chunk has the samples, and those behind it what sensors saw.
 
 from __future__ import annotations
 
-import itertools
 import struct
 import zlib
 from collections import Counter
@@ -24,8 +23,9 @@ from rclzenoh.interfaces import message_definition, type_hash
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.dataset.directory import LIBRARY
 from throwcollect.episode.channels import Channel, Channels
-from throwcollect.episode.chunk import Chunk, count_indexed, encode_message_index, encode_records
+from throwcollect.episode.chunk import Chunk, count_indexed, encode_records
 from throwcollect.episode.episode_message import Episode
+from throwcollect.episode.message_table import MessageTable
 
 MAGIC = b"\x89MCAP0\r\n"
 EPISODE = "throwcollect.episode"
@@ -230,16 +230,7 @@ class McapFile:
 
 def encode_latched_run(channels: Channels, stamp_ns: int) -> RecordGroup:
     """Encode the latched messages: a chunk and its message indexes."""
-    messages = [
-        encode_records(records.Message(channel.id, stamp_ns, data, stamp_ns, 0))
-        for channel, data in channels.encode_latched_messages(stamp_ns).items()
-    ]
-    starts = itertools.accumulate(map(len, messages), initial=0)
-    indexes = {
-        channel.id: encode_message_index(channel.id, np.array([stamp_ns], np.uint64), np.array([start]))
-        # `starts` has the end of the last message, too.
-        for channel, start in zip(channels.latched, starts, strict=False)
-    }
-    contents = b"".join(messages)
-    data = zstandard.ZstdCompressor(level=_LATCHED_LEVEL).compress(contents)
-    return RecordGroup.of([replace(Chunk.of(contents, data, start_ns=stamp_ns, end_ns=stamp_ns), indexes=indexes)])
+    messages = channels.encode_latched_messages(stamp_ns).items()
+    encoded = [records.Message(channel.id, stamp_ns, data, stamp_ns, 0) for channel, data in messages]
+    compressor = zstandard.ZstdCompressor(level=_LATCHED_LEVEL)
+    return RecordGroup.of([MessageTable(encode_records(*encoded), 1).compress(compressor, np.array([stamp_ns]))])

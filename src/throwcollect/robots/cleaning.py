@@ -6,6 +6,7 @@ import copy
 import hashlib
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,9 +58,7 @@ class Cleaning:
         self.files: dict[str, bytes] = {}
         self.urdf = read_urdf(self._source, str(path), find_mesh=self._find_mesh)
         self.name = self._find_name()
-        if section.flange not in self.urdf.links:
-            sentence = f"{path} has no link {section.flange!r}{suggest(section.flange, self.urdf.links)}"
-            raise make_error("flange", sentence)
+        self._require("link", section.flange, self.urdf.links, "flange")
         self._above = {joint.child: joint for joint in self.urdf.model.joints}
         self.chain = self._find_chain(section.flange)
         self.controllers = self._find_controllers()
@@ -72,6 +71,10 @@ class Cleaning:
         if not (isinstance(member, DescribedRobotConfig) and (given or member.urdf == self._section.urdf)):
             raise make_error("name", f"{name} is the name of an installed robot; give another one")
         return name
+
+    def _require(self, kind: str, name: str, known: Collection[str], key: str) -> None:
+        if name not in known:
+            raise make_error(key, f"{self._path} has no {kind} {name!r}{suggest(name, known)}")
 
     def _find_mesh(self, filename: str) -> Path:
         return find_mesh(filename, self._path, self._section.packages)
@@ -90,9 +93,8 @@ class Cleaning:
     def _find_controllers(self) -> dict[str, list[str]]:
         section, joints = self._section, self.urdf.joints
         for key, names in (("fixed", section.fixed), ("limits", section.limits)):
-            if unknown := [name for name in names if name not in joints]:
-                sentence = f"{self._path} has no joint {unknown[0]!r}{suggest(unknown[0], joints)}"
-                raise make_error(f"{key}.{unknown[0]}", sentence)
+            for name in names:
+                self._require("joint", name, joints, f"{key}.{name}")
         if section.controllers is None:
             found = [joint.name for joint in self.chain if self._can_move(joint) and joint.name not in section.fixed]
             if not found:
@@ -119,13 +121,11 @@ class Cleaning:
         key, joints = f"controllers.{controller}", self.urdf.joints
         if isinstance(given, ChainConfig):
             for link in given.chain:
-                if link not in self.urdf.links:
-                    raise make_error(key, f"{self._path} has no link {link!r}{suggest(link, self.urdf.links)}")
+                self._require("link", link, self.urdf.links, key)
             base, tip = given.chain
             return [joint.name for joint in self._find_chain(tip, base) if self._can_move(joint)]
         for name in given:
-            if name not in joints:
-                raise make_error(key, f"{self._path} has no joint {name!r}{suggest(name, joints)}")
+            self._require("joint", name, joints, key)
             if not self._can_move(joint := joints[name]):
                 kind = f"mimics {joint.mimics}" if joint.mimics else f"is {joint.kind}"
                 raise make_error(key, f"the joint {name} {kind}, so that no controller can command it")
