@@ -76,13 +76,7 @@ class TrialCollection:
         self._drain_deadline = math.inf
         self._synced_at = time.monotonic()
         self._directory = directory
-        policy = self._config.task.policy
-        self._replay = ReplayCheck(
-            directory,
-            count=self._config.run.replay if policy is None or policy.reproducible else 0,
-            seed=self._config.seed,
-            policy="" if policy is None else policy.use,
-        )
+        self._replay = ReplayCheck(directory, self._config)
 
     @classmethod
     def open(cls, directory: Path, *, say: Callable[[str], object], processes: int = 1) -> TrialCollection:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
 from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, PLAN
 from throwcollect.dataset.throws_table import Row, find_row
 from throwcollect.errors import DatasetError
@@ -33,16 +35,15 @@ class ReplayCheck:
         begun: Whether `begin` has been called.
 
     Args:
-        count: How many trials are simulated again.
-        seed: Root seed of the collection, by which they are chosen.
-        policy: Name of the policy that commands the joints; empty if none does.
+        directory: Directory of the dataset.
+        config: Its configuration, which says how many trials are simulated again.
     """
 
-    def __init__(self, directory: Path, *, count: int, seed: int, policy: str = "") -> None:
+    def __init__(self, directory: Path, config: Config) -> None:
         self._directory = directory
-        self._count = count
-        self._seed = seed
-        self._policy = policy
+        self._policy = config.task.policy
+        count = config.run.replay if self._policy is None or self._policy.reproducible else 0
+        self._choose = partial(choose_trials, count=count, seed=config.seed)
         self.begun = False
         self._again: dict[int, Future[Row]] = {}
         self._held = ExitStack()
@@ -50,7 +51,7 @@ class ReplayCheck:
     def begin(self, trials: Sequence[int]) -> None:
         """Start to simulate the trials that will be chosen if all of these, the trials of the plan, get an episode."""
         self.begun = True
-        self._simulate(choose_trials(trials, count=self._count, seed=self._seed))
+        self._simulate(self._choose(trials))
 
     def compare(self, throws: pa.Table, *, meanwhile: Callable[[], None]) -> str | None:
         """Compare episodes and results of some trials, and return a sentence on that; None if there are no trials.
@@ -61,7 +62,7 @@ class ReplayCheck:
         """
         # The choice is made by place in the list, so the order must not depend on which episode came first.
         recorded = throws["trial"].filter(throws["digest"].is_valid()).to_pylist()
-        trials = choose_trials(recorded, count=self._count, seed=self._seed)
+        trials = self._choose(recorded)
         if list(self._again) != trials:
             # If the guess was wrong, do not wait: a trial that was lost may never end in that process, either.
             self._simulate(trials)
@@ -79,7 +80,7 @@ class ReplayCheck:
             )
             if self._policy:
                 hint = (
-                    f"the policy {self._policy} is not a function of its seed and its observations: it should draw "
+                    f"the policy {self._policy.use} is not a function of its seed and its observations: it should draw "
                     "random numbers by the seed of `reset` alone, and keep nothing from an earlier trial; "
                     "task.policy.reproducible: false collects with it as it is"
                 )

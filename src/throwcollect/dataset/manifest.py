@@ -123,11 +123,6 @@ def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
 
 def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
     """Read the entries of the manifest of a dataset, in order of their paths."""
-    return read_named_manifest(directory)[1]
-
-
-def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
-    """Read the name of the collection that a manifest has, and its entries; see `read_manifest`."""
     path = directory / MANIFEST
     if not path.exists():
         raise DatasetError("is missing", path=path, hint=command("resume", directory, "--no-simulate"))
@@ -140,7 +135,7 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     # No digest covers the manifest itself, so a changed byte of it shows only by this comparison.
     if text != manifest_text(name, entries) or len({entry.path for entry in entries}) < len(entries):
         raise DatasetError("is not written as the manifest of a dataset is", path=path)
-    return name, entries
+    return entries
 
 
 def is_begun(directory: Path) -> bool:

@@ -39,8 +39,7 @@ _BALL_COLOR = "#ff7300"
 
 def object_of(config: Config) -> SceneBody:
     """Make the object that the robot acts on in a trial: the ball, or a body of the scene or of the task."""
-    name = config.acted_on
-    return _make_ball(config.ball) if name == BALL else _make_body(name, config.bodies)
+    return _make_body(config.acted_on, _list_sections(config))
 
 
 def bodies_of(config: Config) -> tuple[SceneBody, ...]:
@@ -66,11 +65,6 @@ def _list_sections(config: Config) -> Mapping[str, AnyBody]:
     if config.acted_on != BALL:
         return config.bodies
     return {**config.bodies, BALL: _describe_ball(config.ball)}
-
-
-@lru_cache(maxsize=64)
-def _make_ball(ball: BallConfig) -> SceneBody:
-    return _make_body(BALL, {BALL: _describe_ball(ball)})
 
 
 @lru_cache(maxsize=64)

@@ -195,7 +195,7 @@ def _read_color(material: ElementTree.Element) -> dict[str, Rgba]:
     color = material.find("color")
     if color is None:
         return {}
-    r, g, b, a = _read_numbers(color.attrib["rgba"])
+    r, g, b, a = map(float, color.attrib["rgba"].split())
     return {material.get("name", ""): (r, g, b, a)}
 
 
@@ -214,7 +214,3 @@ def _read_shape(link: ElementTree.Element, visual: ElementTree.Element, colors: 
     rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
     place, turn = shape.placement.xyz, turn_of(shape.placement)
     return DrawnShape(link.attrib["name"], place, turn, size, shape.kind, mesh, rgba)
-
-
-def _read_numbers(text: str) -> tuple[float, ...]:
-    return tuple(map(float, text.split()))

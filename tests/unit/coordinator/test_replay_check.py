@@ -11,6 +11,7 @@ import pytest
 from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.throws_table import Row
@@ -27,6 +28,7 @@ PLAN: Plan = make_plan(
             "trials": 6,
             "sweep": {"sampler": "uniform", "parameters": {"ball.mass_kg": {"min": 0.03, "max": 0.06}}},
             "sim": {"engine": "ballistic"},
+            "run": {"replay": 2},
         }
     )
 )
@@ -67,7 +69,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
 @pytest.fixture
 def check(tmp_path: Path) -> Iterator[ReplayCheck]:
     create(tmp_path / "data", PLAN)
-    check = ReplayCheck(tmp_path / "data", count=2, seed=PLAN.config.seed)
+    check = ReplayCheck(tmp_path / "data", PLAN.config)
     yield check
     check.close()
 
@@ -136,7 +138,7 @@ def test_closing_a_replay_check_ends_its_process(check) -> None:
 
 
 def test_a_replay_check_of_no_trials_starts_no_process(tmp_path, started) -> None:
-    check = ReplayCheck(tmp_path, count=0, seed=1)
+    check = ReplayCheck(tmp_path, with_values(PLAN.config, {"run.replay": 0}))
     check.begin(NUMBERS)
     assert compare(check, {1: {"trial": 1, "digest": "d"}}) is None
     assert started == []

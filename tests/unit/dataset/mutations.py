@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import struct
 from collections.abc import Callable, Sequence
@@ -14,7 +15,7 @@ from throwcollect.config.loader import load
 from throwcollect.coordinator.resume import finish_without_simulating
 from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.inspect import digest, info
-from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text, read_named_manifest
+from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text
 from throwcollect.dataset.mcap_reader import scan_file
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
@@ -73,7 +74,7 @@ def mutate(data: bytes, mutations: Sequence[Mutation]) -> bytes:
 def fit_manifest(directory: Path) -> None:
     """Write a manifest that fits the files, so that it does not give a change away."""
     files = [directory / name for name in list_promised_names(directory) if (directory / name).is_file()]
-    name, _ = read_named_manifest(directory)
+    name = json.loads((directory / "datapackage.json").read_bytes())["name"]
     (directory / "datapackage.json").write_text(manifest_text(name, map(entry_of_file, files)))
 
 
