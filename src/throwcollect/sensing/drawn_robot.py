@@ -77,11 +77,6 @@ class DrawnRobot:
     locate: Callable[[str], Path]
 
     @property
-    def links(self) -> tuple[str, ...]:
-        """Names of the links, in the order of the description."""
-        return tuple(link.attrib["name"] for link in ElementTree.fromstring(self.urdf).iter("link"))  # noqa: S314
-
-    @property
     def meshes(self) -> dict[str, Path]:
         """The mesh files, by their paths or URLs."""
         return {mesh: self.locate(mesh) for mesh in sorted({shape.mesh for shape in self.shapes if shape.mesh})}

@@ -89,7 +89,7 @@ class Scene:
         free = {name: (1 + len(self._joints) + number, Pose()) for number, name in enumerate(moving)}
         # A robot may have a link with the name of the world, too, which then stands at the height of the base.
         self.links = {**links, **free, WORLD: (0, Pose())}
-        self.labels = label_names(robot.links, moving[0], dict.fromkeys(shape.name for shape in bodies))
+        self.labels = label_names(tree.links, moving[0], dict.fromkeys(shape.name for shape in bodies))
         self.ground = self.labels.index(GROUND)
         self.n_moving = len(moving)
         drawn = [(links[shape.link], shape) for shape in robot.shapes]

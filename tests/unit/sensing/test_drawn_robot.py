@@ -6,7 +6,10 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+from tests.unit.sensing.scenes import make_scene
 
+from throwcollect.episode.frames import read_frames
+from throwcollect.episode.sensor_topics import label_names
 from throwcollect.sensing.drawn_robot import DrawnRobot, read_drawn_robot
 from throwcollect.view.markers import shape_markers
 
@@ -59,3 +62,10 @@ def test_each_shape_has_its_own_colour(tmp_path: Path) -> None:
     # A part without a colour is grey, and the tool has one of its own, whatever its description says.
     assert len(set(colours)) == 5
     assert drawn.urdf.count("<material") == 5
+
+
+def test_labels_begin_with_the_root_of_a_description_as_recordings_say() -> None:
+    joint = '<joint name="j" type="fixed"><parent link="root"/><child link="hand"/></joint>'
+    urdf = f'<robot name="r"><link name="hand"/><link name="root"/>{joint}</robot>'
+    recorded = label_names(read_frames(urdf, base_height=0.5).links, "ball", ["ball"])
+    assert make_scene(urdf=urdf).labels == recorded == ("background", "root", "hand", "ball", "ground")
