@@ -76,11 +76,6 @@ class Leases:
         """Number of trials that no simulation holds, and that are to be done."""
         return self._waiting_fresh + len(self._returned)
 
-    @property
-    def finished(self) -> bool:
-        """Whether every trial was completed or given up."""
-        return self.ended == self.total
-
     def why_set_aside(self, simulation: str) -> str | None:
         """Say why a simulation gets no more trials; None if it gets more."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:

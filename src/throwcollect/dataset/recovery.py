@@ -8,7 +8,7 @@ if it had never stopped.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,12 +71,6 @@ class LeftOfShard:
     path: Path
     episodes: Mapping[int, RecoveredEpisode]
     finished: FinishedShard | None
-
-    def without(self, dropped: Collection[int]) -> LeftOfShard:
-        """Leave out the episodes of some trials, which are of no use any more."""
-        if not dropped:
-            return self
-        return LeftOfShard(self.path, {n: found for n, found in self.episodes.items() if n not in dropped}, None)
 
 
 def remove_unfinished(directory: Path) -> None:

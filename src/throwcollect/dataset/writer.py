@@ -24,7 +24,7 @@ from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import Judge, find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import Judge, LeftOfShard, find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording, ShardLayout
 from throwcollect.dataset.summary_files import write_description
 from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, place_columns
@@ -121,8 +121,9 @@ class DatasetWriter:
         parts = {each: self._layout.part(each) for each in sorted(self._unfinished) if self._layout.has_file(each)}
         all_left = find_left([*parts.values()], self._channels, judge=judge, processes=processes)
         for number, found in zip(parts, all_left, strict=True):
-            dropped = {trial for trial, each in sorted(found.episodes.items()) if not keep(trial, each.result)}
-            left, shard = found.without(dropped), self._get_shard(number)
+            kept = {trial: each for trial, each in sorted(found.episodes.items()) if keep(trial, each.result)}
+            left = found if len(kept) == len(found.episodes) else LeftOfShard(found.path, kept, None)
+            shard = self._get_shard(number)
             recover_shard(shard, left)
             for trial, each in left.episodes.items():
                 shard.rows[trial] = self._make_row(trial, each.result, {**each.place, "shard": shard.path.name})

@@ -29,7 +29,7 @@ def test_a_trial_that_is_given_up_lists_all_its_failures() -> None:
     assert leases.fail("a", 7, "exit 137") is None
     leases.lease("b")
     assert leases.fail("b", 7, "timeout") == ["a: exit 137", "b: timeout"]
-    assert leases.finished
+    assert leases.ended == leases.total
 
 
 def test_only_trials_of_the_plan_that_have_not_ended_are_open() -> None:
@@ -59,9 +59,9 @@ def test_a_trial_without_retries_left_waits_until_it_is_known_whether_its_simula
         assert leases.lease("a") == 0
         assert leases.fail("a", 0, "out of sight", alive=None) is None
         assert leases.lease("b") is None
-        assert not leases.finished
+        assert leases.ended < leases.total
         assert leases.settle("a", alive=fate) == (None if fate else (0, ["a: out of sight"]))
-    assert leases.finished
+    assert leases.ended == leases.total
     assert leases.settle("a", alive=False) is None
 
 
@@ -116,7 +116,7 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
     for simulation, action in actions:
         act(simulation, action)
     present = False
-    while not leases.finished:
+    while leases.ended < leases.total:
         act("z", "lease")
         act("z", "complete")
         for simulation in "abcd":
@@ -131,7 +131,7 @@ BOTH = ("hole", "well")
 def do_all(leases: Leases) -> list[int]:
     """One simulation refuses every trial, the other completes every trial; returns the trials that were given up."""
     given_up = []
-    while not leases.finished:
+    while leases.ended < leases.total:
         trial = leases.lease("hole", others=BOTH)
         if trial is not None and leases.fail("hole", trial, "no", refused=True):
             given_up.append(trial)
@@ -165,7 +165,7 @@ def test_a_simulation_that_is_alone_gets_its_failed_trial_back() -> None:
 def test_trials_that_every_simulation_refuses_set_no_simulation_aside() -> None:
     leases = Leases(range(30), retries=3)
     lost = []
-    while not leases.finished:
+    while leases.ended < leases.total:
         for name in ("a", "b"):
             trial = leases.lease(name, others="ab")
             if trial is None:
