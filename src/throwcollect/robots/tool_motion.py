@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ class ToolMotion:
         self._seat = mount_of(robot_of(config), tool) * pinocchio.SE3(
             np.eye(3), np.array(tool.ball_seat(object_of(config).radius_m))
         )
-        self._model = _model_of(robot_of(config))
+        self._model = _model_of(robot_of(config), threading.get_ident())
         self._offsets = joint_offsets(config)
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])
 
@@ -63,15 +64,7 @@ class _JointModel:
         self.hand = self.model.getFrameId(robot.hand, pinocchio.BODY)
 
 
-_of_this_thread = threading.local()
-
-
-def _model_of(robot: Robot) -> _JointModel:
-    """Return this thread's model of a robot.
-
-    Each thread keeps its own, because making a model takes a hundred times as long as using it, and using changes it.
-    """
-    models: dict[Robot, _JointModel] = _of_this_thread.__dict__.setdefault("models", {})
-    if robot not in models:
-        models[robot] = _JointModel(robot)
-    return models[robot]
+@lru_cache(maxsize=64)
+def _model_of(robot: Robot, _thread: int) -> _JointModel:
+    """Return the model that a thread keeps, as using it changes it, and making it takes a hundred times as long."""
+    return _JointModel(robot)
