@@ -188,9 +188,11 @@ class SensorFrames:
     def _read(self, stream: str, number: int) -> NDArray[Any]:
         chunk = bisect_right(self._starts, number) - 1
         seen = self._decode(stream, self._rows(chunk, stream)[number - self._starts[chunk]])
-        if not self.noise or stream in ("segmentation", "points"):
+        if not self.noise or stream == "segmentation":
             return seen
         noise = Noise(self.config.noise, self._whole.seed, self._header.trial, f"{self.name}/{stream}")
+        if stream == "points":
+            return _move_along_rays(seen, noise, number)
         return noise.color(seen, number) if stream == "color" else noise.distance(seen, number)
 
     def _decode(self, stream: str, row: Any) -> NDArray[Any]:
@@ -205,3 +207,11 @@ class SensorFrames:
             found = found.view(kind).reshape(sensor.height, sensor.width, *colors)
         decoded: NDArray[Any] = found
         return decoded
+
+
+def _move_along_rays(points: NDArray[Any], noise: Noise, number: int) -> NDArray[Any]:
+    ranges = np.sqrt(sum(points[axis] * points[axis] for axis in "xyz"))
+    moved, shares = points.copy(), noise.distance(ranges, number) / ranges
+    for axis in "xyz":
+        moved[axis] *= shares
+    return moved

@@ -130,7 +130,8 @@ class LidarSensor(Sensor):
 
     def __init__(self, name: str, section: LidarConfig, seed: int, trial: int) -> None:
         super().__init__(name, section)
-        self._section, self._noise = section, Noise(section.noise, seed, trial, name)
+        stream = "points" if isinstance(section, LayersConfig) else "scan"
+        self._section, self._noise = section, Noise(section.noise, seed, trial, f"{name}/{stream}")
         low, high = section.range_m
         self.lidar = Lidar(section.angles_rad, section.elevations_rad, section.link, self.pose, low, high)
 

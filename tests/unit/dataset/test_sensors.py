@@ -156,6 +156,21 @@ def test_noise_is_added_on_reading_and_the_same_each_time(seen: Path, tmp_path: 
     assert np.isinf(noisy.depth_m[2][np.isnan(first)]).all()
 
 
+@pytest.mark.parametrize("kind", [{"kind": "lidar_2d"}, {"kind": "lidar_3d", "layers": 4}])
+def test_lidars_have_their_noise_whether_it_is_recorded_or_added_on_reading(seen: Path, kind: dict[str, Any]) -> None:
+    def measure(**noise: Any) -> Any:
+        section = {"link": "base_link", "position_m": [0.4, 0, 0.2], "rays": 180, "rate_hz": 2, **kind, "noise": noise}
+        found = throwcollect.load(seen)[0].render({"lidar": section})["lidar"]
+        if kind["kind"] == "lidar_2d":
+            return np.where(np.isinf(found.ranges[2]), np.nan, found.ranges[2])
+        return np.sqrt(sum(found.points[2][axis] ** 2 for axis in "xyz"))
+
+    clean, read = measure(), measure(range_std_m=0.02, dropout=0.1)
+    np.testing.assert_allclose(read, measure(range_std_m=0.02, dropout=0.1, recorded=True), rtol=1e-5)
+    assert 0.05 < np.isnan(read)[np.isfinite(clean)].mean() < 0.15
+    assert 0.015 < np.nanstd(read - clean) < 0.025
+
+
 def test_normal_noise_is_normal() -> None:
     noise = Noise(load_noise(color_std=5), 1, 2, "head/color")
     drawn = noise.color(np.full((200, 200, 3), 128, np.uint8), 3).astype(float)
