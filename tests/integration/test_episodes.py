@@ -53,7 +53,7 @@ def test_a_genuine_subscriber_misses_no_episode(endpoint: str, robot: Robot) -> 
     headers = [unpack(message, signer()).header for message in heard]
     assert [header.trial for header in headers] == list(range(TRIALS))
     assert [header.start_ns for header in headers] == [CONFIG.trial_start_ns(number) for number in range(TRIALS)]
-    attachments = [unpack_attachment(sample.attachment.to_bytes()) for sample in samples]
+    attachments = [unpack_attachment(sample.attachment) for sample in samples]
     first = attachments[0].sequence
     assert [each.sequence for each in attachments] == list(range(first, first + TRIALS))
     assert len({each.gid for each in attachments}) == 1

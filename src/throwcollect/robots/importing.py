@@ -12,6 +12,7 @@ import shutil
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -84,9 +85,10 @@ def _find_cache(section: DescribedRobotConfig, path: Path) -> Path:
     for root in (urdf, *([read_xml(Path(section.srdf))] if section.srdf else ())):
         digest.update(ElementTree.tostring(root))
     for filename in sorted({mesh.get("filename", "") for mesh in urdf.iterfind("link/*/geometry/mesh")} - {""}):
-        # Meshes may be large, so their contents are not looked at.
-        status = find_mesh(filename, path, section.packages).stat()
-        digest.update(f"\n{filename} {status.st_size} {status.st_mtime_ns}".encode())
+        # Meshes may be large, so their contents are not looked at. One that is missing is an error of its link, later.
+        with suppress(ConfigError):
+            status = find_mesh(filename, path, section.packages).stat()
+            digest.update(f"\n{filename} {status.st_size} {status.st_mtime_ns}".encode())
     return state_directory() / "robots" / digest.hexdigest()[:16]
 
 
