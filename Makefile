@@ -90,8 +90,8 @@ test-fast: $(READY_DEV)
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 6 test-containers-of-commands test-containers-of-runs test-cluster test-processes test-units test-ros \
-	    test-containers test-image
+	$(MAKE) $(BESIDE) -j 5 test-containers-of-commands test-containers-of-runs test-processes test-units test-ros test-containers \
+	    test-image test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
