@@ -47,12 +47,18 @@ def import_robot(section: DescribedRobotConfig) -> DescribedRobotConfig:
     """
     path = find_urdf(section.urdf)
     directory = _find_cache(section, path)
-    if not directory.is_dir():
+    if not _is_whole(directory):
+        # Cleaners of temporary directories remove files and leave their directories.
+        shutil.rmtree(directory, ignore_errors=True)
         _fill(directory, section, path)
     found = Document(directory / SECTION).values["robot"]
     files = {"urdf": str(directory / URDF), "srdf": str(directory / SRDF), "sha256": hash_files(directory)}
     kept = {key: getattr(section, key) for key in section.model_fields_set - _DERIVED}
     return DescribedRobotConfig.model_validate({**found, **files, **kept})
+
+
+def _is_whole(directory: Path) -> bool:
+    return all((directory / name).is_file() for name in (URDF, SRDF, SECTION))
 
 
 _DERIVED = {
@@ -114,7 +120,7 @@ def _fill(directory: Path, section: DescribedRobotConfig, path: Path) -> None:
             scratch.rename(directory)
         except OSError:
             # Another process has imported the same robot meanwhile.
-            if not directory.is_dir():
+            if not _is_whole(directory):
                 raise
     except ConfigError as error:
         # The user knows the source, and not the copy.

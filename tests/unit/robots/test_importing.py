@@ -155,6 +155,8 @@ def test_an_import_gives_the_same_files_again(name: str, tmp_path: Path, monkeyp
     again = import_robot(section)
     assert Path(again.urdf).is_relative_to(tmp_path)
     assert again.sha256 == first.sha256 == hash_files(Path(again.urdf).parent)
+    Path(again.urdf).unlink()
+    assert import_robot(section).sha256 == first.sha256
 
 
 def test_an_imported_robot_can_be_imported_again(tmp_path: Path) -> None:
