@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
@@ -36,4 +37,7 @@ def test_the_integration_tests_pass_on_each_pair_of_backends(client, simulation,
         backends = {"THROWCOLLECT_ROS": client, "SIMULATION_ROS": simulation}
         return subprocess.run(command, cwd=ROOT, env={**os.environ, **backends}, check=False).returncode == 0
 
-    assert any(passes() for _ in range(5))
+    needed = next((number for number in range(1, 6) if passes()), None)
+    assert needed is not None
+    if needed > 1:
+        warnings.warn(f"{needed} passes were needed: {client}, {simulation}", stacklevel=1)

@@ -111,7 +111,7 @@ class SensorFrames:
     def depth_m(self) -> Frames:
         """Depths along the optical axis [m]: ``(height, width)``, float32; inf where nothing is near enough.
 
-        With ``depth_encoding: 16UC1``, they are rounded to millimetres.
+        They are NaN where the noise has a dropout. With ``depth_encoding: 16UC1``, they are rounded to millimetres.
         """
         return self._frames("depth")
 
@@ -122,14 +122,14 @@ class SensorFrames:
 
     @property
     def ranges(self) -> Frames:
-        """Ranges of a `lidar_2d` [m], shape ``(rays,)``, float32; inf where nothing is near enough."""
+        """Ranges of a `lidar_2d` [m], shape ``(rays,)``, float32; inf where nothing is near enough, NaN at dropouts."""
         return self._frames("scan")
 
     @property
     def points(self) -> Frames:
         """Points of a `lidar_3d` in the frame of the sensor: ``(layers, rays)`` of x, y, z [m] and intensity.
 
-        They are NaN where nothing is near enough. The intensity is a number in `label_names`.
+        They are NaN where nothing is near enough, and at dropouts. The intensity is a number in `label_names`.
         """
         return self._frames("points")
 
