@@ -14,7 +14,7 @@ from throwcollect.config.section import Section
 Size = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,17}[bkmg]?$")]
 Cores = Annotated[str, NUMBER_AS_TEXT, Field(pattern=r"^[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*$")]
 # Which directories and devices of the host may be used is checked when a run begins, after links have been followed.
-Mount = Annotated[str, Field(pattern=r"^/[^/:][^:]*:/[^:]*(:ro)?$")]
+Mount = Annotated[str, Field(pattern=r"^/[^/:][^:]*:/[^:]*(:(ro|(ro,)?[zZ]))?$")]
 Device = Annotated[str, Field(pattern=r"^/dev/[^:]+:/dev/[^:]+:(r|w|rw)$")]
 Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 ContainerPort = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,4}(/tcp|/udp)?$")]
@@ -66,7 +66,7 @@ class NodeContainerConfig(Section):
     """Further environment variables."""
     mounts: list[Mount] = []
     """Directories and files with data of the host that the container sees, too, as HOST:CONTAINER[:ro]; none inside
-    /data or /key."""
+    /data or /key. `:z` or `:ro,z` labels them for all containers on hosts with SELinux, `Z` for this one alone."""
     networks: list[str] = []
     """Networks of the engine that the container joins besides the run's own."""
     ports: dict[ContainerPort, HostPort] = {}

@@ -28,10 +28,11 @@ containers:
     memory: 512m
     cpuset: 0-3,6
     environment: {A: text, B: 1, C: 0.5}
-    mounts: [/a:/b:ro]
+    mounts: [/a:/b:ro, /c:/d:z, "/e:/f:ro,Z"]
     networks: [lab]
     options: {shm_size: 64m, ulimits: {nofile: 9}, dns: [1.1.1.1], tmpfs: {/cache: size=1m}, labels: {team: a}}
 """
+WRONG_MOUNTS = ("a:/b", "/a", "//:/b", "/a:/b:rz")
 
 
 def test_every_container_key_reads_back_equal_after_it_is_written(tmp_path: Path) -> None:
@@ -57,7 +58,10 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
     [
         ("sim: {memory: 512MB}", "sim.memory: should match pattern"),
         ("sim: {cpuset: 0-}", "sim.cpuset: should match pattern"),
-        *((f"sim: {{mounts: ['{mount}']}}", "sim.mounts.0: should match pattern") for mount in ("a:/b", "/a", "//:/b")),
+        *(
+            (f"sim: {{mounts: ['{mount}']}}", "sim.mounts.0: should match pattern")
+            for mount in ("a:/b", "/a", "//:/b", "/a:/b:rz")
+        ),
         ("sim: {options: {devices: [/dev/vda:rw]}}", "sim.options.devices.0: should match pattern"),
         *(
             (f"sim: {{options: {{{option}}}}}", f"sim.options.{option.partition(':')[0]}: unknown key; known: dns, ")

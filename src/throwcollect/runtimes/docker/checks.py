@@ -14,7 +14,7 @@ from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.runtimes.docker.address import engine_address
-from throwcollect.runtimes.docker.container_options import image, read_mount
+from throwcollect.runtimes.docker.container_options import image
 from throwcollect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors, find_image
 from throwcollect.state_directory import state_directory
 
@@ -73,8 +73,9 @@ def _check(
 def _problems(
     key: str, section: NodeContainerConfig, networks: set[str], root: str, *, mounts: str
 ) -> Iterator[Problem]:
-    for index, mount in enumerate(map(read_mount, section.mounts)):
-        wrong = _wrong_mount(Path(mount["Source"]), root) or _wrong_target(mount["Target"])
+    for index, mount in enumerate(section.mounts):
+        source, target, *_ = mount.split(":")
+        wrong = _wrong_mount(Path(source), root) or _wrong_target(target)
         if wrong is not None:
             yield Problem(wrong, f"{key}.{mounts}.{index}")
     for index, device in enumerate(section.options.get("devices", [])):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from docker.types import EndpointConfig, Mount
+from docker.types import EndpointConfig
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.errors import ConfigError, WorkerError
@@ -50,7 +50,7 @@ class JoinOptions:
 
     run: str
     environment: Mapping[str, str]
-    key: Mount
+    key: str
     network: str | None
 
 

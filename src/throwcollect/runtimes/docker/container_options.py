@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from docker.types import DeviceRequest, EndpointConfig, LogConfig, Mount, Ulimit
+from docker.types import DeviceRequest, EndpointConfig, LogConfig, Ulimit
 
 from throwcollect.config.containers import NodeContainerConfig
 from throwcollect.config.schema import Config
@@ -58,9 +58,12 @@ def labels(context: RunContext) -> dict[str, str]:
     return {RUN_LABEL: context.run, DIRECTORY_LABEL: str(context.directory.resolve()), VERSION_LABEL: __version__}
 
 
-def key_mount(key: RunKey) -> Mount:
-    """The mount of the directory of a key, whose files only their owner can read."""
-    return Mount(target=str(KEY.directory), source=str(key.directory), type="bind", read_only=True)
+def key_mount(key: RunKey) -> str:
+    """The mount of the directory of a key, whose files only their owner can read.
+
+    On hosts with SELinux, `z` gives it the label with which all containers may read it.
+    """
+    return f"{key.directory}:{KEY.directory}:ro,z"
 
 
 def router_endpoint(config: Config, middleware: Middleware) -> str:
@@ -105,7 +108,7 @@ def node_options(
     }
     mounts = [key_mount(context.key)]
     if node.name != ROUTER:
-        mounts.append(Mount(target=DATA, source=directory, type="bind", read_only=node.name != COORDINATOR))
+        mounts.append(f"{directory}:{DATA}:{'rw' if node.name == COORDINATOR else 'ro'},z")
     options = container_options(context, image(config), node.name, section, environment=own, mounts=mounts)
     if node.name == ROUTER and config.run.router_port:
         options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
@@ -125,7 +128,7 @@ def container_options(
     section: NodeContainerConfig,
     *,
     environment: Mapping[str, str],
-    mounts: Sequence[Mount],
+    mounts: Sequence[str],
 ) -> dict[str, Any]:
     """Keywords for `containers.create` for a node or a component, which can do little but compute.
 
@@ -153,7 +156,7 @@ def container_options(
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _with_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
-        "mounts": [*mounts, *map(read_mount, section.mounts)],
+        "volumes": [*mounts, *section.mounts],
         "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
         "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
         "mem_limit": section.memory,
@@ -161,13 +164,6 @@ def container_options(
         "memswap_limit": section.memory,
         "cpuset_cpus": section.cpuset,
     }
-
-
-def read_mount(mount: str) -> Mount:
-    """Read a mount of the configuration."""
-    source, target, *mode = mount.split(":")
-    # The only mode that the configuration allows is ``ro``.
-    return Mount(target=target, source=source, type="bind", read_only=bool(mode))
 
 
 def _with_tmpfs(own: Mapping[str, str], chosen: Mapping[str, str]) -> dict[str, str]:

@@ -57,21 +57,15 @@ def test_a_container_gets_the_name_of_its_node_and_the_address_of_the_router() -
 
 
 def test_only_the_coordinator_can_write_the_dataset_and_simulations_can_read_it() -> None:
-    def mounts(name: str) -> list[tuple[str, str, str, bool]]:
-        found = options(name)["mounts"][1:]
-        return [(each["Type"], each["Source"], each["Target"], each["ReadOnly"]) for each in found]
-
-    assert mounts("coordinator") == [("bind", "/home/me/data set", "/data", False)]
-    assert mounts("sim_0") == [("bind", "/home/me/data set", "/data", True)]
-    assert mounts("router") == []
+    assert options("coordinator")["volumes"][1:] == ["/home/me/data set:/data:rw,z"]
+    assert options("sim_0")["volumes"][1:] == ["/home/me/data set:/data:ro,z"]
+    assert options("router")["volumes"][1:] == []
 
 
 def test_every_node_gets_the_key_of_the_run_in_a_read_only_mount() -> None:
     for name in ("router", "sim_0", "coordinator"):
         made = options(name)
-        mount = made["mounts"][0]
-        assert (mount["Type"], mount["Source"]) == ("bind", "/state/key")
-        assert (mount["Target"], mount["ReadOnly"]) == ("/key", True)
+        assert made["volumes"][0] == "/state/key:/key:ro,z"
         assert made["environment"]["THROWCOLLECT_KEY"] == "/key"
         assert 'connect_private_key="/key/key.pem"' in made["environment"]["ZENOH_CONFIG_OVERRIDE"]
 
@@ -99,11 +93,8 @@ def test_container_options_of_simulations_do_not_apply_to_other_nodes() -> None:
 
 
 def test_mounts_of_the_configuration_are_added_to_that_of_the_dataset() -> None:
-    found = options("sim_0", sim={"mounts": ["/a b:/c:ro", "/d:/e"]})["mounts"]
-    assert [(each["Source"], each["Target"], each["ReadOnly"]) for each in found[2:]] == [
-        ("/a b", "/c", True),
-        ("/d", "/e", False),
-    ]
+    mounts = ["/a b:/c:ro", "/d:/e:Z"]
+    assert options("sim_0", sim={"mounts": mounts})["volumes"][2:] == mounts
 
 
 def test_ports_are_published_on_the_loopback_interface() -> None:
