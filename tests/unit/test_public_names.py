@@ -21,7 +21,7 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def test_dir_and_the_documentation_list_the_public_names() -> None:
-    described = re.findall(r"^\| `(\w+)[`(]", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
+    described = re.findall(r"^\| `(\w+)`", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert dir(throwcollect) == throwcollect.__all__ == sorted(throwcollect.__all__)
     assert sorted(described) == throwcollect.__all__
 
@@ -35,8 +35,6 @@ def read_signatures(page: str) -> dict[str, list[str]]:
 
 
 def test_functions_have_the_parameters_that_are_described() -> None:
-    described = read_signatures("python.md")
-    assert described == {name: list(inspect.signature(getattr(throwcollect, name)).parameters) for name in described}
     described = read_signatures("runs.md")
     for function in (prepare, resume):
         # The last parameter is for the launcher, and not documented.

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.pages import find_blocks, read_section
 
 from throwcollect import Simulator, load_config
 from throwcollect.errors import ConfigError, ConflictError, PlanError
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "simulator.md").read_text(encoding="utf-8")
 POINT = {"task.duration_s": 1.1, "ball.mass_kg": 0.04}
 REFUSED = {"task.duration_s": 0.2}
 TOO_FAST = r"moves at .* rad/s at .* its limit is"
@@ -180,7 +180,7 @@ def test_a_missing_configuration_is_an_error_that_names_it(tmp_path: Path) -> No
 
 
 def test_the_program_of_the_page_runs_without_error_output(tmp_path: Path) -> None:
-    (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    (program,) = find_blocks("python", read_section("python.md", "Single throws"))
     (tmp_path / "program.py").write_text(program)
     said = subprocess.run(
         [sys.executable, tmp_path / "program.py"], capture_output=True, text=True, timeout=120, cwd=ROOT, check=False

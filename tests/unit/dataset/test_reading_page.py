@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.pages import find_blocks, read_section
 
 from throwcollect.dataset import reader, throw, trajectories
 from throwcollect.dataset.trajectories import list_columns
@@ -15,7 +16,6 @@ COLUMNS = tuple(list_columns(["ball"]))
 
 PAGE = (Path(__file__).parents[3] / "docs" / "reading.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-OF_FUNCTIONS = (Path(__file__).parents[3] / "docs" / "python.md").read_text(encoding="utf-8")
 
 
 def run(block: str, collected: Path, directory: Path) -> str:
@@ -48,7 +48,7 @@ def test_the_numpy_example_runs(collected: Path, tmp_path: Path) -> None:
 
 
 def test_the_example_of_the_page_on_functions_runs(collected: Path, tmp_path: Path) -> None:
-    (block,) = re.findall(r"```python\n(.*?)```", OF_FUNCTIONS, flags=re.DOTALL)
+    block = find_blocks("python", read_section("python.md", "Python API"))[0]
     assert re.search(r"^-?\d\.\d+ \d\.\d+$", run(block, collected, tmp_path), flags=re.MULTILINE)
     assert (tmp_path / "short-npz" / "throws.npz").is_file()
 
