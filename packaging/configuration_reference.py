@@ -30,15 +30,14 @@ _INTRODUCTION = """\
 
 <!-- Printed by `python packaging/configuration_reference.py`; edit the docstrings in src/throwcollect/config. -->
 
-A configuration is a YAML 1.2 file. Every key may be left out, unless it is marked as required; `throwcollect config`
-prints all keys with the values that they then have, and `throwcollect config --schema` the JSON Schema for editors.
-Units are part of the names; angles are in radians. A key that does not exist and a value out of bounds are errors, and
-all of them are reported at once. Keys that contradict each other, and what a sweep may not vary, are reported once
-these are right. A key that is there twice is no valid YAML.
+A configuration is a YAML 1.2 file. Every key has a default, unless it is marked as required. `throwcollect config`
+prints all keys with their values, and `throwcollect config --schema` the JSON Schema for editors. Units are part of
+the names; angles are in radians. Unknown keys, values out of bounds and keys that contradict each other are errors,
+which are reported together.
 
 `--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
-ball/odometry, clock]'`. The value is read as YAML; later ones win. An item of a list in
-the file is named by its index, from 0; a list that the file leaves out is given as a whole.
+ball/odometry, clock]'`. The value is YAML; later ones win. An item of a list is named by its index, from 0; a list
+that is absent from the file is given as a whole.
 """
 
 _SAMPLERS = """\
@@ -60,10 +59,10 @@ With `until`, a dataset ends with the trial at which enough have succeeded. With
 """
 
 _TARGETS = """\
-A list may also say where each trial should end, in columns that the task names; those of `throw` are below. The trial
-does not depend on them: the table of throws has them, and by how much each throw missed
-([dataset.md](dataset.md#targets)). A row without a target has empty cells there (Parquet: null).
-`throwcollect aim -o FILE` writes such lists ([learning.md](learning.md)).
+A list may also have the place where each trial should end, in columns that the task names; those of `throw` are
+below. The trial does not depend on them: the table of throws has them, and the distance by which each throw missed
+([dataset.md](dataset.md#targets)). A row without a target has empty cells there (Parquet: null). `throwcollect aim -o
+FILE` writes such lists ([learning.md](learning.md)).
 """
 
 _ANY = {"containers.": "<node>", "sweep.target.": "<target>"}
@@ -72,42 +71,53 @@ _ANY = {"containers.": "<node>", "sweep.target.": "<target>"}
 
 def page() -> str:
     """Write the reference of all keys, as Markdown."""
-    return "\n".join([_INTRODUCTION, *_write_sections(root(), "")])
+    return "\n".join([_INTRODUCTION, *_write_sections(root(), "", {})])
 
 
-def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
-    yield _write_table(shape, prefix)
+Written = dict[str, list[str]]
+"""What is on the page already: the rows of tables by where they stand, and the sections by their keys."""
+
+
+def _write_sections(shape: ValueShape, prefix: str, written: Written) -> Iterator[str]:
+    yield _write_table(shape, prefix, written.setdefault(prefix, []))
     for name, child in shape.keys.items():
         key = prefix + name
         alternatives = child.alternatives
+        section = str(child.node)
+        if child.keys or len(alternatives) > 1:
+            # Tasks share sections, such as that of the trajectory.
+            if section in (sections := written.setdefault(f"sections {key}", [])):
+                continue
+            sections.append(section)
         if key == "sweep.parameters":
             for parameter in child.child("").alternatives:
                 yield f"### `sweep.parameters.<key>`: {_write_sentence(parameter)}\n"
-                yield _write_table(parameter, "")
+                yield _write_table(parameter, "", [])
             yield f"{_SAMPLERS}\n### Targets in a list\n\n{_list_targets()}"
             yield f"### Keys that may be swept\n\n{_list_sweepable()}\n"
         elif len(alternatives) > 1 and all(each.keys for each in alternatives):
             for each in alternatives:
                 yield f"{'###' if prefix else '##'} `{key}` with `{_find_discriminator(each)}`\n"
                 yield f"{each.node['description']}\n"
-                yield from _write_sections(each, f"{key}.")
+                yield from _write_sections(each, f"{key}.", written)
         elif len(twins := _find_twins(shape, child)) > 1:
             if name == twins[0]:
                 yield f"## {', '.join(f'`{prefix}{twin}`' for twin in twins)}\n\n{_find_own_sentence(child)}\n"
-                yield from _write_sections(child, f"{prefix}{_ANY[prefix]}.")
+                yield from _write_sections(child, f"{prefix}{_ANY[prefix]}.", written)
         elif child.keys:
             yield f"## `{key}`\n\n{child.node['description']}\n"
-            yield from _write_sections(child, f"{key}.")
+            yield from _write_sections(child, f"{key}.", written)
         else:
+            rows: list[str] = []
             items = [each for part in (0, "") for each in child.child(part).alternatives if each.keys]
             for item in items:
                 kind = f" with `{_find_discriminator(item)}`" if len(items) > 1 else ""
                 yield f"### Items of `{key}`{kind}\n\n{item.node['description']}\n"
-                yield _write_table(item, "")
+                yield _write_table(item, "", rows)
                 for part, section in item.keys.items():
                     if section.keys:
-                        yield f"Its section `{part}`: {_write_sentence(section)}\n"
-                        yield _write_table(section, f"{part}.")
+                        table = _write_table(section, f"{part}.", rows)
+                        yield f"Its section `{part}`: {_write_sentence(section)}\n\n{table}"
 
 
 def _find_discriminator(shape: ValueShape) -> str:
@@ -132,14 +142,20 @@ def _find_own_sentence(shape: ValueShape) -> str:
     return str(json_schema(Config)["$defs"][_find_title(shape)]["description"])
 
 
-def _write_table(shape: ValueShape, prefix: str) -> str:
-    rows = ["| key | holds | default | meaning |", "|---|---|---|---|"]
+def _write_table(shape: ValueShape, prefix: str, written: list[str]) -> str:
+    """Write the table of a section; rows that an alternative has already are only named."""
+    rows, named = [], []
     for name, child in shape.keys.items():
         if child.keys and "default" in child.node and len(child.alternatives) == 1:
             continue
         cells = [f"`{prefix}{name}`", str(child), _write_default(child, name, shape), _write_sentence(child)]
-        rows.append("| " + " | ".join(cells) + " |")
-    return "\n".join(rows) + "\n"
+        row = "| " + " | ".join(cells) + " |"
+        (named if row in written else rows).append(row)
+    written += rows
+    lines = ["| key | holds | default | meaning |", "|---|---|---|---|", *rows] if rows else []
+    if named:
+        lines += ["", "As above: " + ", ".join(row.split(" | ")[0].removeprefix("| ") for row in named) + "."]
+    return "\n".join(lines) + "\n"
 
 
 def _write_sentence(shape: ValueShape) -> str:
@@ -151,7 +167,11 @@ def _write_default(child: ValueShape, name: str, holder: ValueShape) -> str:
         return "required"
     if "default" not in child.node:
         return "absent"
-    return f"`{value_as_yaml(child.node['default'])}`"
+    default = child.node["default"]
+    if isinstance(default, dict) and len(default) > 1 and any(each.keys for each in child.alternatives):
+        first = next(iter(default))
+        return f"`{first}: {value_as_yaml(default[first])}`, ..."
+    return f"`{value_as_yaml(default)}`"
 
 
 def _list_targets() -> str:
