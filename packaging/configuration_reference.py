@@ -32,8 +32,8 @@ _INTRODUCTION = """\
 
 A configuration is a YAML 1.2 file. Every key has a default, unless it is marked as required. `throwcollect config`
 prints all keys with their values, and `throwcollect config --schema` the JSON Schema for editors. Units are part of
-the names; angles are in radians. Unknown keys, values out of bounds and keys that contradict each other are errors,
-which are reported together.
+the names; angles are in radians. Unknown keys and values out of bounds are errors, which are reported together;
+contradictions between keys are reported once these are right.
 
 `--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
 ball/odometry, clock]'`. The value is YAML; later ones win. An item of a list is named by its index, from 0; a list

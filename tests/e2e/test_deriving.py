@@ -1,6 +1,5 @@
-"""A derived dataset equals a collection of its trials, and the commands of docs/deriving.md work."""
+"""A derived dataset equals a collection of its trials, and the commands of docs/dataset.md work."""
 
-import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -9,11 +8,12 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.e2e.collection import collect_here
+from tests.pages import find_blocks, read_section
 from throwcollect.cli.main import assemble
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
-PAGE = (Path(__file__).parents[2] / "docs" / "deriving.md").read_text(encoding="utf-8")
+PAGE = read_section("dataset.md", "Merge, filter, sample, split")
 
 MONDAY = """\
 name: monday
@@ -59,7 +59,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
         config = directory / f"{name}.yaml"
         config.write_text(text)
         collect_here(config, directory / "datasets" / name)
-    for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL):
+    for block in find_blocks("sh", PAGE):
         for line in block.replace("\\\n", " ").splitlines():
             program, command, *arguments = shlex.split(line)
             assert program == "throwcollect"
@@ -87,7 +87,7 @@ def test_verify_finds_nothing_wrong_in_derived_datasets(home: Path) -> None:
 
 
 def test_the_python_program_of_the_page_runs(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (python,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    (python,) = find_blocks("python", PAGE)
     monkeypatch.chdir(home.parent)
     names: dict[str, Any] = {}
     exec(python, names)  # noqa: S102

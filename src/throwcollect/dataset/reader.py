@@ -249,7 +249,7 @@ class Dataset(Sequence[Throw]):
         """Read the trajectories of all throws into one array for each column.
 
         Args:
-            columns: Which columns (``docs/reading.md``); nothing else is copied. None for all.
+            columns: Which columns (``docs/dataset.md``); nothing else is copied. None for all.
             joints: Joints that the columns of joints have, in this order; None for all. `moving_joints` leaves out the
                 constant ones.
             threads: How many threads read; None for one for each core, up to 4.

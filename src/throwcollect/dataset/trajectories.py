@@ -64,7 +64,7 @@ def name_components(column: str, joints: Sequence[str], sliding: Collection[str]
 def list_columns(bodies: Sequence[str]) -> dict[str, str]:
     """List the columns of trajectories in which these bodies move, with the fields of rows that they are read from.
 
-    ``docs/reading.md`` describes them.
+    ``docs/dataset.md`` describes them.
     """
     columns = {TIMES: STAMPS, STAMPS: STAMPS, **JOINT_COLUMNS}
     for number, name in enumerate(bodies):
@@ -170,7 +170,7 @@ def read_trajectories(
     there = list_columns(bodies)
     for column in columns:
         if column not in there:
-            raise ConfigError(f"a trajectory has no column {column!r}{suggest(column, there, 'docs/reading.md')}")
+            raise ConfigError(f"a trajectory has no column {column!r}{suggest(column, there, 'docs/dataset.md')}")
     stored = [place for place in places if place is not None]
     offsets = np.zeros(len(places) + 1, np.int64)
     np.cumsum([place.samples if place else 0 for place in places], out=offsets[1:])

@@ -16,6 +16,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 from ruamel.yaml import YAML
+from tests.pages import read_section
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.dataset import bag
@@ -58,7 +59,7 @@ def test_rosbags_and_mcap_read_the_same_messages(full: Path) -> None:
 def test_the_command_of_the_page_on_viewing_converts_a_dataset_for_older_releases_of_ros(
     full: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page = (Path(__file__).parents[3] / "docs" / "viewing.md").read_text(encoding="utf-8")
+    page = read_section("dataset.md", "Foxglove, Rerun, RViz")
     (command,) = re.findall(r"^rosbags-convert (.*)$", page, re.MULTILINE)
     monkeypatch.chdir(full.parent)
     Path("datasets").mkdir()

@@ -1,4 +1,4 @@
-"""The examples and names in docs/reading.md work."""
+"""The examples and names of docs/dataset.md that read work."""
 
 import re
 import shutil
@@ -14,8 +14,8 @@ from throwcollect.dataset.trajectories import list_columns
 
 COLUMNS = tuple(list_columns(["ball"]))
 
-PAGE = (Path(__file__).parents[3] / "docs" / "reading.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+PAGE = read_section("dataset.md", "From Python")
+BLOCKS = find_blocks("python", PAGE)
 
 
 def run(block: str, collected: Path, directory: Path) -> str:

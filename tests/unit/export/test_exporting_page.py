@@ -1,4 +1,4 @@
-"""The commands and examples of docs/exporting.md work."""
+"""The commands and examples of docs/dataset.md that export work."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ import shutil
 from pathlib import Path
 
 import pytest
+from tests.pages import find_blocks, read_section
 from tests.unit.export.conftest import FORMATS
 from typer.testing import CliRunner
 
 from throwcollect.cli.main import assemble
 from throwcollect.dataset.inspect import info
 
-PAGE = (Path(__file__).parents[3] / "docs" / "exporting.md").read_text(encoding="utf-8")
+PAGE = read_section("dataset.md", "Export")
 COMMANDS = [
     shlex.split(line)[1:]
     for line in re.findall(r"^throwcollect dataset export datasets/quickstart.*$", PAGE, re.MULTILINE)
 ]
 OF_IMAGES = re.findall(r"^throwcollect (dataset export datasets/seen.*)$", PAGE, re.MULTILINE)
-EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+EXAMPLES = find_blocks("python", PAGE)
 IMPORTED = re.compile(r"^(?:import|from) (\w+)", re.MULTILINE)
 
 

@@ -1,4 +1,4 @@
-"""`dataset view`, which prepares throws for viewers, does what `docs/viewing.md` shows."""
+"""`dataset view`, which prepares throws for viewers, does what `docs/dataset.md` shows."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ import shlex
 from pathlib import Path
 
 import pytest
+from tests.pages import read_section
 from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
 from throwcollect.cli.dataset.writing import read_trials
 from throwcollect.cli.main import assemble
 from throwcollect.errors import ConfigError
-
-PAGE = Path(__file__).parents[4] / "docs" / "viewing.md"
 
 
 def test_view_takes_trials_as_numbers_and_ranges_in_the_given_order() -> None:
@@ -31,7 +30,7 @@ def test_view_refuses_malformed_lists_of_trials(text: str) -> None:
 def test_the_page_on_viewing_lists_the_files_and_topics_that_view_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page = PAGE.read_text(encoding="utf-8")
+    page = read_section("dataset.md", "Foxglove, Rerun, RViz")
     (command,) = re.findall(r"^throwcollect (dataset view .*)$", page, re.MULTILINE)
     monkeypatch.chdir(tmp_path)
     Collection().collect(tmp_path / "datasets" / "quickstart")
