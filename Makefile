@@ -179,7 +179,7 @@ check-imports: $(READY_DEV)
 check-house: $(READY_DEV)
 	$(BIN)/python -m pytest -q tests/architecture
 
-# The image of this clone, labelled with its sources (docs/containers.md). BUILD has further options of the program that builds.
+# The image of this clone, labelled with its sources (docs/running.md). BUILD has further options of the program that builds.
 BUILD :=
 VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' src/throwcollect/version.py)
 SIF := throwcollect.sif

@@ -1,8 +1,8 @@
-r"""What mkdocs does besides for the documentation site: it takes in pages that do not lie in `docs/`.
+"""What mkdocs does besides for the documentation site: it takes in pages that do not lie in `docs/`.
 
 README, CONTRIBUTING and CHANGELOG stay where everybody looks for them. Links between pages are written for the
 repository, so those that lead out of `docs/`, or from outside into it, are changed to where their targets are on the
-site. GitHub wants a bar inside of code in a table as `\|`, and mkdocs as it is.
+site.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ PAGES = {
 SOURCES = {page: source for source, page in PAGES.items() if source.endswith(".md")}
 LINK = re.compile(r"(?<=\]\()(?!\w+:)([^)#\s]+)")
 """Paths in links and pictures; what follows `#` stays."""
-CODE_IN_ROW = re.compile(r"^\|.*`.*\|$", flags=re.MULTILINE)
 
 
 def rewrite_links(text: str, page: str) -> str:
@@ -68,6 +67,5 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, *, page: Page, **_: object) -> str:
-    """Change links before mkdocs looks where they lead, and bars in tables."""
-    text = CODE_IN_ROW.sub(lambda row: re.sub(r"`[^`]*`", lambda code: code[0].replace(r"\|", "|"), row[0]), markdown)
-    return rewrite_links(text, page.file.src_uri)
+    """Change links before mkdocs looks where they lead."""
+    return rewrite_links(markdown, page.file.src_uri)

@@ -40,10 +40,6 @@ def test_pages_from_outside_of_docs_link_into_the_site(site: Path) -> None:
         assert f'href="{path.stem}.html"' in decisions
 
 
-def test_a_bar_in_a_table_is_shown_without_its_backslash(site: Path) -> None:
-    assert r"\|" not in (site / "cli.html").read_text(encoding="utf-8")
-
-
 def test_pages_load_nothing_from_other_servers(site: Path) -> None:
     loaded = re.compile(
         r"<(?:script|img|iframe)[^>]* src=\"?(?:https?:)?//[^>]*>|<link[^>]* href=\"?(?:https?:)?//[^>]*>"

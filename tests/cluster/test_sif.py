@@ -14,6 +14,7 @@ from docker.client import DockerClient
 
 from tests.cluster.conftest import SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
+from tests.pages import read_section
 from throwcollect import runs
 from throwcollect.cluster.submit import check_sif
 from throwcollect.state_directory import STATE_VARIABLE
@@ -21,7 +22,7 @@ from throwcollect.state_directory import STATE_VARIABLE
 pytestmark = pytest.mark.cluster
 ROOT = Path(__file__).parents[2]
 BASE = "throwcollect-base:bookworm"
-PAGE = (ROOT / "docs" / "containers.md").read_text(encoding="utf-8")
+PAGE = read_section("running.md", "Apptainer and Singularity")
 COMMANDS = re.findall(r"^ *(apptainer .*?throwcollect\.sif up [^#\n]*)", PAGE, flags=re.MULTILINE)
 PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/run/user", "/opt")
 """Directories that all users of a machine share."""

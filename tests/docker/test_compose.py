@@ -13,12 +13,13 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.collection import FAST, collect_here, fingerprints, write_config
+from tests.pages import read_section
 from throwcollect.runtimes.docker.docker_engine import connect
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "compose" / "collect.sh"
-DOCUMENT = (ROOT / "docs" / "compose.md").read_text(encoding="utf-8")
+DOCUMENT = read_section("running.md", "Docker Compose and continuous integration")
 COMMAND = "compose/collect.sh configs/quickstart.yaml 4 dataset"
 _ARM = (ROOT / "configs" / "panda.yaml").read_text(encoding="utf-8").replace("{", "{{").replace("}", "}}")
 PANDA = re.sub(r"^trials: .*", "trials: {trials}", _ARM, flags=re.MULTILINE)

@@ -1,8 +1,7 @@
-"""An image with packages, made as docs/containers.md says: nodes collect with its robot, and with its policy."""
+"""An image with packages, made as docs/running.md says: nodes collect with its robot, and with its policy."""
 
 from __future__ import annotations
 
-import re
 import shutil
 import uuid
 from collections.abc import Iterator
@@ -13,10 +12,10 @@ from docker.client import DockerClient
 
 from tests.e2e.collection import call_here, fingerprints
 from tests.e2e.plugins import PLUGINS, process_with_plugins
+from tests.pages import find_blocks, read_section
 from throwcollect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = pytest.mark.docker
-PAGE = Path(__file__).parents[2] / "docs" / "containers.md"
 ARM = """\
 robot: {name: planar_arm}
 task:
@@ -44,7 +43,7 @@ class Swing:
 @pytest.fixture
 def image(client: DockerClient, tmp_path: Path) -> Iterator[str]:
     """An image with the robot of `tests/plugins`, made by the Dockerfile of the page."""
-    (text,) = re.findall(r"```dockerfile\n(.+?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (text,) = find_blocks("dockerfile", read_section("running.md", "Containers"))
     assert f"FROM {default_tag()}\n" in text
     context = tmp_path / "context"
     for name in ("planar_arm", "planar_arm-1.0.dist-info"):

@@ -1,4 +1,4 @@
-"""The script that docs/cluster.md shows for other schedulers works."""
+"""The script that docs/running.md shows for other schedulers works."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import sys
 from pathlib import Path
 
 from tests.e2e.collection import CONFIG, FAST, collect_here, fingerprints, write_config
-
-PAGE = Path(__file__).parents[2] / "docs" / "cluster.md"
+from tests.pages import read_section
 
 
 def test_the_documented_shell_loop_collects_all_slices(tmp_path: Path) -> None:
     marked = rf"<!-- run by tests/e2e/{Path(__file__).name} -->\n```sh\n(.*?)```"
-    (script,) = re.findall(marked, PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    (script,) = re.findall(marked, read_section("running.md", "Other schedulers"), flags=re.DOTALL)
     script = script.replace("0 1 2 3", "0 1").replace("/4 ", "/2 ")
     assert "$index/2" in script
     text = CONFIG.replace("local", "inprocess") + "record: {{trials_per_shard: 2}}\n"

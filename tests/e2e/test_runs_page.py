@@ -1,18 +1,18 @@
-"""The program of docs/runs.md, as it stands there."""
+"""The programs of docs/running.md, as it stands there."""
 
-import re
 from pathlib import Path
 
 import pytest
 
 from tests.e2e.collection import FAST
+from tests.pages import find_blocks, read_section
 from throwcollect.dataset.inspect import digest
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
 
 ROOT = Path(__file__).parents[2]
-BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "runs.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+BLOCKS = find_blocks("python", read_section("running.md", "From Python"))
 
 
 def test_two_runs_of_one_program_are_followed_side_by_side(

@@ -12,7 +12,6 @@ import pytest
 
 import throwcollect
 from throwcollect import runs
-from throwcollect.runs import prepare, resume
 
 ROOT = Path(__file__).parents[2]
 OWN = "throwcollect:"
@@ -24,21 +23,6 @@ def test_dir_and_the_documentation_list_the_public_names() -> None:
     described = re.findall(r"^\| `(\w+)`", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert dir(throwcollect) == throwcollect.__all__ == sorted(throwcollect.__all__)
     assert sorted(described) == throwcollect.__all__
-
-
-def read_signatures(page: str) -> dict[str, list[str]]:
-    """Names of the parameters of each function that a table of a page describes."""
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-    cells = re.findall(r"^\| (.*?) \| ", text, re.MULTILINE)
-    calls = [call for cell in cells for call in re.findall(r"`([\w.]+)\(([^`]*)\)`", cell)]
-    return {name: re.findall(r"(\w+)(?:=|,|$)", re.sub(r"\(\)|=[^,]*", "", each)) for name, each in calls}
-
-
-def test_functions_have_the_parameters_that_are_described() -> None:
-    described = read_signatures("runs.md")
-    for function in (prepare, resume):
-        # The last parameter is for the launcher, and not documented.
-        assert described[f"runs.{function.__name__}"] == list(inspect.signature(function).parameters)[:-1]
 
 
 @pytest.mark.parametrize("face", [throwcollect, runs], ids=lambda face: face.__name__)

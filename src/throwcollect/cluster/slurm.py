@@ -177,7 +177,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
     except FileNotFoundError as error:
         raise ConfigError(
             f"{program} is missing: this machine cannot submit to Slurm",
-            hint="run this on a login node, or see docs/cluster.md for other schedulers",
+            hint="run this on a login node, or see docs/running.md for other schedulers",
         ) from error
     except subprocess.TimeoutExpired as error:
         raise WorkerError(f"{program} has not answered within {patience_s:g} s") from error
@@ -186,7 +186,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
         if any(words in line for words in _UNREACHED for line in said):
             raise WorkerError(
                 f"Slurm has no controller that {program} can reach: none is configured here, or it is down",
-                hint="run this on a login node, or see docs/cluster.md for other schedulers",
+                hint="run this on a login node, or see docs/running.md for other schedulers",
             )
         raise WorkerError(f"{program} refuses: {'; '.join(said) or f'exit code {done.returncode}'}")
     return done.stdout

@@ -1,6 +1,6 @@
 """Runs: the command line and Python programs prepare, launch, follow, scale and end them with these functions.
 
-A name is imported when it is used for the first time; see ``docs/runs.md``.
+A name is imported when it is used for the first time; see ``docs/running.md``.
 """
 
 from typing import TYPE_CHECKING

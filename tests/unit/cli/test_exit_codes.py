@@ -1,11 +1,10 @@
-"""docs/cli.md lists the exit code of every error."""
+"""docs/running.md lists the exit code of every error."""
 
 import re
-from pathlib import Path
+
+from tests.pages import read_section
 
 from throwcollect.errors import ThrowcollectError
-
-PAGE = Path(__file__).parents[3] / "docs" / "cli.md"
 
 
 def all_kinds(kind: type[ThrowcollectError]) -> list[type[ThrowcollectError]]:
@@ -13,9 +12,8 @@ def all_kinds(kind: type[ThrowcollectError]) -> list[type[ThrowcollectError]]:
 
 
 def test_the_page_on_commands_lists_all_exit_codes() -> None:
-    section = PAGE.read_text(encoding="utf-8").partition("## Exit codes")[2].partition("\n## ")[0]
-    told = [int(code) for code in re.findall(r"^\| (\d+) \|", section, flags=re.MULTILINE)]
+    listed = re.findall(r"^\| (\d+) \|", read_section("running.md", "Exit codes"), flags=re.MULTILINE)
     raised = {
         kind.exit_code for kind in all_kinds(ThrowcollectError) if kind.__module__ == ThrowcollectError.__module__
     }
-    assert told == sorted({0, *raised})
+    assert [int(code) for code in listed] == sorted({0, *raised})
