@@ -129,7 +129,7 @@ class _Goal(PendingCall):
         """Take the answer of the action, which accepts or rejects the goal."""
         self.handle = handle = future.result()
         if not handle.accepted:
-            self.give_up("the goal was rejected, and /rosout has the reason (docs/rosbridge.md)")
+            self.give_up("the goal was rejected, and /rosout has the reason (docs/ros.md)")
         elif self.is_open:
             handle.get_result_async().add_done_callback(self._take_result)
             # If the client asked to cancel the goal before the action accepted it, it is cancelled now.

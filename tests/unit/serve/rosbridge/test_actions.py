@@ -81,7 +81,7 @@ def test_a_client_can_cancel_a_goal_and_gets_no_unwanted_feedback(party: Party, 
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({}, "/follow: the goal was rejected, and /rosout has the reason (docs/rosbridge.md)"),
+        ({}, "/follow: the goal was rejected, and /rosout has the reason (docs/ros.md)"),
         ({"action": "/nobody"}, "nobody offers an action /nobody"),
         ({"action_type": "control_msgs/Follow"}, "unknown interface 'control_msgs/action/Follow'"),
         ({"args": {"path": 1}}, "path: no such field"),
