@@ -1,4 +1,4 @@
-"""From throws to a policy of LeRobot that throws at targets: collect, export, train, and score it (docs/policies.md).
+"""From throws to a policy of LeRobot that throws at targets: collect, export, train, and score it (docs/learning.md).
 
 On Python 3.12, with ``throwcollect[collect]`` and ``lerobot[dataset]``:
 ``python examples/policy_lerobot.py configs/quickstart.yaml out``.

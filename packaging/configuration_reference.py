@@ -55,7 +55,7 @@ The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet;
 Each of a set of `values` is drawn equally often. All draws follow from `seed`.
 
 With `until`, a dataset ends with the trial at which enough have succeeded. With `target`,
-`throwcollect cover` spreads throws evenly over its cells: [targets.md](targets.md).
+[`throwcollect cover`](learning.md#evenly-over-where-throws-land) spreads throws evenly over its cells.
 """
 
 _TARGETS = """\

@@ -1,23 +1,22 @@
 """Covering the cells of landings: one dataset after the other, each a fixed plan."""
 
-import re
 from pathlib import Path
 
 import pytest
 
 from tests.e2e.collection import INPROCESS, call_here, fingerprints
+from tests.pages import find_blocks, read_section
 from throwcollect.config.loader import load
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
-PAGE = (Path(__file__).parents[2] / "docs" / "targets.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The configuration on the page, with fewer throws in coarser steps."""
-    yaml = next(each for each in re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL) if "target:" in each)
+    (yaml,) = find_blocks("yaml", read_section("learning.md", "Evenly over where throws land"))
     assert "trials: 1920" in yaml
     path = tmp_path_factory.mktemp("config") / "targets.yaml"
     coarse = f"sim: {{physics_hz: 250, engine: ballistic}}\nrecord: {{rate_hz: 125}}\nrun: {{replay: 0}}\n{yaml}"

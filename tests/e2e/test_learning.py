@@ -12,9 +12,10 @@ import pytest
 
 import throwcollect
 from tests.e2e.collection import INPROCESS, call_here
+from tests.pages import find_blocks, read_section
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+PAGE = read_section("learning.md", "From a dataset to a target")
 TRIALS = 60
 
 
@@ -193,7 +194,7 @@ def test_fit_learns_the_same_model_from_a_directory_and_a_loaded_dataset(place: 
 
 
 def test_the_python_program_of_the_page_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    (program,) = find_blocks("python", PAGE)
     program = program.replace('"datasets/many"', '"data"').replace('"configs/quickstart.yaml"', '"throws.yaml"')
     x, y = middle(place).split(",")
     (place / "program.py").write_text(program.replace("(1.4, -0.2)", f"({x}, {y})"))

@@ -15,12 +15,13 @@ import pytest
 
 import throwcollect
 from tests.e2e.collection import INPROCESS, call, call_here
+from tests.pages import find_blocks, read_section
 
 pytest.importorskip("mujoco")
 
 pytestmark = pytest.mark.e2e
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
+PAGE = read_section("learning.md", "Policies")
 FEW = ("--set", "sim.engine=mujoco", "--set", "run.replay=0")
 LAB = """\
 import numpy as np
@@ -61,10 +62,6 @@ sweep: {parameters: {ball.mass_kg: {min: 0.04, max: 0.05}}}
 """
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
-
-
 def collect(name: str, *options: str) -> subprocess.CompletedProcess[str]:
     return call_here("up", "lab.yaml", "-o", name, *INPROCESS, *options)
 
@@ -86,17 +83,18 @@ def test_the_page_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caps
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
-    own, rolling, learning = blocks("python")
+    own, rolling, learning = find_blocks("python", PAGE)
     (tmp_path / "my_lab.py").write_text(own, encoding="utf-8")
     for name, language in (("policy.yaml", "yaml"), ("aims.csv", "csv")):
-        (tmp_path / name).write_text(*blocks(language), encoding="utf-8")
+        (tmp_path / name).write_text(*find_blocks(language, PAGE), encoding="utf-8")
 
     def run(program: str) -> str:
         exec(program, {})  # noqa: S102
         return capsys.readouterr().out
 
     printed = []
-    for line in "".join(blocks("sh")).replace("up -n 2 ", "up ").replace("--targets 20", "--targets 5").splitlines():
+    commands = "".join(find_blocks("sh", PAGE)).replace("up -n 2 ", "up ").replace("--targets 20", "--targets 5")
+    for line in commands.splitlines():
         words = [word for word in shlex.split(line) if word not in ("PYTHONPATH=.", "throwcollect")]
         few = {"up": (*INPROCESS, *FEW, *(("--set", "trials=60") if "quick" in line else ()))}.get(words[0], ())
         done = call_here(*words, *few)

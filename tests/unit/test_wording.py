@@ -36,7 +36,7 @@ def test_a_wrong_name_is_answered_by_those_that_contain_it_or_else_by_similar_on
 @pytest.mark.parametrize("name", ["x", "", "distance", "landing" * 100, None, 3])
 def test_a_name_that_is_like_none_is_answered_by_all_or_by_the_page(name: object) -> None:
     few, many = ["grid", "list", "sobol"], [f"landing_{each}_m" for each in "uvwxyzabc"]
-    assert suggest(name, few, "docs/targets.md") == "; known: grid, list and sobol"
+    assert suggest(name, few, "docs/learning.md") == "; known: grid, list and sobol"
     assert suggest(name, many, "docs/dataset.md") == "; docs/dataset.md lists all"
     assert suggest(name, many).endswith("and 4 more")
     assert suggest(name, []) == "; there is none"

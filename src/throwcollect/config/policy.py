@@ -17,7 +17,7 @@ class PolicyConfig(Section):
     """A policy in the loop."""
 
     use: str
-    """Function that makes the policy: `module:function`, or the name that a package gives it (docs/policies.md)."""
+    """Function that makes the policy: `module:function`, or the name that a package gives it (docs/learning.md)."""
     rate_hz: Annotated[int, Field(ge=1, le=10000)] = 50
     """Commands per simulated second; must divide `sim.physics_hz`."""
     observation: list[str] = []
