@@ -75,7 +75,7 @@ if [ -z "$named" ] && command -v "$uv" > /dev/null; then
     echo "uv cannot have Python 3.11: ${said##*cause: }"
 fi
 
-because="for which pybullet has no wheel: MuJoCo simulates, whose throws land some millimetres elsewhere (docs/engines.md)"
+because="for which pybullet has no wheel: MuJoCo simulates, whose throws land some millimetres elsewhere (docs/robots.md)"
 if [ -z "$named" ]; then set -- python3 python3.12 python3.13 python3.14; fi
 for python; do
     suits "$python" "(3, 12)" "(3, 15)" "$MAKES" && make_with "$python" ", $because"

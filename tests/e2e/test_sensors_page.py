@@ -1,4 +1,4 @@
-"""The page on sensors, block by block and command by command."""
+"""The section on sensors, block by block and command by command."""
 
 import re
 import shlex
@@ -10,23 +10,20 @@ import pytest
 
 import throwcollect
 from tests.e2e.collection import INPROCESS, call_here
+from tests.pages import find_blocks, read_section
 
 images = pytest.importorskip("PIL.Image")
 
 pytestmark = pytest.mark.e2e
-PAGE = (Path(__file__).parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
-
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
+PAGE = read_section("robots.md", "Cameras and lidars")
 
 
 def test_the_page_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
-    for name, text in zip(("seen.yaml", "other.yaml", "random.yaml"), blocks("yaml"), strict=True):
+    for name, text in zip(("seen.yaml", "other.yaml", "random.yaml"), find_blocks("yaml", PAGE), strict=True):
         (tmp_path / name).write_text(text, encoding="utf-8")
     printed = {}
-    for line in "".join(blocks("sh")).replace("up -n 2 ", "up ").splitlines():
+    for line in "".join(find_blocks("sh", PAGE)).replace("up -n 2 ", "up ").splitlines():
         words = shlex.split(line)[1:]
         # Sensors see what was recorded, whatever has simulated it.
         few = {"up": (*INPROCESS, "--set", "run.replay=0"), "plan": ()}.get(words[0])
@@ -55,7 +52,7 @@ def test_the_page_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caps
     assert list(front[0].sensors) == ["front"]
     eyes = throwcollect.load(tmp_path / "data" / "random")
     assert len({throw.sensors["eye"].intrinsics[0, 0] for throw in eyes}) == 4
-    exec("\n".join(blocks("python")), {})  # noqa: S102
+    exec("\n".join(find_blocks("python", PAGE)), {})  # noqa: S102
     said = capsys.readouterr().out
     assert "SensorFrames(side: 1" in said
     assert "(96, 96, 3) uint8" in said

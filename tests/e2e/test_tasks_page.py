@@ -1,4 +1,4 @@
-"""The page on tasks, command by command and file by file, with few trials."""
+"""The sections on tasks, command by command and file by file, with few trials."""
 
 import os
 import re
@@ -14,30 +14,30 @@ import tomllib
 import throwcollect
 from tests.e2e.collection import INPROCESS, call_here
 from tests.e2e.plugins import process_with_plugins
+from tests.pages import find_blocks, read_section
 from throwcollect.config.loader import load
 
 pytest.importorskip("mujoco")
 
 pytestmark = pytest.mark.e2e
 ROOT = Path(__file__).parents[2]
-BODIES, OBJECT, INTO, SLIDE, OWN = re.split(
-    r"^## (?:Another object than a ball|Throw into a bin|Slide a puck|A task of your own)$",
-    (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8"),
-    flags=re.MULTILINE,
+HEADINGS = (
+    "Things that stand in the world",
+    "Another object than a ball",
+    "Throw into a bin",
+    "Slide a puck",
+    "A task of your own",
 )
+BODIES, OBJECT, INTO, SLIDE, OWN = (read_section("robots.md", heading) for heading in HEADINGS)
 CHEAP = ("--set", "run.replay=0", "--set", "record.rate_hz=50", "--set", "sim.engine=mujoco")
 Call = Callable[..., "subprocess.CompletedProcess[str]"]
-
-
-def blocks(language: str, text: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
 def run(text: str, call: Call, *few: str) -> dict[str, str]:
     """Call the commands of a part of the page, `up` with further options; returns what each printed, by its name."""
     printed = {}
     # The runtime `inprocess` has only one simulation.
-    for line in "".join(blocks("sh", text)).replace("up -n 2 ", "up ").splitlines():
+    for line in "".join(find_blocks("sh", text)).replace("up -n 2 ", "up ").splitlines():
         program, *words = shlex.split(line)
         if program == "throwcollect":
             done = call(*words, *((*INPROCESS, *few) if words[0] == "up" else ()))
@@ -47,7 +47,7 @@ def run(text: str, call: Call, *few: str) -> dict[str, str]:
 
 
 def test_the_world_with_a_table_is_right_and_its_table_can_be_swept(tmp_path: Path) -> None:
-    yaml, moving, _files = blocks("yaml", BODIES)
+    yaml, moving, _files = find_blocks("yaml", BODIES)
     (tmp_path / "table.yaml").write_text(yaml, encoding="utf-8")
     config = load(tmp_path / "table.yaml")
     table = config.scene.bodies["table"]
@@ -58,7 +58,7 @@ def test_the_world_with_a_table_is_right_and_its_table_can_be_swept(tmp_path: Pa
     assert list(throw.bodies) == ["ball", "can"]
     assert throw.bodies["can"].position[0] == pytest.approx((1.5, -0.25, 0.58), abs=2e-3)
     assert {"can_x_m", "can_wz_radps"} <= set(throw.to_pandas().columns)
-    (block,) = blocks("yaml", OBJECT)
+    (block,) = find_blocks("yaml", OBJECT)
     (tmp_path / "block.yaml").write_text(block, encoding="utf-8")
     thrown = throwcollect.Simulator(tmp_path / "block.yaml").throw()
     assert (thrown.outcome, thrown.object.name) == ("landed", "block")
@@ -69,11 +69,11 @@ def test_a_throw_that_is_aimed_at_a_bin_stays_in_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "configs", "configs")
-    (yaml,) = blocks("yaml", INTO)
+    (yaml,) = find_blocks("yaml", INTO)
     assert yaml in Path("configs/bin.yaml").read_text(encoding="utf-8")
     printed = run(INTO, call_here, "--trials", "100", *CHEAP)
     assert "throw 0: in_bin: " in printed["throw"]
-    (program,) = blocks("python", INTO)
+    (program,) = find_blocks("python", INTO)
     coarse = program.replace("range(10)", "range(3, 10, 4)")
     assert coarse != program
     exec(coarse, {"__name__": "__main__"})  # noqa: S102
@@ -86,7 +86,7 @@ def test_a_puck_that_is_aimed_at_a_place_rests_there(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "configs", "configs")
-    (yaml,) = blocks("yaml", SLIDE)
+    (yaml,) = find_blocks("yaml", SLIDE)
     assert yaml in Path("configs/slide.yaml").read_text(encoding="utf-8")
     printed = run(SLIDE, call_here, "--trials", "60", *CHEAP)
     assert "60: 60 at_rest" in printed["up"]
@@ -95,7 +95,7 @@ def test_a_puck_that_is_aimed_at_a_place_rests_there(
     # The throw is simulated with Bullet, and the model was learned with MuJoCo.
     (miss,) = re.findall(r"throw 0: at_rest: .* miss_m ([\d.]+)$", printed["throw"], flags=re.MULTILINE)
     assert float(miss) < 0.15
-    (program,) = blocks("python", SLIDE)
+    (program,) = find_blocks("python", SLIDE)
     exec(program, {"__name__": "__main__"})  # noqa: S102
     distance, law = map(float, re.findall(r"slid ([\d.]+) m; .* is ([\d.]+) m", capsys.readouterr().out)[0])
     assert distance == pytest.approx(law, rel=0.05)

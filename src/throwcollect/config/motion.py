@@ -51,7 +51,7 @@ class MotionFile(Section):
     """Trajectory family."""
     file: Annotated[str, Key(Effect.RUN, swept=False, operator=True)]
     """CSV, Parquet, npz, HDF5 or MCAP file, a directory of such files, or a LeRobot dataset
-    (docs/motions.md); a relative path starts at the directory of the configuration file."""
+    (docs/robots.md); a relative path starts at the directory of the configuration file."""
     motion: Annotated[float, Field(ge=0, multiple_of=1)] | str | None = None
     """The motion, by its number in the file, from 0, or by its name; null: each trial has the next one, and after the
     last one the first one again."""

@@ -100,7 +100,7 @@ class SimConfig(Section):
 
     engine: EngineName = "bullet"
     """Physics engine: `bullet` simulates contacts; so does `mujoco`, which is faster and computes throws that differ by
-    some millimetres (docs/engines.md); `ballistic` is for trying things out: an arm that is always where its commands
+    some millimetres (docs/robots.md); `ballistic` is for trying things out: an arm that is always where its commands
     are, and a ball that leaves the spoon when the spoon would have to pull it. Packages may add others."""
     physics_hz: Annotated[int, Field(ge=100, le=10000)] = 500
     """Physics steps per simulated second; also the controllers' update rate."""

@@ -84,7 +84,7 @@ def check_choices(task: str, sampler: str) -> None:
     """Reject names of a task and a sampler that do not exist, and a task that cannot be loaded."""
     for option, name, known in (("--task", task, names_of("tasks")), ("--sampler", sampler, samplers())):
         if name not in known:
-            how = "" if option == "--sampler" or find_near(name, known) else "; docs/tasks.md describes how to add one"
+            how = "" if option == "--sampler" or find_near(name, known) else "; docs/robots.md describes how to add one"
             raise ConfigError(f"{option} {name}: no such {option[2:]} is installed{suggest(name, known)}{how}")
     load_member("tasks", task)
 

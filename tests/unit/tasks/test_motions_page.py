@@ -1,4 +1,4 @@
-"""docs/motions.md: the example and the commands work, and the motion of another program's DMP becomes one of ours."""
+"""Motions in docs/robots.md: the commands work, and the motion of another program's DMP becomes one of ours."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tests.e2e.collection import call_here
+from tests.pages import find_blocks, read_section
 
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import draw_plan
@@ -16,7 +17,7 @@ from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import trajectory_of
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "motions.md").read_text(encoding="utf-8")
+PAGE = read_section("robots.md", "Motions from files")
 CONFIG = ROOT / "configs" / "motions.yaml"
 
 
@@ -60,7 +61,7 @@ class OtherDmp(SimpleNamespace):
 
 
 def test_a_dmp_of_pydmps_becomes_one_of_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    (code,) = find_blocks("python", PAGE)
     weights = np.random.default_rng(1).uniform(-30, 30, (2, 10))
     dmp = OtherDmp(y0=np.array([-1.9, -0.1]), goal=np.array([-1.2, 0.2]), w=weights, dt=0.002)
     monkeypatch.chdir(tmp_path)

@@ -18,7 +18,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.tasks.starter import begin_at_default, make_starter, samplers
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
-ADD = "; docs/tasks.md describes how to add one"
+ADD = "; docs/robots.md describes how to add one"
 
 
 @pytest.mark.parametrize("sampler", samplers())
