@@ -51,7 +51,7 @@ def list_decisions() -> str:
     """A page that leads to all decisions, by their headings."""
     paths = sorted((ROOT / "docs" / "decisions").glob("*.md"))
     headings = [(path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# "), path.name) for path in paths]
-    items = [f"- [{heading}]({name})" for heading, name in headings]
+    items = [f"- {name[:4]}: [{heading}]({name})" for heading, name in headings]
     return "\n".join(["# Decisions", "", "Why things are as they are, one page a question.", "", *items, ""])
 
 
