@@ -211,7 +211,7 @@ bench-full: $(READY_DEV)
 	$(BIN)/python -m bench.full --engine bullet
 	$(BIN)/python -m bench.full --engine mujoco
 
-# What is published (docs/releasing.md): checked, and tried in an environment of its own.
+# What is published (CONTRIBUTING.md): checked, and tried in an environment of its own.
 dist: | $(VENV)/bin/python
 	rm -rf dist build/release build/tried
 	packaging/environment.sh build/release $(BIN)/python
