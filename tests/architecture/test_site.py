@@ -34,7 +34,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_pages_from_outside_of_docs_link_into_the_site(site: Path) -> None:
     assert 'href="configuration.html"' in (site / "index.html").read_text(encoding="utf-8")
     assert 'href="docs/' not in (site / "index.html").read_text(encoding="utf-8")
-    assert 'href="../contributing.html"' in (site / "decisions" / "0021-urdf-of-components.html").read_text(encoding="utf-8")
+    decision = (site / "decisions" / "0021-urdf-of-components.html").read_text(encoding="utf-8")
+    assert 'href="../contributing.html"' in decision
     decisions = (site / "decisions" / "index.html").read_text(encoding="utf-8")
     for path in (ROOT / "docs" / "decisions").glob("*.md"):
         assert f'href="{path.stem}.html"' in decisions
