@@ -80,7 +80,7 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 
 # What a contributor runs in between, in less than a minute on two cores: the rules of the house, the API of nodes on the embedded
 # backend, and all units but those that write, read, learn from, serve, draw or simulate whole datasets.
-SLOW := cli coordinator dataset derive engines export learning replay report runs runtimes serve sim slimming test_simulator.py view wheels
+SLOW := cli coordinator dataset derive engines export learning replay report runs runtimes serve sim test_simulator.py view wheels
 test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 

@@ -109,31 +109,3 @@ def test_raises_are_documented() -> None:
         str(path.relative_to(ROOT)): list(find_undocumented(MODULES[path], errors)) for path in list_public_modules()
     }
     assert {path: each for path, each in found.items() if each} == {}
-
-
-def test_the_rule_finds_an_undocumented_raise() -> None:
-    text = '''
-class OwnError(ValueError): ...
-def made(path) -> OwnError: ...
-def silent():
-    raise OwnError
-def says_too_little():
-    """Do it."""
-    try:
-        raise KeyError("caught")
-    except LookupError:
-        raise made(1) from None
-def says_it():
-    """Do it.
-
-    Raises:
-        ValueError: If it cannot
-            be done.
-        OSError: If the disk fails.
-    """
-    def inner():
-        raise KeyError("not its own")
-    raise made(2)
-'''
-    errors = Errors({Path(): text})
-    assert list(find_undocumented(text, errors)) == ["says_too_little raises OwnError"]

@@ -72,18 +72,3 @@ def test_functions_that_other_rooms_import_have_precise_types() -> None:
         if not is_document(name)
     }
     assert found == set()
-
-
-def test_the_rule_finds_loosely_typed_functions_and_fields() -> None:
-    code = """
-def read() -> dict[str, Any]: ...
-def write(entries: Iterable[Mapping[str, object]]) -> None: ...
-def count() -> dict[str, int]: ...
-class Dataset:
-    facts: Mapping[str, Any]
-    _kept: Mapping[str, Any]
-    def as_dict(self) -> dict[str, object]: ...
-"""
-    names = [name for definition in parse(code).body for name in loose_names(definition)]
-    assert names == ["read", "write", "Dataset.facts", "Dataset.as_dict"]
-    assert [name for name in names if is_document(name)] == ["Dataset.as_dict"]
