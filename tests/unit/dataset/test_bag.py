@@ -19,8 +19,7 @@ from ruamel.yaml import YAML
 from tests.pages import read_section
 
 from rclzenoh.interfaces import type_hash
-from throwcollect.dataset import bag
-from throwcollect.dataset.bag import BAG_SECTION, FileSummary, bag_information, to_yaml
+from throwcollect.dataset.bag import BAG_SECTION
 from throwcollect.robots.talos import TALOS
 
 ALL_TOPICS = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
@@ -159,11 +158,3 @@ def test_rosbags_reads_counts_times_and_qos_as_the_metadata_says(full: Path) -> 
             latched = each.topic in LATCHED
             assert qos.durability == (QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE)
             assert each.digest == type_hash(each.msgtype)
-
-
-def test_the_metadata_of_as_many_files_as_a_dataset_may_have_can_be_read() -> None:
-    files = [
-        FileSummary(f"{'n' * 64}_{number}.mcap", 10**18, 2 * 10**18, {0: 10**9}) for number in range(10_000, 10_002)
-    ]
-    one, two = (len(to_yaml({BAG_SECTION: bag_information(files[:count], (), {})})) for count in (1, 2))
-    assert one + (two - one) * bag.MOST_FILES < bag._MOST_BYTES

@@ -14,7 +14,6 @@ from throwcollect import verify_dataset
 from throwcollect.config.loader import load
 from throwcollect.config.scene import FileBodyConfig, MeshConfig
 from throwcollect.config.values import with_sensors
-from throwcollect.dataset.carried_robot import copy_carried, list_carried, pack_robot, unpack_robot
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials, merge, render_sensors
@@ -34,22 +33,21 @@ sweep:
   parameters: {{task.end.arm_right_4_joint: {{min: -0.7, max: -0.4}}, task.duration_s: {{min: 1.0, max: 1.2}}}}
 run: {{replay: 0}}
 """
-ENGINES = ("bullet", "mujoco")
 
 
-def write_sources(directory: Path, engine: str) -> Path:
+def write_sources(directory: Path) -> Path:
     directory.mkdir()
     write_box(directory / "table.obj", (0, 0, 0), (600, 1200, 50))
     write_l_shape(directory)
-    return write_config(directory, trials=4, text=SHAPES, sim=f"engine: {engine}")
+    return write_config(directory, trials=4, text=SHAPES, sim="engine: mujoco")
 
 
-@pytest.fixture(scope="module", params=ENGINES)
-def carrying(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module")
+def carrying(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A dataset whose sources lie elsewhere now."""
-    pytest.importorskip({"bullet": "pybullet"}.get(request.param, request.param))
+    pytest.importorskip("mujoco")
     place = tmp_path_factory.mktemp("shapes")
-    collect_here(write_sources(place / "source", request.param), place / "carrying")
+    collect_here(write_sources(place / "source"), place / "carrying")
     (place / "source").rename(place / "moved")
     return place / "carrying"
 
@@ -121,17 +119,6 @@ def test_a_shape_that_is_lost_comes_back_by_the_configuration(
     done = call_here("up", carrying.parent / "moved" / "small.yaml", "--resume", dataset, *INPROCESS)
     assert done.returncode == 0, done.stderr
     assert verify_dataset(dataset, replay=1) == []
-
-
-def test_shapes_pass_as_a_text_to_another_machine(carrying: Path, tmp_path: Path) -> None:
-    unpack_robot(pack_robot(Dataset.open(carrying).config), tmp_path)
-    packed = {path.name: path.read_bytes() for path in (tmp_path / "bodies").iterdir()}
-    assert packed == {path.name: path.read_bytes() for path in (carrying / "bodies").iterdir()}
-
-
-def test_a_model_carries_the_shapes_of_its_dataset(carrying: Path, tmp_path: Path) -> None:
-    copy_carried(carrying, tmp_path)
-    assert sorted(list_carried(tmp_path)) == sorted(f"bodies/{path.name}" for path in (carrying / "bodies").iterdir())
 
 
 def test_another_shape_is_found_by_its_digest(carrying: Path, tmp_path: Path) -> None:

@@ -12,12 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, write_config
 
-from throwcollect import fit, verify_dataset
+from throwcollect import verify_dataset
 from throwcollect.config.loader import load
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import filter_trials, merge
-from throwcollect.errors import ConfigError
 from throwcollect.export.export import export
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.motions import motions_of
@@ -145,17 +144,3 @@ def test_motions_that_are_lost_come_back_by_the_configuration(
     done = call_here("up", place / "moved" / "small.yaml", "--resume", dataset, *INPROCESS)
     assert done.returncode == 0, done.stderr
     assert verify_dataset(dataset, replay=1) == []
-
-
-def test_other_motions_are_found_although_the_manifest_has_them(carrying: Path, tmp_path: Path) -> None:
-    (tmp_path / "other.csv").write_text("time_s,arm_right_4_joint_rad\n0,-1.9\n1,-0.5\n")
-    config = load(carrying / "config.yaml")
-    other = config.task.trajectory.model_copy(update={"file": str(tmp_path / "other.csv")})
-    # What this process has read is found by its digest, so another one is asked for.
-    with pytest.raises(ConfigError, match=r"its motions are not those of task\.trajectory\.sha256"):
-        motions_of(other.model_copy(update={"sha256": "0" * 64}), robot_of(config))
-
-
-def test_no_model_is_fitted_to_motions_of_a_file(carrying: Path) -> None:
-    with pytest.raises(ConfigError, match="there is nothing between them"):
-        fit(carrying)

@@ -11,7 +11,6 @@ import pytest
 from ruamel.yaml import YAML
 from tests.unit.dataset.conftest import Collection
 
-import throwcollect
 from throwcollect.config.loader import load
 from throwcollect.dataset.data_card import data_card
 from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE, Provenance, read_provenance
@@ -25,15 +24,6 @@ def test_the_data_card_has_the_header_that_hubs_of_datasets_read(dataset: Path) 
     assert fields["configs"] == [{"config_name": "throws", "data_files": "throws.parquet"}]
     assert fields["size_categories"] == ["n<1K"]
     assert "| landed | 7 |" in text
-
-
-def test_the_data_card_says_how_the_collection_was_run(dataset: Path) -> None:
-    text = (dataset / "README.md").read_text()
-    for fact in (
-        f"| throwcollect | {throwcollect.__version__} |",
-        "| simulations | 2 |",
-    ):
-        assert fact in text
 
 
 def test_the_data_card_tells_between_which_values_each_key_varies_and_in_which_unit(

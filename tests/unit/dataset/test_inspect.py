@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from throwcollect.cli.dataset.info import info as show_info
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.episode.episode_message import header_to_json
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
@@ -75,17 +74,3 @@ def test_a_digest_that_differs_from_the_metadata_is_an_error(dataset: Path) -> N
     path.write_text(path.read_text().replace(info(dataset).digest, "0" * 64))
     with pytest.raises(DatasetError, match="digest"):
         digest(dataset)
-
-
-def test_info_prints_the_summary_before_it_reports_a_missing_recording(
-    dataset: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    missing = info(dataset).shards
-    shard = next(iter(sorted(dataset.glob("*.mcap"))))
-    shard.unlink()
-    assert missing > 1
-    with pytest.raises(
-        DatasetError, match=f"{shard.name} is missing\n  try: throwcollect resume .* collects the trials"
-    ):
-        show_info(dataset)
-    assert capsys.readouterr().out.startswith("trials ")

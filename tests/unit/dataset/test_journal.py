@@ -1,17 +1,12 @@
 from __future__ import annotations
 
-import errno
 import json
-import time
 from contextlib import closing
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from throwcollect.dataset import journal as journal_module
 from throwcollect.dataset.journal import Journal, measure_collected_s, read_journal, was_open
-from throwcollect.errors import DatasetError
 
 
 def journal_of(directory: Path, *lines: str) -> None:
@@ -36,20 +31,6 @@ def test_journal_events_are_read_back_in_order_with_their_times(tmp_path: Path) 
     assert events[0].time_s <= events[1].time_s <= events[2].time_s
     lease = json.loads((tmp_path / "logs" / "journal.jsonl").read_text().splitlines()[1])
     assert (lease["trial"], lease["simulation"]) == (3, "sim_0")
-
-
-def test_a_journal_that_could_not_be_written_can_be_opened_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with monkeypatch.context() as full:
-        full.setattr(journal_module, "write_all", fail)
-        with pytest.raises(DatasetError, match="No space left"):
-            Journal(tmp_path)
-    with closing(Journal(tmp_path)):
-        pass
 
 
 def test_an_incomplete_line_in_the_journal_does_not_spoil_the_next(tmp_path: Path) -> None:
@@ -87,16 +68,6 @@ def test_pauses_between_processes_do_not_count_as_collecting_time(tmp_path: Path
     assert measure_collected_s(tmp_path) is None
     journal_of(tmp_path, line("opened", 10.0), line("commit", 12.5), line("opened", 1000.0), line("finished", 1004.0))
     assert measure_collected_s(tmp_path) == 6.5
-
-
-def test_the_collecting_time_does_not_depend_on_a_clock_that_is_set_meanwhile(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with closing(Journal(tmp_path)) as journal:
-        a_year_on = time.time() + 365 * 86_400.0
-        clocks = SimpleNamespace(time=lambda: a_year_on, monotonic=time.monotonic)
-        monkeypatch.setattr("throwcollect.dataset.journal.time", clocks)
-        assert journal.measure_collected_s() < 60.0
 
 
 def test_the_collecting_time_is_the_one_that_the_finished_event_states(tmp_path: Path) -> None:

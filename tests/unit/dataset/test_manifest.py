@@ -109,20 +109,6 @@ def test_the_quick_check_finds_shortened_and_missing_files(dataset: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        '{"name": "quick", "resources": [{}]}',
-    ],
-)
-def test_a_malformed_manifest_is_refused(dataset: Path, text: str) -> None:
-    (dataset / MANIFEST).write_text(text)
-    with pytest.raises(DatasetError, match=MANIFEST):
-        read_manifest(dataset)
-    assert [finding.file for finding in verify(dataset)] == [MANIFEST]
-
-
-@pytest.mark.parametrize(
     ("key", "value"),
     [
         ("path", "../metadata.yaml"),

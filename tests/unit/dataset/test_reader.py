@@ -2,8 +2,6 @@ from __future__ import annotations
 
 import multiprocessing
 import pickle
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -39,12 +37,6 @@ def trials(dataset: Dataset) -> list[int]:
 
 def last_position(throw_dataset: Dataset, index: int) -> list[float]:
     return [float(each) for each in throw_dataset[index].ball.position[-1]]
-
-
-def test_importing_the_package_loads_no_large_package() -> None:
-    heavy = {"numpy", "pyarrow", "pydantic", "mcap", "rosbags"}
-    code = f"import sys, throwcollect; print(sorted({heavy} & set(sys.modules)))"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 def test_a_loaded_dataset_has_its_table_and_its_throws_by_position(loaded: Dataset, collected: Path) -> None:
@@ -124,17 +116,9 @@ def test_a_selection_that_makes_no_sense_is_an_error(loaded: Dataset, which: Any
         loaded.select(which)
 
 
-def test_the_repr_of_a_dataset_names_directory_outcomes_and_parameters(with_gaps: Dataset) -> None:
-    text = repr(with_gaps)
-    for part in (str(with_gaps.directory), "7 throws", "5 landed", "1 refused", "1 lost", "task.duration_s"):
-        assert part in text
-    assert repr(with_gaps[0]).startswith("Throw(0: landed at x = ")
-
-
-@pytest.mark.parametrize(("method", "processes"), [("fork", 3), ("spawn", 1)])
-def test_a_dataset_can_be_read_by_other_processes(loaded: Dataset, method: str, processes: int) -> None:
+def test_a_dataset_can_be_read_by_other_processes(loaded: Dataset) -> None:
     expected = [last_position(loaded, number) for number in range(7)]
-    with multiprocessing.get_context(method).Pool(processes) as pool:
+    with multiprocessing.get_context("fork").Pool(3) as pool:
         assert pool.starmap(last_position, [(loaded, number) for number in range(7)]) == expected
 
 
@@ -162,18 +146,6 @@ def test_no_recording_stays_open_after_reading(loaded: Dataset) -> None:
     assert loaded.trajectories(threads=2)
     assert ".mcap" not in Path("/proc/self/maps").read_text()
     assert not [link for link in Path("/proc/self/fd").iterdir() if link.resolve().suffix == ".mcap"]
-
-
-def test_opening_a_directory_near_a_dataset_names_that_dataset(dataset: Path, tmp_path: Path) -> None:
-    for wrong in (dataset.parent, dataset / "throws.parquet"):
-        with pytest.raises(DatasetError, match="holds no dataset") as caught:
-            Dataset.open(wrong)
-        assert caught.value.hint == str(dataset)
-    (tmp_path / "empty").mkdir()
-    for wrong in (tmp_path / "empty", tmp_path / "nowhere"):
-        with pytest.raises(DatasetError, match="holds no dataset") as caught:
-            Dataset.open(wrong)
-        assert caught.value.hint is None
 
 
 def test_a_dataset_of_another_format_is_refused(dataset: Path) -> None:
@@ -205,35 +177,9 @@ def test_opening_a_dataset_names_the_missing_file_and_the_remedy(dataset: Path, 
     assert caught.value.hint == f"throwcollect resume {dataset}"
 
 
-@pytest.mark.parametrize("contents", [b"\x89 nothing of the kind", b""])
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("throws.parquet", "is damaged"),
-        ("plan.parquet", "is damaged"),
-        ("metadata.yaml", "cannot be read: no UTF-8 text|not the metadata of a rosbag2 bag"),
-    ],
-)
-def test_opening_a_dataset_names_the_damaged_file_and_the_remedy(
-    dataset: Path, contents: bytes, name: str, message: str
-) -> None:
-    (dataset / name).write_bytes(contents)
-    with pytest.raises(DatasetError, match=message) as caught:
-        throwcollect.load(dataset)
-    assert caught.value.path == dataset / name
-    assert caught.value.hint == f"throwcollect resume {dataset}"
-
-
 @pytest.mark.parametrize("shard", ["../quick_00001.mcap", "quick\0.mcap"])
 def test_a_table_of_throws_cannot_name_other_files(dataset: Path, shard: str) -> None:
     change_table(dataset / "throws.parquet", "shard", 4, shard)
     with pytest.raises(DatasetError, match=r"throws\.parquet: shard is '.*' in some row") as caught:
         Dataset.open(dataset)
     assert caught.value.hint == f"throwcollect resume {dataset}"
-
-
-def test_reading_an_episode_names_the_missing_shard(dataset: Path) -> None:
-    loaded = Dataset.open(dataset)
-    (dataset / "quick_00001.mcap").unlink()
-    with pytest.raises(DatasetError, match=r"quick_00001\.mcap: cannot be read"):
-        loaded.episode(4)

@@ -16,7 +16,6 @@ from tests.unit.dataset.mutations import Mutation, any_mutation, mutate
 
 from throwcollect.dataset.mcap_reader import WholeEpisode, open_mcap, scan_file
 from throwcollect.episode.chunk import Chunk
-from throwcollect.errors import DatasetError
 
 SHARD = "quick_00001.mcap"
 
@@ -110,9 +109,3 @@ def test_an_episode_with_changed_samples_and_a_fitting_crc_is_not_found(
     chunk = replace(episode.chunk, data=data, crc=zlib.crc32(contents)).record()
     behind = run.offset + episode.chunk.record_size
     assert find_in(path, whole[: run.offset] + chunk + whole[behind:]) == [3, 5]
-
-
-def test_a_scan_of_a_directory_is_an_error_and_a_missing_file_has_no_episodes(tmp_path: Path) -> None:
-    assert not list(scan_file(tmp_path / "missing.mcap"))
-    with pytest.raises(DatasetError, match="cannot be read: not a file"):
-        list(scan_file(tmp_path))

@@ -59,18 +59,10 @@ def test_a_null_value_fulfils_only_comparisons_with_none() -> None:
     ("text", "message"),
     [
         ("outcome = 'landed'", "invalid syntax"),
-        ("", "is none of: column"),
-        ("not " * 5000 + "trial > 1", "nested|too complex|recursion"),
         ("outcome == landed", "no column landed; docs/dataset.md lists all"),
-        ("task.duration_s > 1", r"no column task\.duration_s; did you mean .task_duration_s.\?"),
         ("landing_x_m", "is no condition"),
-        ("outcome > 3", "no kernel matching input types"),
         ("outcome is 'landed'", "`is` is for None alone"),
-        ("outcome in 'landed'", "`in` for a list"),
-        (f"trial == {'9' * 400}", "too large"),
-        ("abs(trial, 1) > 0", "cannot be evaluated"),
         ("__import__('os').system('true')", "is none of: column"),
-        ("(lambda: 1)", "is none of: column"),
     ],
 )
 def test_a_wrong_expression_is_refused_with_the_argument(text: str, message: str) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.e2e.collection import call_here
 
 import throwcollect
 from throwcollect.config.loader import load
@@ -71,13 +70,6 @@ def test_sessions_append_to_a_dataset_that_is_finished_after_each_episode(
     assert "collecting with it again" not in card
 
 
-def test_directories_of_other_contents_are_refused(session: SessionDataset, tmp_path: Path) -> None:
-    (tmp_path / "taken").mkdir()
-    (tmp_path / "taken" / "notes.txt").touch()
-    with pytest.raises(ConfigError, match=r"holds notes\.txt"):
-        SessionDataset(tmp_path / "taken", CONFIG, name="sim_0")
-
-
 def test_sessions_of_other_configurations_are_refused(
     session: SessionDataset, recorded: tuple[EpisodeHeader, Samples]
 ) -> None:
@@ -104,17 +96,6 @@ def test_episode_after_one_that_cannot_be_written_takes_its_place(
         assert verify(session.directory) == []
     assert session.append(*recorded)[0] == 1
     assert verify(session.directory) == []
-
-
-def test_commands_say_that_nothing_can_be_simulated_again(
-    session: SessionDataset, recorded: tuple[EpisodeHeader, Samples]
-) -> None:
-    session.append(*recorded)
-    session.close()
-    for words, code in (("dataset verify", 0), ("dataset replay --all", 2), ("resume", 4)):
-        done = call_here(*words.split(), session.directory)
-        assert done.returncode == code
-        assert "can be simulated again" in (done.stdout + done.stderr).replace("cannot", "can")
 
 
 def test_datasets_of_two_sessions_can_be_merged(

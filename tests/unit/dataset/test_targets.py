@@ -27,7 +27,6 @@ from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.derivation import filter_trials, merge
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.errors import ConfigError
 from throwcollect.export.throw_source import ExportSource
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.tasks.throw.throw_config import ThrowConfig
@@ -210,24 +209,3 @@ def test_merged_throws_keep_their_targets(targeted: Path, tmp_path: Path) -> Non
     assert verify(tmp_path / "some") == []
     filter_trials(tmp_path / "both", tmp_path / "none", where="trial < 7")
     assert [throw.target for throw in Dataset.open(tmp_path / "none")] == [{}] * 7
-
-
-def test_info_and_the_data_card_summarize_the_misses(targeted: Path) -> None:
-    misses = sorted(throw.miss_m for throw in Dataset.open(targeted) if throw.miss_m is not None)
-    found = info(targeted).misses["miss_m"]
-    assert (found.targets, found.measured) == (3, 3)
-    assert (found.median, found.largest) == (misses[1], misses[2])
-    median, share90 = f"{100 * misses[1]:.2f} cm", f"{100 * found.share90:.2f} cm"
-    assert f"miss_m    3 of 3 targets: median {median}, 9 of 10 below {share90}\n" in describe(info(targeted))
-    assert f"| `miss_m` | 3 | 3 | {median} | {share90} |" in (targeted / "README.md").read_text()
-
-
-def test_a_longer_list_is_refused_if_earlier_targets_differ(targeted: Path, tmp_path: Path) -> None:
-    from throwcollect.coordinator.resume import _extend
-
-    old = Dataset.open(targeted).plan
-    longer = plan_targeted(tmp_path / "longer", LIST + "0.95,0.0,1.3\n").plan
-    assert len(_extend(targeted, old, longer).trials) == 5
-    other = plan_targeted(tmp_path / "other", LIST.replace("1.6", "1.61")).plan
-    with pytest.raises(ConfigError, match=r"the list begins with other trials or targets than .* has"):
-        _extend(targeted, old, other)

@@ -75,21 +75,6 @@ def test_a_table_of_throws_without_one_of_its_columns_is_refused(collection: Col
         read_throws(directory, collection.plan)
 
 
-@pytest.mark.parametrize("column", ["shard", "chunk_offset", "samples", "digest"])
-def test_a_row_with_only_a_part_of_the_place_of_its_episode_is_refused(
-    collection: Collection, tmp_path: Path, column: str
-) -> None:
-    path = collection.collect(tmp_path / "dataset") / "throws.parquet"
-    table = pq.read_table(path)
-    values = table[column].to_pylist()
-    values[1] = None
-    place = table.schema.get_field_index(column)
-    path.unlink()
-    pq.write_table(table.set_column(place, table.schema.field(place), [values]), path)
-    with pytest.raises(DatasetError, match=r"throws\.parquet: row 2: has only a part of the place of an episode"):
-        read_throws(path.parent, collection.plan)
-
-
 def test_the_row_of_a_trial_is_found_wherever_it_stands() -> None:
     table = pa.table({"trial": [4, None, 0, 2], "outcome": ["a", "b", "c", "d"]})
     for trial, outcome in {0: "c", 2: "d", 4: "a"}.items():

@@ -1,17 +1,14 @@
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
 import throwcollect
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.trajectories import list_columns
-from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.talos import TALOS
 
 COLUMNS = tuple(list_columns(["ball"]))
@@ -84,46 +81,6 @@ def test_padded_trajectories_have_one_shape(loaded: Dataset) -> None:
             assert np.array_equal(row[:length], one[name])
             assert np.isnan(row[length:]).all()
     assert found.padded("time_s", fill=-1).min() == -1
-
-
-def test_unknown_columns_joints_and_positions_of_trajectories_are_errors(loaded: Dataset) -> None:
-    with pytest.raises(ConfigError, match=r"no column 'ball_colour'"):
-        loaded.trajectories(["ball_colour"])
-    with pytest.raises(ConfigError, match="Talos has no joint 'elbow'"):
-        loaded.trajectories(joints=["elbow"])
-    found = loaded.trajectories(["time_s"])
-    for look in (found.__getitem__, found.padded):
-        with pytest.raises(KeyError, match="stamps_ns"):
-            look("stamps_ns")
-    with pytest.raises(IndexError):
-        found[7]
-    assert np.array_equal(found[np.int64(-1)]["time_s"], found[6]["time_s"])
-
-
-def with_column(dataset: Dataset, name: str, values: list[Any]) -> Dataset:
-    index = dataset.throws.schema.get_field_index(name)
-    throws = dataset.throws.set_column(index, dataset.throws.schema.field(name), pa.array(values))
-    return replace(dataset, throws=throws)
-
-
-@pytest.mark.parametrize("threads", [1, 2])
-def test_trajectories_refuse_a_row_with_the_offset_of_another_trial(loaded: Dataset, threads: int) -> None:
-    offsets = loaded.throws["chunk_offset"].to_pylist()
-    wrong = with_column(loaded, "chunk_offset", [offsets[1], offsets[0], *offsets[2:]])
-    with pytest.raises(DatasetError, match=r"quick_00000\.mcap: byte \d+: starts at \d+ ns(.|\n)*expected: \d+ ns"):
-        wrong.trajectories(threads=threads)
-
-
-def test_trajectories_refuse_a_recording_with_a_flipped_bit(dataset: Path) -> None:
-    loaded = throwcollect.load(dataset)
-    path, start = dataset / "quick_00002.mcap", loaded[6].row["chunk_offset"]
-    whole = path.read_bytes()
-    for place in range(start + 60, start + 5000, 397):
-        contents = bytearray(whole)
-        contents[place] ^= 1
-        path.write_bytes(contents)
-        with pytest.raises(DatasetError, match=rf"quick_00002\.mcap: byte {start}: chunk: "):
-            loaded.trajectories(["time_s"])
 
 
 @pytest.mark.parametrize("topics", [["clock"], ["clock", "tf", "controller_state"]])

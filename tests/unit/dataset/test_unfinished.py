@@ -11,8 +11,6 @@ import pytest
 import throwcollect
 from throwcollect.dataset import reader, recovery
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.inspect import info
-from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
 
@@ -48,25 +46,6 @@ def test_an_unfinished_dataset_has_rows_of_the_trials_that_have_ended(
     )
     with pytest.raises(DatasetError, match=r"throwcollect\.digest is missing"):
         _ = dataset.digest
-
-
-def test_a_dataset_that_is_being_collected_advises_wait_and_not_resume(collection: Any, tmp_path: Path) -> None:
-    directory = tmp_path / "dataset"
-    create(directory, collection.plan)
-    with pytest.raises(DatasetError, match=r"is not finished: it has no metadata\.yaml\n  try: throwcollect resume /"):
-        info(directory)
-    with closing(DatasetWriter.open(directory)) as writer:
-        collection.fill(writer, [0, 1])
-        with pytest.warns(
-            throwcollect.UnfinishedDatasetWarning,
-            match=r"is being collected: it has 2 of 7 trials so far; `throwcollect wait --run /.*/dataset` waits",
-        ):
-            throwcollect.load(directory)
-        for read in (info, verify):
-            with pytest.raises(
-                DatasetError, match=r"is being collected: .*\n  try: throwcollect wait --run /.*/dataset$"
-            ):
-                read(directory)
 
 
 def test_an_incomplete_last_episode_of_an_unfinished_dataset_is_left_out(collection: Any, tmp_path: Path) -> None:

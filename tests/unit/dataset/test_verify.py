@@ -18,13 +18,11 @@ from tests.unit.dataset.damage import SHARD, change_table, find_facts, find_stor
 from tests.unit.dataset.mutations import fit_manifest
 
 from throwcollect.config.loader import load
-from throwcollect.dataset.creation import create
 from throwcollect.dataset.mcap_file import McapFile, episode_run
 from throwcollect.dataset.verify import verify
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
 
 THROWS, PLAN, METADATA = "throws.parquet", "plan.parquet", "metadata.yaml"
@@ -209,9 +207,3 @@ def test_an_episode_that_no_simulation_records_is_found(
     findings = verify(collection.collect(tmp_path / "dataset", change=change_one))
     assert {(finding.file, finding.place) for finding in findings} == {("quick_00000.mcap", "trial 2")}
     assert any(problem in finding.problem for finding in findings)
-
-
-def test_verify_of_an_unfinished_dataset_is_an_error(collection: Collection, tmp_path: Path) -> None:
-    create(tmp_path / "dataset", collection.plan)
-    with pytest.raises(DatasetError, match="is not finished"):
-        verify(tmp_path / "dataset")

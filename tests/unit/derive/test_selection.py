@@ -226,9 +226,3 @@ def test_filtering_an_episode_that_differs_from_its_digest_in_the_table_is_refus
         shutil.copy(shard, dataset / shard.name)
     with pytest.raises(DatasetError, match=r"trial 0: digest .*\n.* as throws.parquet says"):
         filter_trials(dataset, tmp_path / "some", where="trial == 0")
-
-
-def test_merge_refuses_an_empty_list(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"^directories: got none\n  expected: at least one dataset"):
-        merge([], tmp_path / "new")
-    assert list(tmp_path.iterdir()) == []

@@ -2,13 +2,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
 from ruamel.yaml import YAML
 
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels, Qos
-from throwcollect.errors import ConfigError
 from throwcollect.robots.description import full_description
 
 URDF = full_description(Config())
@@ -47,8 +45,3 @@ def test_the_text_of_a_qos_is_its_profile_in_yaml() -> None:
     assert qos.text.startswith(
         "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: transient_local\n"
     )
-
-
-def test_a_text_that_is_no_urdf_is_refused() -> None:
-    with pytest.raises(ConfigError, match="cannot be read as robot description"):
-        Channels(Config(), "nothing")

@@ -16,12 +16,10 @@ from mcap.records import Message, MessageIndex
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder, MessageTable
-from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
-from throwcollect.robots.talos import TALOS
 
 URDF = full_description(Config())
 ALL = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
@@ -155,33 +153,3 @@ def test_records_that_do_not_fit_the_number_of_samples_are_refused(encoder: Chun
     ]:
         with pytest.raises(DatasetError, match=message):
             MessageTable(broken, count)
-
-
-def test_records_without_the_expected_topics_or_layout_hold_no_samples(
-    encoder: ChunkEncoder, make_samples: Any
-) -> None:
-    contents = encoder.encode(make_samples(2))[0].contents
-    size = 9 + struct.unpack_from("<Q", contents, 1)[0]
-    with pytest.raises(DatasetError, match="no messages of odometry"):
-        _ = MessageTable(contents[:size], 1).samples
-    framed = contents[: len(contents) // 2].replace(b"head_1_joint\0", b"head_1_joint1")
-    with pytest.raises(DatasetError, match="messages of /joint_states have another layout"):
-        _ = MessageTable(framed, 1).samples
-
-
-def test_samples_for_joints_other_than_the_recorded_ones_are_refused(
-    encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any
-) -> None:
-
-    def record(contents: bytes) -> Chunk:
-        return Chunk.of(contents, zstandard.compress(contents), start_ns=10**10, end_ns=10**10 + 49 * 4_000_000)
-
-    contents = encoder.encode(make_samples(50))[0].contents
-    assert Episode(header, record(contents)).samples(TALOS.joints).position.shape == (50, 32)
-    renamed = Episode(header, record(contents.replace(b"head_1_joint", b"neck_1_joint")))
-    assert renamed.table.joints == tuple(joint.replace("head_1", "neck_1") for joint in TALOS.joints)
-    assert renamed.samples().position.tolist() == make_samples(50).position.tolist()
-    with pytest.raises(DatasetError, match=r"joint states of .*\n.*head_1_joint"):
-        renamed.samples(TALOS.joints)
-    with pytest.raises(DatasetError, match=r"joint states of .*\n.*shoulder_joint, elbow_joint"):
-        renamed.samples(("shoulder_joint", "elbow_joint"))

@@ -2,11 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio
-import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.frames import read_frames
-from throwcollect.errors import ConfigError
 from throwcollect.robots.description import full_description
 from throwcollect.robots.talos import TALOS
 
@@ -55,22 +53,3 @@ def test_the_rotation_at_one_angle_equals_that_computed_with_many() -> None:
     angles = np.random.default_rng(1).uniform(-7, 7, size=(500, 3))[:, 1]
     alone = np.concatenate([frame.rotation_at(angles[row : row + 1]) for row in range(len(angles))])
     assert alone.tobytes() == frame.rotation_at(angles).tobytes()
-
-
-LINKS = "<link name='a'/><link name='b'/>"
-
-
-@pytest.mark.parametrize(
-    ("urdf", "message"),
-    [
-        ("no xml", "cannot be read as robot description"),
-        (f"<robot>{LINKS}</robot>", "links a and b are not connected"),
-        (
-            f"<robot>{LINKS}<joint name='j' type='floating'><parent link='a'/><child link='b'/></joint></robot>",
-            "joint j is floating",
-        ),
-    ],
-)
-def test_an_unreadable_robot_description_is_refused(urdf: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=message):
-        read_frames(urdf, base_height=1.0)

@@ -132,21 +132,3 @@ def test_fields_after_fields_of_every_kind_are_found() -> None:
     assert read.stamp.nanosec == 5
     assert [p.value.double_array_value.tolist() for p in read.new_parameters] == [[1.0, 2.0], [3.0, math.pi]]
     assert [p.name for p in read.new_parameters] == ["a", "bcd"]
-
-
-def test_a_layout_does_not_describe_messages_with_other_constant_bytes() -> None:
-    layout = joint_states(TALOS.joints).layout
-    message = bytearray(layout.template)
-    np.frombuffer(message, layout.dtype)["position"] = 1.5
-    assert layout.describes_message(message)
-    message[layout.template.index(b"arm_left_1_joint")] ^= 1
-    assert not layout.describes_message(message)
-    assert not layout.describes_message(message[:-1])
-
-
-@pytest.mark.parametrize(
-    ("path", "message"), [("nonsense", "no numbers at 'nonsense'"), ("header", "do not lie side by side")]
-)
-def test_paths_to_fields_that_are_no_adjacent_numbers_are_refused(path: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        MessageLayout(get_message("sensor_msgs/msg/JointState")(), [path])

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 import shutil
-import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -26,7 +24,6 @@ from throwcollect.derive.derivation import sample
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.export.export import export
 from throwcollect.export.throw_source import unit_of
-from throwcollect.extras import MissingExtraError
 from throwcollect.members import load_member
 from throwcollect.runs.preparation import prepare, resume
 
@@ -98,29 +95,6 @@ def test_the_card_of_a_hub_dataset_names_its_data_in_the_header(to: str, exporte
         assert list(directory.glob(each["data_files"])), each
 
 
-@pytest.mark.parametrize(
-    ("rate_hz", "text"),
-    [
-        (None, "The samples are those that were recorded, at 250 Hz."),
-        (50, "Each is one of the 250 Hz record, unchanged: every 5th. Nothing is filtered: what is faster than 25 Hz"),
-        (60, "They lie between those of the 250 Hz record: positions of joints and bodies on the cubic"),
-    ],
-)
-def test_the_card_explains_the_rate_of_the_samples(rate_hz: int | None, text: str, exported: Export) -> None:
-    assert text in (exported("npz", rate_hz) / "README.md").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("to", FORMATS)
-def test_the_summary_of_an_export_has_the_right_counts_and_size(
-    to: str, exported: Export, source: Path, tmp_path: Path
-) -> None:
-    found = export(source, tmp_path / "again", to=to)
-    assert (found.trials, found.episodes, found.rate_hz, found.format) == (6, 4, 250, to)
-    assert found.samples == info(source).samples
-    assert found.size_bytes == sum(path.stat().st_size for path in exported(to).rglob("*") if path.is_file())
-    assert [path.name for path in tmp_path.iterdir()] == ["again"]
-
-
 @pytest.mark.parametrize("to", FORMATS)
 def test_an_export_of_a_damaged_dataset_leaves_no_files(to: str, source: Path, tmp_path: Path) -> None:
     broken = Path(shutil.copytree(source, tmp_path / "in" / "dataset"))
@@ -134,49 +108,16 @@ def test_an_export_of_a_damaged_dataset_leaves_no_files(to: str, source: Path, t
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_an_output_directory_that_is_not_empty_is_refused(source: Path, tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("precious")
-    with pytest.raises(ConfigError, match="exists"):
-        export(source, tmp_path, to="npz")
-    with pytest.raises(ConfigError, match="exists"):
-        export(source, tmp_path / "mine.txt", to="npz")
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-
-
 def test_an_empty_output_directory_is_accepted(source: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     export(source, tmp_path / "empty", to="npz")
     assert (tmp_path / "empty" / "throws.npz").exists()
 
 
-def test_an_unknown_format_is_refused_with_a_list_of_the_formats(source: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="unknown format 'docx'; known: parquet, npz, lerobot, hdf5 and mat"):
-        export(source, tmp_path / "out", to="docx")
-
-
 @pytest.mark.parametrize("rate_hz", [0, -5, 251])
 def test_a_rate_below_1_or_above_the_recorded_one_is_refused(rate_hz: int, source: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"^rate_hz: {rate_hz} samples per second\n  expected: 1 to 250"):
         export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("to", FORMATS)
-def test_a_dataset_without_episodes_cannot_be_exported(to: str, make_collection: Any, tmp_path: Path) -> None:
-    empty = make_collection({"trials": 2}).collect(tmp_path / "empty", lost=[0, 1])
-    with pytest.raises(DatasetError, match="none of its 2 trials has an episode to export"):
-        export(empty, tmp_path / "out", to=to)
-    assert not (tmp_path / "out").exists()
-
-
-def test_export_to_hdf5_without_h5py_says_what_to_install(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(
-        MissingExtraError, match=r"h5py, which is not installed\n  try: pip install 'throwcollect\[export\]'"
-    ):
-        export(source, tmp_path / "out", to="hdf5")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -12,7 +12,6 @@ from tests.unit.export.conftest import (
     Export,
     actions_of,
     moving_columns,
-    table_of,
     throws_of,
 )
 
@@ -71,14 +70,3 @@ def test_datasets_in_the_hdf5_file_state_their_units_and_components(exported: Ex
         assert file["throws/landing_x_m"].attrs["unit"] == "m"
         assert file.attrs["digest_of_dataset"] == info(source).digest
         assert Config.model_validate_json(file.attrs["config"]) == Dataset.open(source).config
-
-
-def test_the_exported_table_has_all_trials(exported: Export, source: Path) -> None:
-    with h5py.File(exported("hdf5") / "throws.hdf5") as file:
-        for name, values in table_of(source).items():
-            column = file["throws"][name]
-            if h5py.check_string_dtype(column.dtype):
-                assert column.asstr()[:].tolist() == [value or "" for value in values]
-            else:
-                missing = -1 if column.dtype.kind == "i" else np.nan
-                assert np.array_equal(column, [missing if value is None else value for value in values], equal_nan=True)

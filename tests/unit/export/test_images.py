@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import pickle
-import shutil
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from tests.unit.dataset.damage import flip
 from tests.unit.export.conftest import actions_of
 
 import throwcollect
@@ -218,15 +216,6 @@ def test_a_throw_that_lacks_frames_is_found(seen: Path, tmp_path: Path, monkeypa
     monkeypatch.setattr(SensorFrames, "stamps_ns", property(lambda self: stamps(self)[:-5]))
     with pytest.raises(DatasetError, match=r"trial 0: front has \d+ frames, and there are more or fewer samples"):
         export(seen, tmp_path / "out", to="hdf5")
-
-
-def test_frames_of_a_damaged_recording_name_their_dataset(seen: Path, tmp_path: Path) -> None:
-    shutil.copytree(seen, tmp_path / "damaged")
-    row = throwcollect.load(seen)[0].row
-    flip(tmp_path / "damaged" / f"{row['shard']}", row["chunk_offset"] + 2000)
-    frames = throwcollect.FrameDataset(tmp_path / "damaged")
-    with pytest.raises(DatasetError, match=r"damaged.*trial 0(.|\n)*dataset verify"):
-        [frames[number] for number in range(8)]
 
 
 def test_frames_for_training_are_those_of_throws_with_their_signals_and_actions(seen: Path) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.unit.export.conftest import MOVING, WITH_EPISODE, Export, table_of, throws_of
+from tests.unit.export.conftest import MOVING, WITH_EPISODE, Export, throws_of
 
 from throwcollect.dataset.inspect import info
 from throwcollect.robots.talos import TALOS
@@ -27,12 +27,3 @@ def test_exported_arrays_equal_the_samples_of_the_dataset(
             for name, values in expected[trial].items():
                 assert np.array_equal(archive[name][offsets[number] : offsets[number + 1]], values), name
         assert {len(archive[name]) for name in expected[0]} == {offsets[-1]}
-
-
-def test_the_exported_table_has_all_trials(exported: Export, source: Path) -> None:
-    throws = np.load(exported("npz") / "throws.npz")
-    for name, values in table_of(source).items():
-        kind = throws[name].dtype.kind
-        missing = {"U": "", "i": -1, "f": None}[kind]
-        found = [None if kind == "f" and np.isnan(value) else value for value in throws[name].tolist()]
-        assert found == [missing if value is None else value for value in values], name

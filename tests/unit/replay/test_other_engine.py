@@ -9,7 +9,6 @@ import pytest
 
 from throwcollect import progress_log
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError
 from throwcollect.replay.audit import Deviation, Distribution, distributions, simulate_with
 from throwcollect.simulator import Simulator
 
@@ -28,24 +27,6 @@ def test_a_distribution_covers_only_values_that_both_throws_have() -> None:
         ),
         Distribution("apex_z_m", 3, 1.0, pytest.approx(3**0.5), 0.0, 3.0),
     ]
-
-
-def test_replaying_with_the_same_or_an_unknown_engine_is_refused(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    from throwcollect.config.schema import Config
-
-    class Stored:
-        config = Config()
-
-    monkeypatch.setattr(Dataset, "open", lambda _: Stored())
-    with pytest.raises(
-        ConfigError,
-        match=r"--engine bullet: the throws of .* are by bullet themselves\n  expected: mujoco or ballistic$",
-    ):
-        simulate_with(tmp_path, "bullet", [0])
-    with pytest.raises(ConfigError, match=r"--engine physx: there is no such engine; known: mujoco and ballistic$"):
-        simulate_with(tmp_path, "physx", [0])
 
 
 def test_deviations_are_those_of_the_rows_of_both_engines(dataset: Path) -> None:

@@ -7,20 +7,7 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.errors import ConfigError
 from throwcollect.replay.audit import verify_dataset
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"replay": -1}, "replay: got -1\n  expected: 0 or more"),
-        ({"processes": 0}, "processes: got 0\n  expected: 1 or more"),
-    ],
-)
-def test_verify_refuses_wrong_numbers_of_throws_and_processes(dataset: Path, arguments, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"^{message}$"):
-        verify_dataset(dataset, **arguments)
 
 
 def test_throws_that_come_out_differently_are_found(make_collection: type[Collection], tmp_path: Path) -> None:
