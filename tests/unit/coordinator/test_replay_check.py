@@ -93,12 +93,6 @@ def test_a_replay_check_compares_the_chosen_trials_even_if_others_were_begun(che
     assert started == [CHOSEN, choose_trials(sorted(kept), count=2, seed=PLAN.config.seed)]
 
 
-def test_a_replay_process_begun_early_that_fails_is_replaced(check, rows, started) -> None:
-    check.begin([10**6, 10**6 + 1])
-    assert compare(check, rows) is not None
-    assert started == [[10**6, 10**6 + 1], CHOSEN]
-
-
 @pytest.mark.parametrize(
     ("early", "change", "said"),
     [
@@ -116,25 +110,12 @@ def test_a_trial_that_replays_differently_is_an_error(check, rows, early, change
     assert f"trial {CHOSEN[1]}: {said}" in str(caught.value.evidence)
 
 
-def test_a_replay_process_that_fails_is_an_error(check, rows, tmp_path) -> None:
-    (tmp_path / "data" / "plan.parquet").unlink()
-    with pytest.raises(DatasetError, match=r"plan\.parquet"):
-        compare(check, rows)
-
-
 def test_a_replay_process_that_is_killed_is_an_error(check, rows) -> None:
     check.begin(NUMBERS)
     for process in multiprocessing.active_children():
         process.kill()
     with pytest.raises(WorkerError, match="a process that simulates trials again was killed"):
         compare(check, rows)
-
-
-def test_closing_a_replay_check_ends_its_process(check) -> None:
-    check.begin(NUMBERS)
-    assert len(multiprocessing.active_children()) == 1
-    check.close()
-    assert multiprocessing.active_children() == []
 
 
 def test_a_replay_check_of_no_trials_starts_no_process(tmp_path, started) -> None:

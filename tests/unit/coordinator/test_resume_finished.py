@@ -18,7 +18,6 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.errors import DatasetError
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
 TRIALS = 4
@@ -185,16 +184,6 @@ def test_a_damaged_configuration_is_an_error_or_is_restored(
     damage(dataset / "config.yaml")
     assert trials.go_on(dataset)[0] == ALL
     assert contents(dataset) == contents(sound)
-
-
-def test_resume_refuses_a_dataset_whose_configuration_was_changed(trials: Trials, dataset: Path) -> None:
-    text = (dataset / "config.yaml").read_text()
-    (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
-    before = contents(dataset)
-    other = trials.plan.config.model_copy(update={"seed": 1})
-    with pytest.raises(DatasetError, match="the plan belongs to another configuration"):
-        resume(other, dataset, sweep_directory=dataset)
-    assert contents(dataset) == before
 
 
 @pytest.mark.parametrize(("name", "lost"), [("plan.parquet", []), ("throws.parquet", []), ("quick_00001.mcap", [3])])

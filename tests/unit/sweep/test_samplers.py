@@ -123,22 +123,6 @@ def test_the_first_points_of_a_grid_beyond_64_bits_can_be_drawn():
         draw(endless, sampler="grid", trials=None)
 
 
-def test_more_trials_than_a_grid_has_are_an_error():
-    with pytest.raises(PlanError, match=r"^trials: should be at most 18, as the sweep has no more points, got 19$"):
-        draw(GRID, sampler="grid", trials=19)
-
-
-@pytest.mark.parametrize("sampler", ["sobol", "grid"])
-def test_drawing_points_without_parameters_is_an_error(sampler):
-    with pytest.raises(PlanError, match=r"^sweep\.parameters: nothing is swept\n  expected: at least one key"):
-        draw({}, sampler=sampler)
-
-
-def test_drawing_needs_a_number_of_trials():
-    with pytest.raises(PlanError, match=r"^trials: missing; the sampler uniform draws any number of trials$"):
-        draw(SPREAD, sampler="uniform", trials=None)
-
-
 @pytest.mark.parametrize("seed", [0, 7])
 @pytest.mark.parametrize("count", [1, 2, 3, 50])
 def test_latin_hypercubes_equal_those_of_scipy(count, seed):

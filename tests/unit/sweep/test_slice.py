@@ -71,11 +71,6 @@ def test_a_malformed_slice_is_refused(text: str, message: str) -> None:
         Slice.parse(text)
 
 
-def test_more_slices_than_shards_are_refused(plan: Plan) -> None:
-    with pytest.raises(ConfigError, match=r"record.trials_per_shard: 10 trials are 4 shards of 3.*5 slices"):
-        plan.slice_of(Slice(0, 5))
-
-
 def test_a_slice_of_a_plan_keeps_the_numbers_of_its_trials(plan: Plan) -> None:
     part = plan.slice_of(Slice(1, 2))
     assert [trial.number for trial in part.trials] == [6, 7, 8, 9]
