@@ -70,17 +70,6 @@ def test_a_problem_has_the_line_of_its_key_or_of_the_section_that_lacks_it(read,
     assert document.problem(location, "wrong").line == line
 
 
-def test_problems_in_overridden_values_name_no_file(read):
-    document = read("a: {b: 1, c: 2}\n")
-    document.override("a.b=3")
-    document.override("d.e={f: 1}")
-    assert document.values == {"a": {"b": 3, "c": 2}, "d": {"e": {"f": 1}}}
-    places = [
-        document.problem(location, "wrong").path for location in [("a", "b"), ("d",), ("d", "e", "f"), ("a", "c")]
-    ]
-    assert [path is None for path in places] == [True, True, True, False]
-
-
 def test_an_override_of_a_section_removes_the_lines_of_its_old_keys(read):
     document = read("a:\n  b: {c: 1}\n")
     document.override("a.b={d: 2}")
@@ -112,11 +101,7 @@ def test_a_pipe_as_configuration_is_refused_without_waiting(tmp_path):
     ("text", "message"),
     [
         ("a: 1\nb: c: d\n", "run.yaml:2: not valid YAML: mapping values are not allowed here"),
-        ("a: 1\nb: !units 3\n", "run.yaml:2: not valid YAML: could not determine a constructor for the tag '!units'"),
-        ('{1: a, "1": b}', "run.yaml: not valid YAML: a key is here twice, as a number and as a string: 1, '1'"),
         ("a: 1\nb: {c: 1, c: 2}\n", 'run.yaml:2: not valid YAML: found duplicate key "c"'),
-        ("a: &a\n  b: *a\n", "run.yaml: not valid YAML: values are nested too deeply"),
-        ("a: " + 2_000 * "[", "run.yaml: not valid YAML: values are nested too deeply"),
         (
             f"a: &a [{200 * '1,'}]\nb: &b [{200 * '*a,'}]\nc: [{200 * '*b,'}]\n",
             "run.yaml: not valid YAML: there are more than 30000 values",

@@ -41,12 +41,7 @@ def test_the_family_of_a_trajectory_may_be_left_out(write):
     ("content", "message"),
     [
         (b"", "run.yaml: the file is empty"),
-        (b"- 1\n", "run.yaml: the file should hold keys and values"),
         (b"a: 1\nb: \xff\n", "run.yaml: cannot be read: no UTF-8 text: byte 8"),
-        (
-            b"a: 1\nb: [1, 2\nc: 3\n",
-            "run.yaml:3: not valid YAML: expected ',' or ']', but got ':', while parsing a flow sequence",
-        ),
     ],
 )
 def test_a_file_that_holds_no_configuration_is_refused_with_its_line(tmp_path, content, message):
@@ -84,16 +79,7 @@ def test_overrides_replace_values_of_the_file_and_earlier_overrides(write):
     ("override", "message"),
     [
         ("trials", "an override should be KEY=VALUE, got 'trials'"),
-        ("ball..mass_kg=3", "an override should be KEY=VALUE, got 'ball..mass_kg=3'"),
-        (
-            "ball.mass_kg=[",
-            "ball.mass_kg: not valid YAML: expected the node content, but found '<stream end>', "
-            "while parsing a flow node; got '['",
-        ),
-        ("ball.mass_kg=heavy", "ball.mass_kg: should be a valid number, got 'heavy'"),
         ("bal.mass_kg=1", "bal: unknown key; did you mean 'ball'?"),
-        ("ball.mass_kg.x=1", "ball.mass_kg.x: nothing of this name can be set; got '1'"),
-        ("record.topics.7=tf", "record.topics.7: nothing of this name can be set; got 'tf'"),
     ],
 )
 def test_a_wrong_override_is_reported_without_a_line_of_the_file(problems_of, override, message):
@@ -182,10 +168,3 @@ def test_an_override_of_one_joint_keeps_the_values_of_the_others(tmp_path: Path)
     path.write_text("name: throws\n")
     with pytest.raises(ConfigError, match=r"^task\.end\.arm_right_9_joint: "):
         load(path, ["task.end.arm_right_9_joint=1"])
-
-
-def test_a_file_that_cannot_be_read_is_refused_with_the_reason(tmp_path):
-    with pytest.raises(ConfigError, match=r"missing\.yaml: no such file$"):
-        load(tmp_path / "missing.yaml")
-    with pytest.raises(ConfigError, match=r"cannot be read: not a file$"):
-        load(tmp_path)

@@ -51,17 +51,7 @@ def test_with_values_accepts_numbers_of_numpy():
     ("values", "message"),
     [
         ({"ball.mas_kg": 1}, r"^ball\.mas_kg: unknown key; did you mean 'mass_kg'\?$"),
-        (
-            {"task.trajectory.weights.arm_right_4_joint.3": 1},
-            r"^task\.[a-z_.0-9]+\.3: unknown key; known: 0, 1 and 2$",
-        ),
-        ({f"task.trajectory.weights.arm_right_4_joint.{'9' * 5000}": 1}, r"unknown key; known: 0, 1 and 2$"),
         ({"task.duration_s.x": 1}, r"^task\.duration_s\.x: unknown key; no keys are expected here$"),
-        ({"ball.mass_kg": "1"}, r"^ball\.mass_kg: should be a valid number, got '1'$"),
-        (
-            {"task.trajectory.weights.arm_right_4_joint.1": float("nan")},
-            r"^task\.trajectory\.weights\.arm_right_4_joint\.1: should be a finite number, got nan$",
-        ),
         ({"record.rate_hz": 300}, r"^record\.rate_hz: should divide sim\.physics_hz, 500, got 300$"),
     ],
 )
@@ -89,18 +79,9 @@ def test_keys_that_may_vary_between_trials_can_be_swept(key):
     [
         ("task.durations_s", "unknown key; did you mean 'task.duration_s'?"),
         (
-            "task.start.arm_right_3_joint",
-            "cannot vary from trial to trial, as task.end does not name arm_right_3_joint",
-        ),
-        ("task.end.arm_rigth_4_joint", "task.end does not name arm_rigth_4_joint; did you mean 'arm_right_4_joint'?"),
-        ("robot.joint_offsets.arm_right_4_joint", "robot.joint_offsets does not name arm_right_4_joint; there is none"),
-        (
             "task.trajectory.basis_functions",
             "cannot be swept, as it is a whole number; the values of a sweep have decimals",
         ),
-        ("task.trajectory.family", "cannot be swept, as it is not a number"),
-        ("task.points_hz", "cannot vary from trial to trial"),
-        ("tool.mass_kg", "cannot vary from trial to trial"),
         ("seed", "cannot vary from trial to trial"),
     ],
 )
