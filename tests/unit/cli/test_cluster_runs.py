@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,40 +14,9 @@ from throwcollect.cluster.cluster_run import SlicesState
 from throwcollect.cluster.slurm import ArrayTask
 from throwcollect.errors import ConfigError
 
-RUN: Any = SimpleNamespace()
-
 
 def look(*tasks: ArrayTask, complete: bool = False) -> SlicesState:
     return SlicesState(frozenset(), tasks, None, complete)
-
-
-@pytest.fixture
-def looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = [look(ArrayTask(0, "RUNNING", "n1", "")), look(ArrayTask(0, "COMPLETED", "n1", "0:0"), complete=True)]
-    monkeypatch.setattr(cluster_runs, "follow", lambda _run, **_: iter(seen))
-
-
-@pytest.mark.usefixtures("looks")
-def test_events_of_a_cluster_run_with_json_are_one_document_a_line(capsys: pytest.CaptureFixture[str]) -> None:
-    cluster_runs.print_events(RUN, as_json=True)
-    assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [
-        {"event": "task", "task": 0, "state": "running on n1"},
-        {"event": "task", "task": 0, "state": "completed on n1"},
-        {"event": "finished"},
-    ]
-
-
-def test_a_run_is_named_by_its_joining_job_if_nothing_else_was_submitted(monkeypatch: pytest.MonkeyPatch) -> None:
-    jobs = [SimpleNamespace(array="7", join="8"), SimpleNamespace(array="", join="9")]
-    run: Any = SimpleNamespace(submission=SimpleNamespace(jobs=jobs, tasks=3), directory="data")
-    assert cluster_runs.make_document(run, look())["run"] == "9"
-
-
-@pytest.mark.parametrize("named", ["2", "-1", "²", "sim_0"])
-def test_logs_of_a_task_that_does_not_exist_are_refused(named: str) -> None:
-    run: Any = SimpleNamespace(directory="data", logs={}, submission=SimpleNamespace(tasks=2))
-    with pytest.raises(ConfigError, match=f"data: has no task '{named}'"):
-        cluster_runs.print_logs(run, [named])
 
 
 def test_logs_of_a_cluster_run_are_followed_until_it_ends(

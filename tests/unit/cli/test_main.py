@@ -9,9 +9,7 @@ import sys
 
 import pytest
 
-from throwcollect.arguments import refuse_argument
 from throwcollect.cli.main import assemble, execute
-from throwcollect.errors import NotFoundError, Problem
 
 
 def describe(error: Exception, capsys: pytest.CaptureFixture[str], *, code: int = 2) -> str:
@@ -26,21 +24,11 @@ def describe(error: Exception, capsys: pytest.CaptureFixture[str], *, code: int 
     return capsys.readouterr().err
 
 
-def test_an_error_about_a_configuration_key_or_an_argument_names_it(capsys: pytest.CaptureFixture[str]) -> None:
-    both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed")])
-    assert describe(both, capsys) == "throwcollect: task.end: is not there\nseed: is not there\n"
-    assert describe(refuse_argument("where", "got 'a'", expected="b", hint="c"), capsys) == (
-        "throwcollect: where: got 'a'\n  expected: b\n  try: c\n"
-    )
-
-
 @pytest.mark.parametrize(
     ("error", "said", "code"),
     [
         (PermissionError(errno.EACCES, "Permission denied", "out"), "out: Permission denied\n", 2),
-        (OSError(errno.ENOSPC, "No space left on device", "out"), "out: No space left on device\n", 1),
         (MemoryError(), "out of memory\n  try: ", 1),
-        (KeyError("x"), "internal error: KeyError: 'x'\n  try: THROWCOLLECT_DEBUG=1", 1),
     ],
 )
 def test_an_error_of_the_system_is_one_message_without_a_traceback(

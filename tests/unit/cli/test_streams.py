@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -38,28 +37,6 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
 def test_lost_output_is_an_error_unless_the_reader_may_leave(call: str, said_last: str) -> None:
     said = run(f"lose(1)\nprint(1, flush=True)\n{call}\nprint('goes on', file=sys.stderr)")
     assert said.stderr.rstrip().endswith(said_last)
-
-
-@pytest.mark.parametrize(
-    ("output", "read"),
-    [
-        ("os.dup2(os.pipe()[1], 1)", True),
-        ("lose(1)", False),
-        ("os.dup2(os.open(os.devnull, os.O_WRONLY), 1)", True),
-        ("os.dup2(os.open('out.txt', os.O_WRONLY | os.O_CREAT), 1)", True),
-        ("os.dup2(os.openpty()[1], 1)", True),
-    ],
-)
-def test_has_reader_tells_without_writing_whether_the_reader_has_left(
-    output: str, read: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run(f"{output}\nprint(streams.has_reader(), file=sys.stderr)").stderr == f"{read}\n"
-
-
-def test_messages_are_dropped_when_standard_error_has_no_reader() -> None:
-    said = run("lose(2)\nfor _ in range(3): print('warning', file=sys.stderr)\nprint('done')")
-    assert (said.returncode, said.stdout) == (0, "done\n")
 
 
 def test_output_to_a_full_disk_is_an_error_even_if_the_reader_may_leave() -> None:

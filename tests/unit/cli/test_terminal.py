@@ -1,8 +1,6 @@
-import re
-
 import pytest
 
-from throwcollect.cli.terminal import _Bar, display
+from throwcollect.cli.terminal import display
 from throwcollect.coordinator.progress import Progress
 
 
@@ -31,15 +29,3 @@ def test_quiet_shows_only_warnings(capsys: pytest.CaptureFixture[str]) -> None:
         shown.update(progress(10, landed=10))
         shown.warn("sim_0 was lost")
     assert capsys.readouterr().err == "sim_0 was lost\n"
-
-
-@pytest.mark.parametrize("columns", [200, 60])
-def test_the_progress_bar_shows_numbers_counts_and_the_time_that_is_left(columns: int) -> None:
-    shown = _Bar()
-    console = shown._progress.console
-    console.width = columns
-    shown.update(progress(3, landed=1, self_hit=1, lost=1))
-    text = "".join(segment.text for line in console.render_lines(shown._progress.get_renderable()) for segment in line)
-    assert "3/10" in text
-    assert re.search(r"[-\d]+:[-\d]+", text)
-    assert "landed" in text
