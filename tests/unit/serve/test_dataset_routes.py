@@ -12,9 +12,6 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, make_end_fields
 
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
-
 URL = "/api/v1/collections"
 
 
@@ -116,19 +113,3 @@ def test_files_of_a_dataset_that_another_run_continues_are_refused(
     assert client.get(f"{URL}/a/files").status_code == 200
     remember("again", directory=str(directory))
     assert client.get(f"{URL}/a/files").status_code == 409
-
-
-def test_a_request_for_a_dataset_reads_no_records_of_other_datasets(
-    client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """There may be thousands of records, and each would add to the time of every request."""
-    assert directory.is_dir()
-    read: list[str] = []
-
-    def read_all(_: Records) -> list[Run]:
-        read.append("all")
-        return []
-
-    monkeypatch.setattr(Records, "all", read_all)
-    assert client.get(f"{URL}/a/files").status_code == 200
-    assert read == []

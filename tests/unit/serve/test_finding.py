@@ -14,11 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.errors import WorkerError
 from throwcollect.serve.finding import (
     Address,
     end_server,
-    ensure_server,
     find_server,
     make_page_address,
     publish,
@@ -109,15 +107,3 @@ def test_the_address_of_the_page_has_a_code_and_names_the_run() -> None:
         assert make_page_address(address, "small-1") == f"{address.url}/#code=abc&run=small-1"
         assert make_page_address(address) == f"{address.url}/#code=abc"
         assert "full" not in make_page_address(address)
-
-
-def test_a_server_that_fails_to_start_is_an_error_with_its_output(
-    state: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    script = tmp_path / "python"
-    script.write_text("#!/bin/sh\necho 'throwcollect: no such thing' >&2; exit 2\n")
-    script.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(script))
-    with pytest.raises(WorkerError, match="no server starts") as error:
-        ensure_server()
-    assert error.value.evidence == "throwcollect: no such thing"

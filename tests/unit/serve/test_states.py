@@ -6,7 +6,6 @@ from contextlib import aclosing
 
 import pytest
 
-from throwcollect.errors import ConfigError
 from throwcollect.serve import states as states_module
 from throwcollect.serve.catalogue import Catalogue
 from throwcollect.serve.state import ComponentState, WholeState
@@ -72,20 +71,5 @@ def test_thirty_clients_share_the_looks_at_the_records() -> None:
         before = world.looks
         await world.read()
         assert world.looks == before + 1
-
-    run(scenario)
-
-
-@pytest.mark.parametrize("error", [ConfigError("the disk is full"), OSError("it is gone")])
-def test_clients_keep_the_last_state_while_records_cannot_be_read(error: Exception) -> None:
-    async def scenario(world: World) -> None:
-        async with aclosing(world.follow()) as states:
-            await anext(states)
-            world.error, change = error, asyncio.ensure_future(read(states))
-            before = world.looks
-            while world.looks < before + 3:
-                await asyncio.sleep(0.005)
-            world.error, world.instances = None, 1
-            assert await change == (2, "1")
 
     run(scenario)

@@ -13,7 +13,7 @@ from throwcollect.serve.rosbridge import Bridge
 
 FJT: Any = get_action("control_msgs/action/FollowJointTrajectory")
 KIND = "control_msgs/FollowJointTrajectory"
-SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+CANCELED, ABORTED = 5, 6
 
 
 class Arm:
@@ -55,20 +55,6 @@ def send(party: Party, *joints: str, number: str = "g", **more: Any) -> None:
     party.ask(op="send_action_goal", **fields)
 
 
-def test_a_client_sends_a_goal_and_gets_feedback_and_result(party: Party, arm: Arm) -> None:
-    send(party, "a", feedback=True)
-    feedback = party.next(op="action_feedback")
-    assert (feedback["id"], feedback["action"], feedback["values"]["joint_names"]) == ("g", "follow", ["a"])
-    assert party.next(op="action_result") == {
-        "op": "action_result",
-        "id": "g",
-        "action": "follow",
-        "values": {"error_code": 0, "error_string": "done"},
-        "status": SUCCEEDED,
-        "result": True,
-    }
-
-
 def test_a_client_can_cancel_a_goal_and_gets_no_unwanted_feedback(party: Party, arm: Arm) -> None:
     send(party, "wait")
     party.ask(op="cancel_action_goal", id="g", action="follow")
@@ -83,9 +69,6 @@ def test_a_client_can_cancel_a_goal_and_gets_no_unwanted_feedback(party: Party, 
     [
         ({}, "/follow: the goal was rejected, and /rosout has the reason (docs/ros.md)"),
         ({"action": "/nobody"}, "nobody offers an action /nobody"),
-        ({"action_type": "control_msgs/Follow"}, "unknown interface 'control_msgs/action/Follow'"),
-        ({"args": {"path": 1}}, "path: no such field"),
-        ({"compression": "png"}, "compression: Input should be"),
     ],
 )
 def test_a_goal_that_cannot_be_sent_fails_with_the_reason(party: Party, arm: Arm, asked: Any, said: str) -> None:
@@ -128,17 +111,6 @@ def offer(party: Party, node: Node) -> Callable[[], Any]:
             return self.ended.result().status, self.ended.result().result.error_string
 
     return Sent
-
-
-def test_a_client_offers_an_action(party: Party, offer: Callable[[], Any]) -> None:
-    sent = offer()
-    assert (sent.asked["action"], sent.asked["action_type"], sent.asked["feedback"]) == ("swing", KIND, True)
-    assert sent.asked["args"]["trajectory"]["joint_names"] == ["a"]
-    party.ask(op="action_feedback", **sent.answer, values={"joint_names": ["b"]})
-    wait_for(lambda: sent.feedback)
-    assert sent.feedback[0].feedback.joint_names == ["b"]
-    party.ask(op="action_result", **sent.answer, values={"error_string": "fine"}, result=True)
-    assert sent.end == (SUCCEEDED, "fine")
 
 
 def test_goals_of_an_offered_action_end_with_the_status_of_the_client(party: Party, offer: Callable[[], Any]) -> None:

@@ -74,22 +74,6 @@ def test_a_bridge_is_over_when_its_router_has_gone(routers: Routers) -> None:
         Bridge(routers.connection)
 
 
-def test_each_bridge_is_in_its_own_run(routers: Routers, bridge: Bridge, connection: Connection) -> None:
-    other = Bridge(routers.connection)
-    party, stranger = Party(other), Party(bridge)
-    for each in (party, stranger):
-        each.ask(op="subscribe", topic="/words", type="std_msgs/String")
-    talkers = [Talker(routers.connection), Talker(connection)]
-    for talker, each, word in zip(talkers, (party, stranger), "ab", strict=True):
-        talker.say(word)
-        assert each.next(op="publish")["msg"]["data"] == word
-    assert [each["msg"]["data"] for each in [*party.got(), *stranger.got()]] == ["a", "b"]
-    stranger.client.close()
-    other.close()
-    for talker in talkers:
-        talker.context.try_shutdown()
-
-
 def test_a_closed_bridge_withdraws_its_topics_and_ignores_requests(routers: Routers) -> None:
     bridge = Bridge(routers.connection)
     party = Party(bridge)

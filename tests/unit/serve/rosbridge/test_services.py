@@ -38,22 +38,6 @@ def test_a_service_is_called_with_arguments_by_name_or_in_their_order(party: Par
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        ({"service": "/nobody"}, "nobody offers a service /nobody"),
-        ({"service": "/lamp", "args": {"date": True}}, "date: no such field; did you mean 'data'?"),
-        ({"service": "/lamp", "args": {"data": 1}}, "data: should be boolean, got 1"),
-        ({"service": "/lamp", "compression": "png"}, "call_service.compression: Input should be"),
-    ],
-)
-def test_a_call_that_cannot_be_made_fails_with_the_reason(party: Party, lamp: Any, asked: Any, said: str) -> None:
-    party.ask(op="call_service", id="c", **asked)
-    answer = party.next(op="service_response", id="c")
-    assert answer["result"] is False
-    assert said in answer["values"]
-
-
-@pytest.mark.parametrize(
     ("service", "arguments"),
     [
         ("get_parameters", {"names": ["x", "trial.leases"]}),
@@ -89,19 +73,6 @@ def call(node: Node, service: str = "/clock") -> Future:
     client = node.create_client(SetBool, service)
     assert client.wait_for_service(30)
     return client.call_async(SetBool.Request(data=True))
-
-
-def test_a_client_offers_a_service(party: Party, node: Node) -> None:
-    party.ask(op="advertise_service", service="clock", type="std_srvs/SetBool")
-    future = call(node)
-    asked = party.next(op="call_service")
-    assert (asked["service"], asked["args"]) == ("clock", {"data": True})
-    answer = {"op": "service_response", "id": asked["id"], "service": "clock"}
-    party.ask(**answer, values={"message": 7}, result=True)
-    party.ask(**answer, values={"messages": "a"}, result=True)
-    wait_for(future.done)
-    assert future.result() == SetBool.Response(message="7")
-    assert "waits for an answer" in party.next(op="status")["msg"]
 
 
 @pytest.mark.parametrize(

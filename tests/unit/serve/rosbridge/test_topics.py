@@ -62,13 +62,7 @@ def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"topic": "/nobody"}, "/nobody is published by nobody, and no type is named; expected: a type"),
         ({"topic": "/rosout", "type": "std_msgs/String"}, "/rosout is no std_msgs/msg/String; expected: rcl_inter"),
-        ({}, "subscribe.topic: Field required"),
-        (
-            {"topic": "/x", "type": "std_msgs/String", "throttle_rate": -1},
-            "throttle_rate: Input should be greater than or equal to 0",
-        ),
         ({"topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "nobody but the coordinator may have this"),
         ({"topic": "parameter_events"}, "it tells the signed leases"),
     ],
@@ -198,10 +192,7 @@ def test_a_latched_message_reaches_late_subscribers_until_it_is_withdrawn(party:
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"op": "advertise", "topic": "/t", "type": "std_msgs/Header"}, "/t is no std_msgs/msg/Header; expected: std_"),
-        ({"op": "publish", "topic": "/nowhere", "msg": {}}, "/nowhere is published by nobody, and no type is named"),
         ({"op": "publish", "topic": "/t", "msg": {"dat": 1}}, "dat: no such field; did you mean 'data'?"),
-        ({"op": "advertise", "topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "but the coordinator"),
         ({"op": "publish", "topic": "/sim_0/episode", "msg": {}}, "nobody but the coordinator may have this topic"),
     ],
 )

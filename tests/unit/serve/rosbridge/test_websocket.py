@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 from contextlib import suppress
 from typing import Any
@@ -13,8 +12,6 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
 
 from throwcollect.ros import HistoryPolicy, Node, QoSProfile, get_message, get_service
-from throwcollect.serve.rosbridge import websocket
-from throwcollect.serve.rosbridge.websocket import Outbox
 
 String: Any = get_message("std_msgs/msg/String")
 Trigger: Any = get_service("std_srvs/srv/Trigger")
@@ -95,22 +92,3 @@ def test_a_slow_client_loses_the_oldest_frames_and_does_not_block_others(url: st
         statuses = [each["msg"] for each in told if each["op"] == "status"]
         assert len(statuses) == 1
         assert "the oldest are dropped" in statuses[0]
-
-
-def test_the_outbox_is_bounded_in_frames_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(websocket, "MOST_FRAMES", 10)
-    monkeypatch.setattr(websocket, "MOST_BYTES", 1200)
-
-    async def find_left(frames: list[str]) -> list[str]:
-        outbox = Outbox(asyncio.get_running_loop())
-        for frame in [*frames, "end"]:
-            outbox.put(frame)
-        found: list[str] = []
-        while found[-1:] != ["end"]:
-            found.append(str(await outbox.take()))
-        return [frame for frame in found if "the oldest are dropped" not in frame]
-
-    numbers = [f"{number:04}" for number in range(30)]
-    assert asyncio.run(find_left(numbers)) == [*numbers[-9:], "end"]
-    long = [f"{number:0300}" for number in range(5)]
-    assert asyncio.run(find_left(long)) == [*long[-3:], "end"]
