@@ -282,7 +282,7 @@ def test_a_reset_restores_the_initial_speed() -> None:
 HERE, TRAJECTORIES = "tests/unit/control/test_acceptance.py", "tests/integration/test_trajectories.py"
 
 
-CONTROLLERS, STEPPING = "tests/integration/test_controllers.py", "tests/integration/test_stepping.py"
+CONTROLLERS = "tests/integration/test_controllers.py"
 
 
 ELSEWHERE = {

@@ -23,7 +23,6 @@ from throwcollect.control import (
 from .bench import JOINTS, PERIOD_NS, TALOS, Bench, Plant, constrain, goal, seconds, to
 
 UPDATES = 120
-positions = st.tuples(*[st.floats(-3, 3)] * 3)
 tolerance = st.sampled_from([0.0, 0.0, 0.005, 0.1, 0.4])
 
 
@@ -208,13 +207,3 @@ def test_the_order_of_joints_in_a_goal_does_not_matter() -> None:
     ordered.step(60)
     shuffled.step(60)
     assert all(np.array_equal(ordered.commands[k], shuffled.commands[k]) for k in range(1, 61))
-
-
-def test_refused_goals_and_broken_path_tolerances_are_logged(caplog: pytest.LogCaptureFixture) -> None:
-    bench = Bench(constrain(trajectory=0.1), Plant("frozen"))
-    bench.send(goal())
-    bench.controller.replace(goal(to(1.0, 2.1)).trajectory, bench.now_ns)
-    bench.step(20)
-    refused, stopped = (record.getMessage() for record in caplog.records)
-    assert refused.startswith("c: Empty trajectory received.")
-    assert stopped.startswith("c: Aborted due to path tolerance violation: joint j1")

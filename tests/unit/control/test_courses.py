@@ -81,9 +81,6 @@ THREE_QUARTERS = (3 * math.pi / 2, 0, 0)
 QUINTIC = {1: 1.100010, 25: 1.203516, 50: 1.6, 75: 1.996484, 100: 2.1}
 
 
-BY_ERROR = "joint j1 has position error 0.5"
-
-
 COURSES = [
     Course("B1 linear", goal(to(1.0, 2.1)), {1: 1.11, 50: 1.6, 99: 2.09, 100: 2.1, 101: 2.1}, (100, *REACHED)),
     Course(

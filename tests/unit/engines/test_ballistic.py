@@ -13,7 +13,6 @@ from tests.unit.engines.test_engine_contract import scene_with
 from throwcollect.config.schema import Config
 from throwcollect.engines.ballistic.tool_path import ToolPath
 from throwcollect.engines.engine import Scene, ToolLink
-from throwcollect.errors import ConfigError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.robots.urdf import parse_xml, read_urdf
@@ -56,11 +55,6 @@ def test_a_prismatic_joint_moves_the_tool_along_its_axis() -> None:
     x, y = math.cos(0.2) + 0.5 * math.cos(0.7), math.sin(0.2) + 0.5 * math.sin(0.7)
     assert place[0].ravel() == pytest.approx((x, y, 1.5), abs=1e-12)
     assert turn[0][:, 0] == pytest.approx((math.cos(0.7), math.sin(0.7), 0.0), abs=1e-12)
-
-
-def test_a_joint_of_another_kind_is_refused_by_name() -> None:
-    with pytest.raises(ConfigError, match="joint elbow: the engine ballistic knows no floating joints"):
-        ToolPath(planar("floating"))
 
 
 def test_the_ball_stays_in_the_spoon_until_the_spoon_brakes() -> None:

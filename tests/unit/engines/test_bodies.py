@@ -21,7 +21,6 @@ from tests.unit.engines.test_engine_contract import (
 
 from throwcollect.engines.body import HERE, BodyLink, LinkInertia, LinkShape, Placement, moments_of
 from throwcollect.engines.engine import BodyState, Engine, Observer, SceneBody, body_of, object_in, split_bodies
-from throwcollect.errors import ConfigError
 from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member
 
@@ -229,8 +228,3 @@ def test_a_state_with_bodies_is_restored_with_all_its_bits(engine: Engine) -> No
     fresh.run(still(fresh, 300), other)
     assert other == once
     fresh.close()
-
-
-def test_the_ballistic_engine_refuses_bodies() -> None:
-    with pytest.raises(ConfigError, match="no contacts: some_box"):
-        load_member("engines", "ballistic")().load(replace(SCENE, bodies=(BOX,)))

@@ -46,23 +46,10 @@ def test_triangles_are_written_with_their_normals():
     ("name", "content", "words"),
     [
         ("mesh.dae", b"<COLLADA/>", "cannot be read as a mesh"),
-        ("mesh.ply", b"ply", ".stl or .obj or .dae"),
-        ("mesh.stl", b"", "0 bytes are no whole STL"),
         ("mesh.stl", bytes(84), "without triangles"),
-        ("mesh.stl", ASCII.encode(), "no whole one in text"),
-        (
-            "mesh.stl",
-            bytes(80) + b"\xff\xff\xff\xff" + bytes(50),
-            "no whole STL of 4294967295 triangles",
-        ),
         ("mesh.stl", b"solid x\nvertex 0 0 0\nendsolid", "cannot be read as a mesh"),
-        ("mesh.stl", (ASCII.replace("2.5", "nan") + "endsolid").encode(), "coordinates beyond 1e\\+06"),
-        ("mesh.obj", b"v 0 0 0\nf 1 2 9\n", "a face uses vertex 2 of 1"),
         ("mesh.obj", b"v 0 0 0\nf 0 0 0\n", "a face uses vertex 0 of 1"),
-        ("mesh.obj", b"v 0 0 0\nf -1 -2 -1\n", "a face uses vertex -2 of 1"),
-        ("mesh.obj", b"v 0 0\nf 1 1 1\n", "cannot be read as a mesh"),
         ("mesh.obj", bytes(range(256)), "without triangles"),
-        ("mesh.obj", None, "No such file"),
     ],
 )
 def test_meshes_that_cannot_be_used_are_refused_by_their_names(name, content, words, tmp_path):

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.unit.engines.test_engine_contract import (
-    END,
     MOVING,
     PHYSICS,
     SCENE,
@@ -27,7 +26,6 @@ from throwcollect.engines.body import HERE, LinkShape
 from throwcollect.engines.engine import BodyState, Observer, Physics, Scene, object_in
 from throwcollect.engines.mujoco.mujoco_engine import MujocoEngine
 from throwcollect.engines.mujoco.scenery import make_spec, resize_object
-from throwcollect.errors import ConfigError
 
 TRIALS: list[tuple[Scene, Physics]] = [
     (SCENE, PHYSICS),
@@ -69,30 +67,9 @@ def each_alone() -> list[Watcher]:
     return [alone(number) for number in range(len(TRIALS))]
 
 
-def test_the_order_of_trials_does_not_change_them(each_alone: list[Watcher]) -> None:
-    engine = MujocoEngine()
-    forwards = [trial(engine, *each) for each in TRIALS]
-    backwards = [trial(engine, *each) for each in reversed(TRIALS)]
-    engine.close()
-    assert forwards == backwards[::-1] == each_alone
-    assert len({repr(seen.samples[-1]) for seen in forwards}) == len(TRIALS)
-
-
 def test_worlds_in_several_threads_do_not_affect_each_other(each_alone: list[Watcher]) -> None:
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(alone, range(len(TRIALS)))) == each_alone
-
-
-def test_steps_in_several_calls_give_the_same_samples_as_in_one(engine: MujocoEngine) -> None:
-    whole = Watcher()
-    engine.run(swing(600), whole)
-    begin(engine)
-    cut = Watcher()
-    for first, last in ((0, 1), (1, 138), (138, 300), (300, 333), (333, 600)):
-        cut.offset = first
-        engine.run(swing(last - first, first=first), cut)
-    assert cut.samples == whole.samples
-    assert cut.touches == whole.touches
 
 
 def test_the_ball_leaves_the_tool_only_once(engine: MujocoEngine) -> None:
@@ -169,14 +146,3 @@ def test_a_diverging_world_has_numbers_that_are_not_finite_and_can_begin_again(
     engine.run(swing(600), again)
     assert again == whole
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_robot_description_that_mujoco_cannot_load_is_refused() -> None:
-    broken = MujocoEngine()
-    joint, *others = SCENE.robot.joints
-    elastic = replace(SCENE.robot, joints=(replace(joint, kind="elastic"), *others))
-    with pytest.raises(ConfigError, match="MuJoCo cannot"):
-        broken.load(replace(SCENE, robot=elastic))
-    begin(broken)
-    assert broken.state.sample[: len(MOVING)] != END.tolist()
-    broken.close()

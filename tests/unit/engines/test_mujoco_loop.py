@@ -244,15 +244,6 @@ def test_without_numba_steps_are_taken_in_python(monkeypatch: pytest.MonkeyPatch
     assert made.made == "in Python, as Numba is not installed (try: pip install 'throwcollect[mujoco]')"
 
 
-def test_a_numba_that_fails_leaves_the_steps_to_python(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(loop, "_DIRECTORY", tmp_path)
-    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
-    monkeypatch.setattr(loop, "_HELPERS", ())
-    made = make_loop.__wrapped__()
-    assert not made.is_compiled
-    assert "\n" not in made.made
-
-
 def refuse() -> bytes:
     raise AssertionError("it is compiled already")
 
@@ -280,12 +271,3 @@ def test_the_compiled_loop_is_kept_where_it_can_be_written(monkeypatch: pytest.M
     assert loop._keep("4", refuse) == (b"code", "compiled")
     # What an earlier version has left there goes.
     assert len(list((tmp_path / "own" / "__pycache__").iterdir())) == 1
-
-
-def test_a_loop_that_can_be_kept_nowhere_is_used_all_the_same(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    monkeypatch.setattr(loop, "_DIRECTORY", tmp_path / "file" / "__pycache__")
-    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path / "file" / "state"))
-    content, made = loop._keep("1", lambda: b"code")
-    assert content == b"code"
-    assert made.startswith("compiled by each process anew")

@@ -6,18 +6,14 @@ import pinocchio
 import pytest
 
 from throwcollect.config.schema import Config, RobotConfig
-from throwcollect.errors import ConfigError
 from throwcollect.robots.description import (
     full_description,
-    joint_model,
     physics_description,
     start_posture,
 )
-from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 
 JOINTS = TALOS.joints
-PLUGINS = Path(__file__).parents[2] / "plugins"
 
 CONFIG = Config()
 MOVED = tuple(CONFIG.task.end)
@@ -55,20 +51,6 @@ def collision_shapes(urdf, posture):
         (Path(shape.meshPath).name, *np.round(place.translation, 9), *np.round(place.rotation.ravel(), 9))
         for shape, place in zip(geometry.geometryObjects, places.oMg, strict=True)
     )
-
-
-def test_the_same_configuration_gives_the_same_descriptions():
-    assert physics_description(CONFIG) == physics_description(Config())
-    assert full_description(CONFIG) == full_description(Config())
-
-
-def test_descriptions_with_different_tools_differ():
-    lengths = [0.1 + 0.01 * number for number in range(12)]
-    configs = [Config.model_validate({"tool": {"handle_length_m": length}}) for length in lengths]
-    described = [full_description(config) for config in configs]
-    assert len(set(described)) == len(configs)
-    # Some of these come from the cache, the others are made again.
-    assert [full_description(config) for config in configs] == described
 
 
 def test_by_default_joints_that_the_task_does_not_move_are_locked():
@@ -150,30 +132,3 @@ def test_merging_locked_links_keeps_every_collision_shape_in_its_place():
     assert collision_shapes(write(physics_description(CONFIG).model), posture) == collision_shapes(
         full_description(CONFIG), posture
     )
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ('name="hand_joint"', 'name="hand_link"', "a joint has the name of a link: hand_link"),
-        ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="prismatic"', "elbow_joint is prismatic"),
-    ],
-)
-def test_a_description_with_an_ambiguous_or_prismatic_joint_is_refused(
-    old: str, new: str, said: str, tmp_path: Path
-) -> None:
-    urdf = (PLUGINS / "planar_arm" / "planar_arm.urdf").read_text()
-    assert old in urdf
-    (tmp_path / "arm.urdf").write_text(urdf.replace(old, new))
-    arm = Robot(
-        name="arm",
-        title="the arm",
-        controllers={"arm_controller": ("shoulder_joint", "elbow_joint")},
-        share=lambda: tmp_path,
-        urdf="arm.urdf",
-        srdf=str(PLUGINS / "planar_arm" / "planar_arm.srdf"),
-        rest="rest",
-        hand="hand_link",
-    )
-    with pytest.raises(ConfigError, match=said):
-        joint_model(arm)

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
-from pydantic import ValidationError
-
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.errors import ConfigError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.tasks.task import trajectory_of
 
@@ -38,11 +34,3 @@ def test_the_base_of_the_robot_has_its_height() -> None:
     assert "leg" in (refusal(Feasibility(config), config) or "")
     lifted = with_values(config, {"robot.base_height_m": 1.5})
     assert refusal(Feasibility(lifted), lifted) is None
-
-
-def test_a_body_with_the_name_of_another_thing_is_refused() -> None:
-    for name in ("spoon", "ball", "talos"):
-        with pytest.raises(ValidationError, match=f"scene.bodies.{name}: should have another name"):
-            scene(name)
-    with pytest.raises(ConfigError, match="arm_right_5_link: should have another name, as a link of Talos has this"):
-        Feasibility(scene("arm_right_5_link"))

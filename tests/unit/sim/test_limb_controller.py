@@ -59,12 +59,6 @@ def test_talos_has_a_goal_tolerance_and_no_path_tolerance() -> None:
     assert set(parameters.constraints.joints) == set(parameters.joints)
 
 
-def test_the_configuration_can_make_joints_brake_when_a_goal_is_cancelled() -> None:
-    parameters = parameters_of(HEAD, hold="decelerate", max_deceleration_radps2=7.0)
-    assert parameters.measures_velocity
-    assert set(parameters.constraints.joints.values()) == {JointConstraints(goal=0.02, max_deceleration_on_cancel=7.0)}
-
-
 @pytest.mark.parametrize("seconds", [0.1, 0.7])
 def test_a_result_comes_at_the_same_time_in_stretches_and_in_steps(seconds: float) -> None:
     ends = []
@@ -158,15 +152,3 @@ def test_a_velocity_that_would_move_a_locked_joint_is_refused_by_name() -> None:
     refusal = limb.refuse_locked(Trajectory(joints, turning))
     assert refusal is not None
     assert refusal.text == f"{HEAD}: head_2_joint is locked at 0 rad (robot.locked) and cannot move"
-
-
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.parametrize("far", [1e6, 1.7e308])
-def test_joints_that_are_faster_than_any_robot_brake_too(far: float) -> None:
-    options = {"hold": "decelerate", "max_deceleration_radps2": 5.0}
-    world = LiveSimulator(Config.model_validate({"controllers": options, "sim": {"engine": "ballistic"}}))
-    world.submit(ARM, 1, goal(1.0, elbow=far))
-    world.step(150)
-    assert world.cancel(ARM, 1)
-    world.step(10)
-    assert [result.status for _, result in world.pop_results()] == [GoalStatus.CANCELED]

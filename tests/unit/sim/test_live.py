@@ -1,4 +1,3 @@
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -179,38 +178,6 @@ def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_tri
     assert simulation.now_ns / 1e9 == pytest.approx(1.0 + CONFIG.sim.max_trial_s, abs=0.1)
 
 
-def test_after_a_trial_the_ground_stops_the_ball(simulation: LiveSimulator) -> None:
-    trial(simulation)
-    run(simulation)
-    assert simulation.take_recording() is not None
-    assert simulation.submit(ARM, 3, swing()) is None
-    run(simulation)
-    assert simulation.world.object.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
-
-
-def test_a_motion_by_hand_leaves_no_trace_in_a_later_trial(simulation: LiveSimulator) -> None:
-    trial(simulation)
-    run(simulation)
-    fresh = simulation.take_recording()
-    simulation.trial.setup = TrialSetup(-1, (), CONFIG)
-    simulation.reset()
-    assert simulation.submit(ARM, 1, swing()) is None
-    run(simulation)
-    trial(simulation)
-    run(simulation)
-    later = simulation.take_recording()
-    assert fresh is not None
-    assert later is not None
-    assert later[0] == fresh[0]
-    assert np.array_equal(later[1].object_position, fresh[1].object_position)
-
-
-def test_a_run_of_a_trajectory_without_a_goal_ends(simulation: LiveSimulator) -> None:
-    assert simulation.follow(ARM, swing().trajectory) is None
-    run(simulation)
-    assert simulation.now_ns > 1e9
-
-
 def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: LiveSimulator) -> None:
     trial(simulation)
     simulation.advance(watched=True)
@@ -220,24 +187,6 @@ def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: LiveSimulat
     ] * 2
     assert simulation.now_ns == CONFIG.trial_start_ns(0)
     assert not simulation.running
-
-
-def test_a_cancelled_goal_stops_the_limb_where_it_is(simulation: LiveSimulator) -> None:
-    assert simulation.submit(ARM, 1, swing()) is None
-    for _ in range(10):
-        simulation.advance(watched=True)
-    assert simulation.cancel(ARM, 1)
-    run(simulation)
-    positions = simulation.world.joints()[0]
-    elbow = positions[simulation.world.moving.index("arm_right_4_joint")]
-    assert -1.3 < elbow < -1.1
-    assert [result.status for _, result in simulation.pop_results()] == [GoalStatus.CANCELED]
-
-
-def test_while_paused_steps_advance_the_clock_exactly(simulation: LiveSimulator) -> None:
-    simulation.set_state(StateCode.PAUSED)
-    simulation.step(10)
-    assert simulation.now_ns == 10 * 10**9 // CONFIG.sim.physics_hz
 
 
 def test_requested_steps_are_taken_stretch_by_stretch(simulation: LiveSimulator) -> None:
@@ -347,20 +296,6 @@ def test_a_result_that_comes_with_the_episode_is_still_reported() -> None:
     assert simulation.take_recording() is not None
     assert [(name, result.status) for name, result in simulation.pop_results()] == [(TORSO, GoalStatus.SUCCEEDED)]
     simulation.close()
-
-
-def test_a_real_time_factor_holds_the_clock_back(simulation: LiveSimulator) -> None:
-    trial(simulation)
-    simulation.real_time_factor = 1.0
-    simulation.fresh_samples()
-    began = time.monotonic()
-    told = []
-    for _ in range(20):
-        simulation.advance(watched=True)
-        told.append(len(simulation.fresh_samples()))
-    simulation.real_time_factor = None
-    assert time.monotonic() - began >= 20 / CONFIG.record.rate_hz
-    assert told == [1] * 20, "a sample waits for those after it"
 
 
 @pytest.mark.parametrize(("leased", "watched", "samples"), [(True, False, 12), (True, True, 1), (False, False, 1)])

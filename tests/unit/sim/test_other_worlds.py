@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from throwcollect import ConfigError, PlanError, Simulator
-from throwcollect.config.loader import load
+from throwcollect import PlanError, Simulator
 from throwcollect.dataset.throw import Throw
 
 QUICKSTART = Path(__file__).parents[3] / "configs" / "quickstart.yaml"
@@ -71,10 +70,3 @@ def test_a_weak_robot_throws_unless_its_actual_limits_are_checked() -> None:
         throw("robot.effort_scale=0.5", feasibility="actual")
     found = throw("robot.effort_scale=0.5")
     assert found.outcome != "landed" or found.row["effort_saturated_share"] > 0
-
-
-def test_zeros_of_joints_that_do_not_move_are_refused() -> None:
-    with pytest.raises(ConfigError, match=r"task\.end does not move this joint"):
-        load(QUICKSTART, ["robot.joint_offsets={arm_left_1_joint: 0.1}"])
-    with pytest.raises(ConfigError, match=r"no joint|arm_rigth"):
-        load(QUICKSTART, ["robot.joint_offsets={arm_rigth_4_joint: 0.1}"])

@@ -216,23 +216,9 @@ def test_a_policy_that_is_too_slow_is_an_error(tmp_path: Path, monkeypatch: pyte
     ("settings", "message"),
     [
         ({"rate_hz": 60}, r"task\.policy\.rate_hz: should divide sim\.physics_hz, 500, got 60"),
-        ({"observation": ["ball_m"]}, r"there is no ball_m.*; there are time_s, joint_position_rad, .*ball_position_m"),
         ({"observation": ["target_x_m"]}, r"trial 0 has no target_x_m: its plan has no targets"),
-        ({"command": "torque"}, r"task\.policy\.command"),
     ],
 )
 def test_wrong_settings_of_a_policy_name_the_key(simulator: Simulator, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         simulator.roll_out(Acts(hold), **settings)
-
-
-@pytest.mark.parametrize(
-    ("use", "message"),
-    [
-        ("no_lab:make", r"the policy no_lab:make: .* cannot be loaded: ModuleNotFoundError"),
-        ("expert", r"task\.policy\.use: there is no policy 'expert'.*module:function"),
-    ],
-)
-def test_a_policy_that_is_not_there_is_named(use: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=message):
-        Simulator(CONFIG, overrides=(*OVERRIDES, f"task.policy={{use: '{use}'}}"))

@@ -8,16 +8,13 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.control import ErrorCode, TrajectoryRefusal
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.engine import Observer, Steps
 from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
-from throwcollect.sim.limb_controller import LimbController
+from throwcollect.errors import MemberError, ThrowcollectError
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulator import Simulator
-from throwcollect.sim.world import World
 from throwcollect.tasks.task import task_of
 
 CONFIG = Config.model_validate({"sim": {"engine": "ballistic"}})
@@ -53,16 +50,6 @@ def test_a_trial_has_the_result_that_judging_its_episode_gives(engine: str) -> N
     *_, values, trajectory = episode.conditions.split("\n")
     assert (values, trajectory) == ('{"ball.mass_kg": 0.05}', task_of(trial).trajectory().digest)
     simulator.close()
-
-
-def test_a_trial_that_cannot_begin_is_an_error(simulator: Simulator, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ConfigError):
-        simulator.begin(0, {"ball.colour": 1.0})
-    monkeypatch.setattr(
-        LimbController, "refuse_locked", lambda *_: TrajectoryRefusal(ErrorCode.INVALID_JOINTS, "is locked")
-    )
-    with pytest.raises(ThrowcollectError, match="trial 0: arm_right_controller refuses its goal"):
-        simulator.begin(0, {})
 
 
 def test_an_episode_with_numbers_that_are_not_finite_is_an_error(
@@ -146,15 +133,3 @@ def test_a_sample_of_a_wrong_step_is_an_error_of_the_engine(
     monkeypatch.setattr(foreign.world.engine, "__class__", Late)
     with pytest.raises(MemberError, match="sample 1 should be of step 2, not 3"):
         foreign.step(500)
-
-
-def test_closing_or_deleting_a_simulator_closes_its_world_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    closed: list[World] = []
-    monkeypatch.setattr(World, "close", lambda world: closed.append(world))  # noqa: PLW0108 - this one is bound
-    for close_first in (True, False):
-        simulator = Simulator(CONFIG)
-        if close_first:
-            simulator.close()
-            assert len(closed) == 1
-        del simulator
-        assert len(closed) == (1 if close_first else 2)

@@ -122,17 +122,8 @@ def test_a_scope_of_a_reset_removes_what_was_spawned(simulation: LiveSimulator) 
     ("request_", "reason"),
     [
         ({"name": "Cube"}, "NAME_INVALID"),
-        ({"name": "table"}, "NAME_NOT_UNIQUE"),
-        ({"name": "arm_right_5_link"}, "NAME_NOT_UNIQUE"),
         ({"name": "talos"}, "NAME_NOT_UNIQUE"),
-        ({"resource_string": ""}, "NO_RESOURCE"),
-        ({"uri": "rack"}, "NO_RESOURCE"),
         ({"resource_string": "<sdf/>"}, "RESOURCE_PARSE_ERROR"),
-        (
-            {"resource_string": CUBE.replace('<box size="0.1 0.1 0.1"/>', '<mesh filename="a.stl"/>')},
-            "RESOURCE_PARSE_ERROR",
-        ),
-        ({"entity_namespace": "a"}, "NAMESPACE_INVALID"),
         ({"initial_pose": at(float("nan"), 0, 0)}, "INVALID_POSE"),
     ],
 )

@@ -6,7 +6,6 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError
-from throwcollect.members import load_member
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.world import World
@@ -99,14 +98,6 @@ def test_joints_are_at_the_command_at_the_end_of_each_step(world):
         assert world.joints()[0] == pytest.approx(command, abs=1e-4)
 
 
-def test_running_commands_one_by_one_equals_running_all_at_once(world):
-    at_once = throw(world)
-    world.reset(CONFIG)
-    for command in motion(CONFIG, world.moving):
-        world.run([command])
-    assert same(world.samples(), at_once)
-
-
 def test_a_throw_ends_with_the_first_sample_below_the_landing_plane(world):
     samples = throw(world)
     lowest = samples.object_position[:, 2] - CONFIG.ball.radius_m
@@ -120,12 +111,6 @@ def test_the_ground_does_not_touch_a_ball_that_lands_at_height_zero(world):
     samples = throw(world)
     assert [contact.body for contact in world.contacts()] == ["spoon"]
     assert samples.object_linear_velocity[-1, 0] == samples.object_linear_velocity[-20, 0]
-
-
-def test_steps_go_on_after_the_end_of_a_throw_on_demand(world):
-    throw(world)
-    assert world.run([motion(CONFIG, world.moving)[-1]] * 10, stop_at_end=False) == 10
-    assert world.end_reason == "landed"
 
 
 def test_a_raised_landing_plane_is_crossed_downwards_after_the_throw():
@@ -221,38 +206,12 @@ def test_a_ball_on_the_robot_touches_the_link_by_name(world):
     assert {contact.body for contact in world.contacts()} >= {"spoon", "torso_1_link"}
 
 
-@pytest.mark.parametrize(("restitution", "least", "most"), [(0.0, 0.0, 0.001), (0.8, 0.5, 0.81)])
-def test_the_bounce_of_the_ball_follows_its_restitution(restitution, least, most):
-    trial = config(scene={"landing_height_m": 1.9}, ball={"restitution": restitution})
-    world = World(trial)
-    world.place("ball", BodyState((1.0, 0.0, 0.5)))
-    world.run(still(trial, world, 200))
-    # Bullet takes from the bounce what the ball still has to fall when the step of the impact begins.
-    assert least <= world.samples().object_linear_velocity[:, 2].max() / np.sqrt(2 * 9.81 * 0.475) <= most
-    world.close()
-
-
 def test_a_reset_with_another_posture_rebuilds_the_robot(world):
     world.reset(config(robot={"posture": {"torso_2_joint": 0.3}}))
     leaning = world.samples()
     world.reset(CONFIG)
     assert leaning.position[0, TALOS.joints.index("torso_2_joint")] == 0.3
     assert leaning.object_position[0, 0] - world.samples().object_position[0, 0] > 0.1
-
-
-def test_a_ball_that_the_spoon_cannot_hold_is_refused(world):
-    with pytest.raises(ConfigError, match="falls through the floor of the cup"):
-        world.reset(config(tool={"cup_floor_radius_m": 0.03}))
-    assert throw(world).object_position[-1, 0] == pytest.approx(1.69, abs=0.02)
-
-
-@pytest.mark.parametrize("engine", ["bullet", "mujoco", "ballistic"])
-def test_an_engine_without_a_start_state_is_freed(engine, monkeypatch):
-    kind, freed = load_member("engines", engine), []
-    monkeypatch.setattr(kind, "close", lambda self, close=kind.close: freed.append(close(self)))
-    with pytest.raises(ConfigError, match=r"tool\.cup_floor_radius_m"):
-        World(config(sim={"engine": engine}, tool={"cup_floor_radius_m": 0.006}, ball={"radius_m": 0.005}))
-    assert freed == [None]
 
 
 def test_a_claw_lets_go_at_the_time_of_each_trial_without_settling_anew(monkeypatch):

@@ -52,22 +52,6 @@ def test_no_trial_of_a_robot_with_narrow_limits_is_refused(shoulder: str, elbow:
     assert "50 trials; 0 refused" in planned.stderr, (tmp_path / DEFAULT_CONFIG).read_text() + planned.stderr
 
 
-def test_a_robot_whose_joints_cannot_move_is_refused(tmp_path: Path) -> None:
-    path = limit_joints(tmp_path, 'lower="0.5" upper="0.5" velocity="20"', 'lower="-2.5" upper="2.5" velocity="0"')
-    (done,) = call_in(tmp_path, "init --robot planar_arm --task reach")
-    said = (
-        f"throwcollect: {path}: no joint of the planar arm may move by 0.02 rad, by its limits of position and velocity"
-    )
-    assert (done.returncode, done.stderr.strip()) == (2, said)
-
-
-def test_a_robot_whose_joints_cannot_move_throws_nothing(tmp_path: Path) -> None:
-    limit_joints(tmp_path, 'lower="0" upper="0" velocity="20"', 'lower="-2.5" upper="2.5" velocity="0"')
-    (done,) = call_in(tmp_path, "init --robot planar_arm")
-    said = "throwcollect: the planar arm: no joint that carries the hand can move by 0.3 rad"
-    assert (done.returncode, done.stderr.strip()) == (2, said)
-
-
 def test_a_narrow_joint_of_a_throw_keeps_its_limits(tmp_path: Path) -> None:
     limit_joints(tmp_path, 'lower="-0.02" upper="0.02" velocity="20"', LIMIT)
     written, planned = call_in(tmp_path, "init --robot planar_arm", "plan --trials 20")

@@ -84,19 +84,11 @@ def test_a_starter_explains_the_keys_of_its_task(tmp_path: Path) -> None:
     assert not [line for line in lines if "recatch_gap_s" in line]
 
 
-def test_a_missing_configuration_is_an_error_that_names_init(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match="throwcollect init writes one"):
-        load(DEFAULT_CONFIG)
-
-
 @pytest.mark.parametrize(
     ("names", "said"),
     [
         (("my.urdf", "throw", "sobol"), "my.urdf: no such robot is installed; known: talos, .*\n.*docs/robots.md"),
-        (("tallos", "throw", "sobol"), "tallos: no such robot is installed; did you mean 'talos'"),
         (("talos", "juggle", "sobol"), f"--task juggle: no such task is installed; known: .*throw.*{ADD}"),
-        (("talos", "throw", "halton"), "--sampler halton: no such sampler is installed; known: grid, uniform, "),
     ],
 )
 def test_an_unknown_robot_task_or_sampler_is_an_error_with_the_known_ones(

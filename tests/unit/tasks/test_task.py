@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError
 from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.result import ResultColumns
 from throwcollect.tasks.result_columns import Count, Number, measured
@@ -37,12 +35,6 @@ def test_the_family_of_the_configuration_shapes_the_trajectory():
     assert points.accelerations[0].any()
 
 
-def test_motion_that_cannot_be_computed_is_refused():
-    weights = {"arm_right_4_joint": [1e6] * 20}
-    with pytest.raises(ConfigError, match="settle"):
-        task_of(Config(task={"trajectory": {"family": "dmp", "weights": weights}})).trajectory()
-
-
 @dataclass(frozen=True)
 class _CountedResult(ThrowResult):
     bounces: int | None = measured(Count("How often the ball bounced."))
@@ -53,10 +45,7 @@ class _CountedResult(ThrowResult):
     ("values", "said"),
     [
         ({"surface": "sand"}, "surface: should be a number, is 'sand'"),
-        ({"bounces": 2.5}, "bounces: should be a count, is 2.5"),
         ({"bounces": np.int64(2)}, "bounces: should be a count, is "),
-        ({"surface": math.nan}, "not JSON compliant"),
-        ({"effort_saturated_share": math.inf}, "not JSON compliant"),
     ],
 )
 def test_a_result_that_the_table_cannot_hold_is_an_error_when_it_is_written(values: dict[str, Any], said: str) -> None:

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from tests.unit.tasks.throw.episodes import GRAVITY, ORIGIN, RELEASE_S, VELOCITY, episode, landing_time
 
-from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError
 from throwcollect.tasks.task import task_of
 
 HELD = ("spoon", 0.0, RELEASE_S)
@@ -124,22 +122,6 @@ def test_the_walls_of_a_bin_enclose_its_opening() -> None:
         "bin_right": [[0.8, 1.68, 0.52], [1.2, 1.7, 0.8]],
         "bin_left": [[0.8, 2.3, 0.52], [1.2, 2.32, 0.8]],
     }
-
-
-def test_keys_of_the_bin_that_contradict_each_other_are_refused(tmp_path) -> None:
-    file = tmp_path / "bin.yaml"
-    for keys, said in (
-        ("depth_m: 0.01", "task.bin.depth_m: should be 0, or at least twice wall_m, 0.01, got 0.01"),
-        ("depth_m: 0, height_m: 0.3", "task.bin.height_m: should be 0 if depth_m is 0"),
-    ):
-        file.write_text(f"task: {{name: throw_into, bin: {{{keys}}}}}\n")
-        with pytest.raises(ConfigError, match=said):
-            load(file)
-    file.write_text(
-        "task: {name: throw_into}\nscene: {bodies: {bin_floor: {shape: sphere, radius_m: 1, position_m: [0, 0, 9]}}}\n"
-    )
-    with pytest.raises(ConfigError, match=r"scene\.bodies\.bin_floor: should have another name"):
-        load(file)
 
 
 def test_a_throw_that_touches_a_body_before_it_lands_is_no_landing() -> None:

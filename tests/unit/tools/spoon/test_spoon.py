@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from throwcollect.errors import ConfigError
 from throwcollect.tools.spoon.spoon import Spoon
 from throwcollect.tools.spoon.spoon_config import SpoonConfig
 
@@ -31,11 +30,6 @@ def test_a_ball_too_large_for_the_cup_lies_on_the_rim():
 def test_a_ball_much_smaller_than_the_cup_lies_on_the_edge_of_the_floor():
     tool = Spoon(SpoonConfig(cup_floor_radius_m=0.019, cup_depth_m=0.01))
     assert gaps(tool, tool.ball_seat(0.0195)) == pytest.approx([0.0195] * 6)
-
-
-def test_a_ball_that_falls_through_the_floor_is_refused():
-    with pytest.raises(ConfigError, match=r"ball\.radius_m: a ball of radius 0\.005 m falls through the floor"):
-        Spoon(SpoonConfig(cup_floor_radius_m=0.005)).ball_seat(0.005)
 
 
 def test_the_spoon_has_its_mass_and_balances_between_handle_and_cup():
