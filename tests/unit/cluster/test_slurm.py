@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.cluster import slurm
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import ConfigError
 
 QUEUE = """\
 7|0|SIGNALING|a1|None
@@ -32,24 +32,6 @@ def test_a_task_that_slurm_warns_of_its_time_limit_counts_as_running(
         (2, True, False),
         (3, True, False),
     ]
-
-
-def test_without_a_slurm_controller_the_error_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    said = """\
-scontrol: error: resolve_ctls_from_dns_srv: res_nsearch error: Unknown host
-scontrol: error: fetch_config: DNS SRV lookup failed
-scontrol: fatal: Could not establish a configuration source
-"""
-    for name in ("squeue", "sbatch"):
-        (tmp_path / name).write_text(f"#!/bin/sh\ncat >&2 <<END\n{said}END\nexit 1\n")
-        (tmp_path / name).chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    with pytest.raises(WorkerError, match="Slurm has no controller that squeue can reach") as caught:
-        slurm.find_tasks()
-    assert "resolve_ctls" not in str(caught.value)
-    with pytest.raises(ConfigError, match="Slurm has no controller that sbatch can reach") as refused:
-        slurm.submit(tmp_path / "script")
-    assert "try: run this on a login node" in str(refused.value)
 
 
 def test_a_refusal_by_slurm_names_the_file_and_option_that_correct_it(

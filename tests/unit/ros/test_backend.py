@@ -69,15 +69,6 @@ def test_a_missing_package_or_interface_is_an_error_only_if_rclpy_is_asked_for(
         uses_rclpy()
 
 
-def test_an_rmw_that_is_not_installed_is_refused_with_a_list_of_others(ros, monkeypatch):
-    monkeypatch.setenv(RMW_VARIABLE, "rmw_cyclonedds_cpp")
-    with pytest.raises(ConfigError, match="RMW_IMPLEMENTATION is rmw_cyclonedds_cpp, which is not installed") as told:
-        uses_rclpy()
-    assert told.value.expected == "rmw_fastrtps_cpp"
-    monkeypatch.setenv(RMW_VARIABLE, "rmw_fastrtps_cpp")
-    assert uses_rclpy()
-
-
 def test_the_embedded_backend_is_used_for_zenoh_if_its_rmw_is_missing(ros, monkeypatch):
     monkeypatch.setenv(RMW_VARIABLE, "rmw_zenoh_cpp")
     assert not uses_rclpy()

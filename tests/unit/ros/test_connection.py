@@ -7,9 +7,8 @@ from tests.contract.rig import names_of
 
 from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from throwcollect import ros
-from throwcollect.errors import ConfigError
 from throwcollect.ros.connection import Connection
-from throwcollect.ros.middleware import VARIABLE, Middleware
+from throwcollect.ros.middleware import VARIABLE
 from throwcollect.ros.router import router
 from throwcollect.run_key import KEY_VARIABLE, RunKey
 
@@ -53,9 +52,3 @@ def test_a_process_can_be_in_several_runs_whatever_its_environment_says(key, mon
             for node in nodes.values():
                 ros.shutdown(context=node.context)
     assert dict(os.environ) == before
-
-
-def test_joining_a_run_on_other_middleware_is_refused(key):
-    way = Connection("udp/127.0.0.1:7447", key, 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
-    with pytest.raises(ConfigError, match="7447 is on rmw_fastrtps_cpp, and this process on rmw_zenoh_cpp"):
-        ros.init(connection=way)

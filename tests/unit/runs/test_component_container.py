@@ -13,9 +13,8 @@ from tests.unit.runtimes.docker.engine import Engine, engine_at
 
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.coordinator.onlooker import SILENT
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import WorkerError
 from throwcollect.ros.connection import Connection
-from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runs.component_container import launch_container
 from throwcollect.runs.control import down
@@ -128,9 +127,3 @@ def test_a_container_joins_a_run_of_containers_over_the_network_of_the_run(tmp_p
     options = find_join_options("talos", "local", connection, SPEC)
     assert (options.network, options.key["Source"], options.key["Target"]) == (None, str(tmp_path), "/key")
     assert "tls/172.18.0.2:7447" in options.environment["ZENOH_CONFIG_OVERRIDE"]
-
-
-def test_a_container_cannot_join_a_run_on_fast_dds(tmp_path: Path) -> None:
-    fast_dds = Connection("udp/127.0.0.1:11811", RunKey(tmp_path), 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
-    with pytest.raises(ConfigError, match="is on Fast DDS"):
-        find_join_options("talos", "local", fast_dds, SPEC)

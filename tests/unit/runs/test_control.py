@@ -1,4 +1,3 @@
-import os
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -8,10 +7,8 @@ from pathlib import Path
 import pytest
 
 from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
-from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
-from throwcollect.runs import control, records
 from throwcollect.runs.control import scale
 from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
@@ -78,32 +75,3 @@ def test_scaling_asks_the_launcher_for_the_number_of_simulations(endpoint: str, 
     for simulations in (5, 0, 256):
         scale(run, simulations)
     assert wanted == [5, 0, 256]
-
-
-@pytest.mark.parametrize("most", [1])
-def test_scaling_above_the_limit_of_the_launcher_is_refused(endpoint: str, wanted: list[int]) -> None:
-    run = living(endpoint)
-    with pytest.raises(ConfigError, match=r"out of range. Min: 0, max: 1, value: 2"):
-        scale(run, 2)
-    scale(run, 0)
-    assert wanted == [0]
-
-
-def test_a_run_in_one_process_cannot_be_scaled() -> None:
-    with pytest.raises(ConfigError, match="run a-0123: has one simulation, as all runs of the runtime inprocess have"):
-        scale(living(None, runtime="inprocess"), 2)
-
-
-def test_a_launcher_that_does_not_end_is_named_unless_the_record_of_its_run_is_damaged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = Records().new("a")
-    run.write(replace(living(None).record, run=run.id, launcher=os.getpid()))
-    monkeypatch.setattr(records, "_LOCK_PATIENCE_S", 0.0)
-    monkeypatch.setattr(control, "_end_launcher", lambda *_: None)
-    for pid in (f"its pid is {os.getpid()}", None):
-        with pytest.raises(WorkerError, match=f"run {run.id}: its launcher does not end") as caught:
-            control.down(run.id)
-        assert caught.value.evidence == pid
-        (tmp_path / "state" / "runs" / f"{run.id}.json").write_text("{")
-    run.close()

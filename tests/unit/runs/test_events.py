@@ -57,11 +57,3 @@ def test_an_event_is_one_line_of_json_without_empty_fields(tmp_path: Path) -> No
         "exit_code": 3,
     }
     assert str(parse(line)) == "small-1234 failed: the coordinator stopped, exit code 3"
-
-
-@pytest.mark.parametrize(
-    ("event", "node", "alarming"),
-    [("lost", "sim_0", True), ("given up", "sim_0", True), ("frozen", "router", True), ("ready", "sim_0", False)],
-)
-def test_only_events_of_failing_nodes_are_alarming(event: str, node: str, alarming: bool) -> None:
-    assert Event("now", "small-1234", event, node).alarming == alarming

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from tests.e2e.collection import FAST, collect_here, write_config
 
-from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.runs.preparation import _name_directory, prepare, resume
+from throwcollect.errors import ThrowcollectError
+from throwcollect.runs.preparation import _name_directory, resume
 from throwcollect.state_directory import STATE_VARIABLE
 
 
@@ -23,17 +23,6 @@ def test_the_default_directory_gets_a_time_if_the_plain_name_is_taken(
     assert re.fullmatch(r"datasets/quick-\d{8}-\d{6}", str(_name_directory("quick")))
     (tmp_path / "datasets/link").symlink_to("nowhere")
     assert _name_directory("link") != Path("datasets/link")
-
-
-def test_prepare_refuses_wrong_arguments_before_it_makes_a_directory(tmp_path: Path) -> None:
-    (tmp_path / "some.yaml").write_text("trials: 1\n")
-    for wrong, message in (
-        ({"processes": -3}, "processes: got -3\n  expected: 1 or more"),
-        ({"overrides": "trials=2"}, "an override should be KEY=VALUE, got 't'"),
-    ):
-        with pytest.raises(ConfigError, match=f"^{message}"):
-            prepare(tmp_path / "some.yaml", output=tmp_path / "new", **wrong)
-    assert not (tmp_path / "new").exists()
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect import runs
-from throwcollect.errors import ConflictError, Interrupted
+from throwcollect.errors import Interrupted
 from throwcollect.runs.run import Run
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -22,25 +22,12 @@ run: {runtime: inprocess, replay: 0}
 sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}
 """
 
-launched_again = pytest.mark.parametrize("launch", [Run.collect, Run.start])
-
 
 @pytest.fixture
 def prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     (tmp_path / "small.yaml").write_text(YAML)
     return runs.prepare(tmp_path / "small.yaml", output=tmp_path / "data")
-
-
-@launched_again
-def test_launching_a_prepared_run_twice_is_refused(prepared: Run, launch) -> None:
-    with prepared as run:
-        summary = run.collect()
-        with pytest.raises(ConflictError, match=f"run {run.id}: was launched already"):
-            launch(run)
-    with pytest.raises(ConflictError, match=f"run {run.id}: was launched already"):
-        launch(run)
-    assert runs.wait(runs.find(run.id)) == summary
 
 
 def call_later(act: Callable[[], object]) -> Callable[[], int]:

@@ -70,14 +70,6 @@ def test_the_id_of_a_run_begins_with_the_name_of_its_collection_and_is_unique(
     assert [records.new("small").id, records.new("small").id] == ["small-aaaa", "small-bbbb"]
 
 
-def test_a_run_without_a_record_is_not_found(state: Path) -> None:
-    records = Records()
-    run = records.new("small")
-    assert records.ids() == []
-    with pytest.raises(ConfigError, match=f"no run {run.id}"):
-        records.get(run.id)
-
-
 def test_a_killed_launcher_releases_its_run_even_if_its_pid_is_in_use(state: Path) -> None:
     code = (
         "import sys; from throwcollect.runs.records import Records; sys.path.insert(0, sys.argv[1])\n"
@@ -218,17 +210,3 @@ def test_every_run_has_its_own_key_until_the_run_is_forgotten(state: Path) -> No
     assert (taken.key, taken.key.exists) == (keys[0], True)
     taken.forget()
     assert (keys[0].exists, keys[1].exists) == (False, True)
-
-
-def test_a_record_that_cannot_be_written_to_a_full_disk_is_an_error(
-    state: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = Records().new("small")
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("throwcollect.files.os.write", full)
-    with pytest.raises(ConfigError, match="runs cannot be remembered there: No space left on device") as caught:
-        run.write(record(run))
-    assert "free space there" in str(caught.value)

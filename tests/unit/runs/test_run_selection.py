@@ -14,7 +14,6 @@ from throwcollect.errors import ConfigError, DatasetError, Interrupted, NotFound
 from throwcollect.runs.control import down
 from throwcollect.runs.preparation import end_left
 from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import RunFailure, RunRecord
 from throwcollect.runs.run_selection import (
     find_run_to_change,
@@ -83,17 +82,6 @@ def test_an_ambiguous_or_unknown_id_is_refused_with_a_list_of_runs(records: Reco
         find_run_to_change("a")
     with pytest.raises(ConfigError, match=r"no run 'x'; known: ab-0123 and ac-0123"):
         find_run_to_change("x")
-
-
-@pytest.mark.parametrize("select", [find_run_to_change, find_run_to_watch])
-def test_an_empty_name_selects_no_run(
-    select: Callable[[str], Run], records: Records, make: Make, tmp_path: Path
-) -> None:
-    # An empty path is the current directory, into which this run collects; every id begins with an empty text.
-    make("a", "lives", directory=str(tmp_path))
-    with pytest.raises(ConfigError, match="the name of the run is empty"):
-        select("")
-    assert select(".").id == "a-0123"
 
 
 def test_without_an_id_the_only_living_run_is_changed(records: Records, make: Make) -> None:

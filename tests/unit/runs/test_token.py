@@ -24,12 +24,6 @@ def test_a_token_is_one_word_and_decodes_to_the_same_values() -> None:
     assert JoinToken.decode(f" {word}\n") == make()
 
 
-@pytest.mark.parametrize("cut", [0, 3, 10, 100, -1])
-def test_an_incomplete_token_is_refused(cut: int) -> None:
-    with pytest.raises(ConfigError, match="only a part of one"):
-        JoinToken.decode(make().encode()[:cut])
-
-
 @pytest.mark.parametrize("part", ["robot", "tool", "task"])
 def test_a_token_of_a_run_with_a_part_of_another_package_is_refused_where_that_differs(
     part: str, monkeypatch: pytest.MonkeyPatch

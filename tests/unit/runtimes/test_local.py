@@ -12,7 +12,6 @@ import psutil
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
 from throwcollect.run_key import RunKey
@@ -134,14 +133,6 @@ def test_a_node_that_ignores_requests_is_ended_by_force(runtime: LocalNodes) -> 
     runtime.stop(["node"], grace_s=0.1)
     assert not process.is_running()
     assert (runtime.running(), runtime.handle("node")) == ((), None)
-
-
-def test_a_busy_port_of_the_router_is_refused_with_a_hint(tmp_path: Path) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used") as caught:
-            nodes(tmp_path, router_port=port)
-    assert caught.value.hint == "--set run.router_port=0 takes a free one"
 
 
 def test_the_port_of_the_router_is_reserved_until_the_router_starts(runtime: LocalNodes) -> None:

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from throwcollect import extras, members
-from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
@@ -78,14 +77,6 @@ def test_a_configuration_can_name_a_runtime_of_another_package(added: None, tmp_
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     command, env = [sys.executable, "-c", code], {**os.environ, "PYTHONPATH": path}
     assert subprocess.run(command, env=env, check=True, capture_output=True, text=True).stdout == "cluster\n"
-
-
-def test_an_unknown_runtime_is_refused_with_a_list_of_the_runtimes(tmp_path: Path) -> None:
-    (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
-    with pytest.raises(ConfigError, match=r"far.yaml:2: run.runtime: .*'inprocess', got 'cluster'"):
-        load(tmp_path / "far.yaml")
-    with pytest.raises(ConfigError, match="there is no runtime cluster; known: local, docker and inprocess"):
-        get_runtime("cluster")
 
 
 @pytest.mark.parametrize(("engine", "package"), [("bullet", "pybullet"), ("mujoco", "mujoco")])

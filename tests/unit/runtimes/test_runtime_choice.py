@@ -11,7 +11,7 @@ from docker.client import DockerClient
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes import registry
 from throwcollect.runtimes.docker import docker_engine as docker_engine
@@ -71,13 +71,6 @@ def test_auto_chooses_processes_without_a_docker_engine_and_says_why(choose, no_
     )
 
 
-def test_requested_containers_without_a_docker_engine_are_an_error(choose, no_engine) -> None:
-    with pytest.raises(WorkerError, match="no Docker engine answers") as caught:
-        choose("docker")
-    assert caught.value.exit_code == 3
-    assert caught.value.hint
-
-
 @pytest.mark.parametrize(("runtime", "note"), [("auto", " (auto)"), ("docker", "")])
 def test_containers_are_chosen_if_engine_and_image_are_there(choose, engine, runtime: str, note: str) -> None:
     assert choose(runtime) == ("docker", [f"runtime: Docker containers of {default_tag()}{note}"])
@@ -93,18 +86,6 @@ def test_an_outdated_default_image_is_not_used(choose, outdated) -> None:
     assert choose("auto") == ("local", [f"runtime: local processes (auto, as {problem})"])
     with pytest.raises(WorkerError, match=problem):
         choose("docker")
-
-
-@pytest.mark.parametrize("runtime", ["auto", "docker"])
-@pytest.mark.parametrize("image", ["lab/throws:2", default_tag()])
-def test_an_outdated_image_that_the_user_names_is_used_with_a_warning(
-    choose, outdated, runtime: str, image: str
-) -> None:
-    chosen, (warning, _) = choose(runtime, image)
-    assert chosen == "docker"
-    assert warning == (
-        f"! the image {image} was made from other sources than these; it is used, as containers.image names it"
-    )
 
 
 FAST_DDS = Middleware("rclpy", "rmw_fastrtps_cpp")
@@ -133,24 +114,6 @@ def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
     found = registry.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
     assert found.middleware == expected
     assert ("on genuine rclpy" in said[0]) == (expected.backend == "rclpy")
-
-
-@pytest.mark.parametrize(
-    ("rmw", "problem"),
-    [
-        (None, f"the image {default_tag()} has no rclpy"),
-        ("rmw_cyclonedds_cpp", "has rclpy with rmw_cyclonedds_cpp, and a launcher with rmw_fastrtps_cpp cannot join"),
-    ],
-)
-def test_requested_rclpy_that_containers_cannot_have_is_an_error(
-    engine, monkeypatch: pytest.MonkeyPatch, rmw: str | None, problem: str
-) -> None:
-    labels = {} if rmw is None else {docker_image.RMW_LABEL: rmw}
-    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels=labels))
-    monkeypatch.setattr(registry, "choose_middleware", lambda _: FAST_DDS)
-    with pytest.raises(ConfigError, match=problem) as caught:
-        registry.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)
-    assert "run.ros" in str(caught.value)
 
 
 @pytest.mark.parametrize("host", ["tcp://192.0.2.7:2375", "ssh://lab"])

@@ -3,8 +3,6 @@
 import hashlib
 import json
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,23 +10,6 @@ import pytest
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket
 from throwcollect.runtimes.docker.docker_engine import connect
-
-CHOOSES = """
-import sys
-from throwcollect.config.schema import Config
-from throwcollect.runtimes.registry import choose
-
-choose(Config(), say=print, warn=print)
-print(sorted({"docker", "requests", "urllib3"} & sys.modules.keys()))
-"""
-
-
-def test_a_missing_docker_socket_is_an_error_with_a_hint(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    assert not has_socket()
-    with pytest.raises(WorkerError, match=r"no Docker engine answers at unix:///\S+/none.sock: No such file") as caught:
-        check_socket()
-    assert "--runtime local" in str(caught.value)
 
 
 def make_contexts(home: Path, current: str, **hosts: str) -> None:
@@ -76,14 +57,3 @@ def test_the_client_connects_to_the_engine_of_the_context(tmp_path: Path, monkey
             connect(timeout_s=0.2)
         engine.setblocking(False)
         assert engine.accept()[0].recv(3) == b"GET"
-
-
-def test_the_docker_client_is_not_imported_without_an_engine(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", CHOOSES],
-        env={"DOCKER_HOST": f"unix://{tmp_path}/none.sock"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.splitlines()[-1] == "[]"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -149,37 +148,12 @@ def test_the_output_of_a_container_is_in_the_log_once_and_before_its_end_is_know
     assert log.read_text().splitlines() == engine.printed[name]
 
 
-def test_a_log_that_cannot_be_written_is_no_silence_of_the_engine(
-    engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch, warnings: list[str]
-) -> None:
-    def is_full(_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(containers, "open_log", is_full)
-    runtime = make()
-    runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
-    engine.printed[name := "throwcollect-run-1a2b-sim_0"] = ["one"]
-    until(lambda: runtime.handle("sim_0"), runtime=runtime)
-    engine.end(name, 3)
-    (end,) = until(lambda: not runtime.running(), runtime=runtime)
-    assert end.code == 3
-    assert ["logs of nodes cannot be written" in each for each in warnings] == [True]
-
-
 @pytest.mark.parametrize(
     ("state", "memory", "words"),
     [
         (ContainerState("exited", 0), None, "exit code 0"),
-        (ContainerState("exited", 128), None, "exit code 128"),
-        # A node that is asked to stop ends with this code by itself.
-        (ContainerState("exited", 130), None, "exit code 130"),
         (ContainerState("exited", 137), "512m", "ended by SIGKILL"),
-        (ContainerState("exited", 163), None, "ended by signal 35"),
-        (ContainerState("exited", 255), None, "exit code 255"),
         (ContainerState("exited", 137, out_of_memory=True), "512m", "ran out of memory (limit 512m)"),
-        (ContainerState("exited", 137, out_of_memory=True), None, "ran out of memory"),
-        # Another process of the container ran out of memory.
-        (ContainerState("exited", 5, out_of_memory=True), "512m", "exit code 5"),
         (ContainerState("removed"), None, "its container was removed"),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 from docker.errors import APIError, ImageNotFound
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.docker_engine import default_tag, ensure
+from throwcollect.runtimes.docker.docker_engine import ensure
 from throwcollect.runtimes.image_sources import are_others, digest_sources
 
 
@@ -45,13 +45,6 @@ def test_a_missing_image_other_than_the_default_is_pulled(said: list[str]) -> No
     assert said == ["image lab/throws:2 is not here; pulling it"]
     with pytest.raises(WorkerError, match=r"lab/throws:3 is not here and cannot be pulled.*no such host"):
         ensure(engine, "lab/throws:3", say=said.append)
-
-
-def test_a_missing_default_image_is_an_error_with_the_command_that_builds_it(said: list[str]) -> None:
-    with pytest.raises(WorkerError, match=f"{default_tag()} is not here; make image, in a clone .*, builds it"):
-        ensure(Engine(registry=(default_tag(),)), default_tag(), say=said.append)
-    ensure(Engine(default_tag()), default_tag(), say=said.append)
-    assert said == []
 
 
 def test_an_image_is_outdated_if_its_label_names_other_sources(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

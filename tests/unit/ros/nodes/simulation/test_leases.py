@@ -10,7 +10,7 @@ from throwcollect.ros.nodes.simulation.leases import LeaseQueue
 from throwcollect.run_key import Signer
 from throwcollect.trial.lease import Lease
 
-A, B, C, D = (Lease.make("/sim_0", trial, {}, Signer(b"")) for trial in range(4))
+A, B, C = (Lease.make("/sim_0", trial, {}, Signer(b"")) for trial in range(3))
 BAD = Lease.make("/sim_0", 99, {}, Signer(b""))
 
 
