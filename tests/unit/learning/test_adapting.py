@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from tests.unit.learning.worlds import KEYS, draw, land, learn, learn_with_drag
 
-from throwcollect.errors import ConfigError
 from throwcollect.learning.adapting import Method, adapt
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
 
@@ -120,19 +119,3 @@ def test_a_requested_method_is_used_even_if_the_world_is_unchanged() -> None:
 def test_scatter_is_hardly_ever_mistaken_for_a_different_world(count: int) -> None:
     found = [elsewhere(learn(), count, land, noise_m=0.02, seed=seed).method for seed in range(12)]
     assert found.count(Method.NONE) >= 11
-
-
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_places_too_far_away_for_any_bias_are_refused() -> None:
-    learned = learn()
-    values = learned.scale(KeyRole.PARAMETER, draw(1, 8))
-    with pytest.raises(ConfigError, match="the throws ended too far from where the model has them"):
-        adapt(
-            learned,
-            values,
-            np.zeros((1, 0)),
-            np.array([[1e5, -2e4]]),
-            method=Method.BIAS,
-            scatter=0.002,
-            latents_count=False,
-        )

@@ -7,13 +7,11 @@ from typing import Any, cast
 
 import numpy as np
 import pyarrow as pa
-import pytest
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError
 from throwcollect.learning.covering import Grid, choose_throws
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
@@ -106,10 +104,3 @@ def test_heights_are_those_of_the_cells_and_values_of_a_set_stay_in_it() -> None
     heights = points.values[:, 3]
     assert ((heights >= 0.2) & (heights <= 0.3)).all()
     assert set(points.values[:, 1]) == {0.8, 1.2}
-
-
-def test_too_few_landings_are_refused() -> None:
-    config = config_with()
-    few = throw(draw_points(config, directory=Path())[:5])
-    with pytest.raises(ConfigError, match="throws have landed"):
-        choose_throws(config, [few], count=COUNT, number=2)

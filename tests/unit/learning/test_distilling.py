@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tests.unit.learning.worlds import KEYS, draw, land, learn, make_dataset
 
-from throwcollect import MissingExtraError, fit, load_model
+from throwcollect import fit, load_model
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
 from throwcollect.learning.model_card import ONNX_PROGRAM
@@ -79,10 +79,3 @@ def test_adapting_a_distilled_model_distils_it_again(tmp_path: Path) -> None:
     path = tmp_path / "real"
     adapted.save(path)
     assert load_model(path).model_dump_json() == adapted.model_dump_json()
-
-
-def test_distilling_without_onnx_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("throwcollect.extras.is_installed", lambda package: package != "onnx")
-    with pytest.raises(MissingExtraError, match="this needs onnx, which is not installed") as caught:
-        fit(make_dataset(tmp_path / "data", 120)).distil()
-    assert caught.value.hint == "pip install 'throwcollect[onnx]'"

@@ -12,8 +12,6 @@ from PIL import Image
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.cameras import show_cameras
 from throwcollect.report.contents import Table
-from throwcollect.report.figures import Points, draw_map
-from throwcollect.report.measured import Outcomes
 
 SENSORS = {
     "side": {"kind": "camera"},
@@ -53,25 +51,3 @@ def test_each_camera_has_a_row_of_pictures_for_each_of_a_few_trials(seen: Datase
 
 def test_a_dataset_without_cameras_has_no_section(collected: Path) -> None:
     assert list(show_cameras(Dataset.open(collected))) == []
-
-
-def map_of(x: list[float], y: list[float]) -> Any:
-    outcomes = Outcomes.of(["landed"] * len(x), ("landed",))
-    numbers = np.arange(len(x))
-    places, zeros = (np.array(x), np.array(y)), np.zeros(len(x))
-    return draw_map(Points(numbers, numbers, *places, zeros, zeros, outcomes.codes), outcomes, speed=None)
-
-
-def test_a_map_is_cropped_to_its_points_and_an_arrow_leads_to_the_robot() -> None:
-    figure = map_of([2.0, 3.0], [-0.5, 0.5])
-    assert figure.layout.xaxis.range == pytest.approx((1.85, 3.15))
-    assert figure.layout.yaxis.range == pytest.approx((-0.65, 0.65))
-    robot = figure.data[-1]
-    assert (robot.x[0], robot.y[0]) == pytest.approx((1.85, 0.0))
-    assert (robot.marker.symbol, robot.marker.angle) == ("arrow", pytest.approx(-90))
-    assert robot.name == "robot, 1.9 m farther"
-
-
-def test_a_robot_among_the_points_of_a_map_is_drawn_where_it_is() -> None:
-    robot = map_of([-1.0, 1.0], [0.0, 1.0]).data[-1]
-    assert (robot.name, robot.marker.symbol, robot.x[0], robot.y[0]) == ("robot", "star-triangle-up", 0, 0)

@@ -6,7 +6,7 @@ import pytest
 from tests.unit.learning.worlds import make_dataset
 from tests.unit.report.page_parser import list_panels
 
-from throwcollect import ConfigError, DatasetError, fit
+from throwcollect import fit
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model import load_model
 from throwcollect.learning.score import Adapted, Errors, MissStatistics, Score, ThrowAtTarget, Trained
@@ -94,12 +94,3 @@ def test_every_unit_has_its_own_curves_and_the_distilled_map_has_a_row(dataset: 
     assert panels["training"].data[0].y == pytest.approx([0.1, 0.1])
     (table,) = (block for block in section.blocks if hasattr(block, "rows"))
     assert table.rows[-1] == ("model.onnx of these", "0.10 cm, 0.57°", "0.20 cm, 1.15°", "-, 1.15°", "3", "1")
-
-
-def test_showing_a_model_of_another_dataset_is_refused(dataset: Dataset, model: Path) -> None:
-    text = (model / "model.json").read_text()
-    (model / "model.json").write_text(text.replace(dataset.digest, "0" * 64))
-    with pytest.raises(ConfigError, match="was learned from quick, digest 0000000000"):
-        show_model(model, dataset)
-    with pytest.raises(DatasetError, match=r"model\.json"):
-        show_model(model / "none", dataset)

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
-
-from throwcollect.report.contents import format_duration, format_share, format_size
 from throwcollect.report.measured import Outcomes
 from throwcollect.report.sections import tabulate_failures
-from throwcollect.report.throw.flights import MOST_RESIDUALS, show_physics
 from throwcollect.tasks.outcome_styles import style_of
 from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
@@ -50,31 +45,3 @@ def test_failures_whose_reasons_differ_only_in_numbers_are_one_group() -> None:
         ("self hit", "the ball touched arm_right_7_link at 0.812 s", "1", "2"),
     )
     assert tabulate_failures(rows[:1]) is None
-
-
-@pytest.mark.parametrize(
-    ("count", "total", "text"),
-    [(0, 7, "0 %"), (7, 7, "100 %"), (1, 100_000, "0.1 %"), (99_999, 100_000, "99.9 %"), (1, 3, "33.3 %")],
-)
-def test_a_share_is_shown_as_0_or_100_percent_only_if_it_is_exact(count: int, total: int, text: str) -> None:
-    assert format_share(count, total) == text
-
-
-@pytest.mark.parametrize(("seconds", "text"), [(0.4, "0 s"), (119, "119 s"), (120, "2.0 min"), (7200, "2.0 h")])
-def test_a_duration_is_shown_in_seconds_minutes_or_hours(seconds: float, text: str) -> None:
-    assert format_duration(seconds) == text
-
-
-@pytest.mark.parametrize(("count", "text"), [(999_999, "1000 kB"), (1_000_000, "1.0 MB"), (2_500_000_000, "2.5 GB")])
-def test_a_size_is_shown_in_decimal_units(count: int, text: str) -> None:
-    assert format_size(count) == text
-
-
-def test_the_page_says_where_exact_flights_are_drawn():
-    """A logarithmic axis has no place for 0, so the page says which bar has the flights that agree to the last bit."""
-    distance_m = np.array([0.0, 0.0, 3e-15])
-    section = show_physics(distance_m, 3)
-    assert str(section.text).startswith("All episodes were compared")
-    assert "2 agree to the last bit (drawn at 1e-17 m)" in str(section.text)
-    some = show_physics(distance_m, MOST_RESIDUALS + 1)
-    assert str(some.text).startswith("2,000 of 2,001 episodes, chosen at random, were compared")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,14 +11,11 @@ import plotly.graph_objects as go
 import pytest
 from plotly.offline import get_plotlyjs
 from tests.unit.report.page_parser import Page
-from typer.testing import CliRunner
 
-from throwcollect.cli.main import assemble
-from throwcollect.dataset.directory import METADATA, PROVENANCE
+from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.provenance import read_provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.extras import MissingExtraError
 from throwcollect.report.contents import Panel, ReportSection, Table
 from throwcollect.report.measured import Outcomes
 from throwcollect.report.sections import Report, render_page, report_dataset, write_report
@@ -87,22 +82,6 @@ def test_text_of_a_dataset_is_never_interpreted_as_markup(collection: Any, tmp_p
     assert ("code", "<img src=x onerror=alert(1)>") in page.texts
 
 
-@pytest.mark.parametrize("text", [None, "", "{}", '{"finished": 1e400}', "[" * 100_000, "\xff"])
-def test_the_report_of_a_dataset_without_readable_provenance_says_so(
-    make_collection: Any, tmp_path: Path, text: str | None
-) -> None:
-    """Datasets of earlier versions have no provenance.json."""
-    # Without a throw, there is little to draw.
-    directory = make_collection({"trials": 1}).collect(tmp_path / "dataset", lost=[0])
-    (directory / PROVENANCE).unlink()
-    if text is not None:
-        (directory / PROVENANCE).write_text(text, encoding="latin-1")
-    words = parse(directory).words
-    assert "unknown: it has no readable provenance.json" in words
-    assert Dataset.open(directory).digest in words
-    assert "finished on" not in words
-
-
 def test_hostile_text_of_a_report_is_escaped_in_scripts_and_attributes() -> None:
     hostile = """a"></div>'</script ><b>"""
     figure = go.Figure(layout_title=hostile, layout_height=100).add_scatter(x=[1], y=[2])
@@ -160,27 +139,3 @@ def test_a_report_never_overwrites_a_file_and_writes_nothing_of_an_unfinished_da
     with pytest.raises(DatasetError, match="not finished"):
         write_report(dataset, page)
     assert [path.name for path in tmp_path.iterdir()] == ["dataset"]
-
-
-def test_a_report_without_plotly_says_what_to_install(
-    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.raises(MissingExtraError, match="needs plotly, which is not installed") as raised:
-        write_report(collected, tmp_path / "page.html")
-    assert raised.value.hint == "pip install 'throwcollect[report]'"
-
-
-def test_the_report_command_writes_beside_the_dataset_and_prints_a_summary(dataset: Path, tmp_path: Path) -> None:
-    printed = CliRunner().invoke(assemble(), ["dataset", "report", str(dataset), "--json"])
-    assert printed.exit_code == 0, printed.output
-    page = tmp_path / "dataset.html"
-    assert json.loads(printed.output) == {"page": str(page), "size_bytes": page.stat().st_size}
-    named = CliRunner().invoke(assemble(), ["dataset", "report", str(dataset), "-o", str(tmp_path / "named.html")])
-    assert named.exit_code == 0, named.output
-    assert (tmp_path / "named.html").read_bytes() == page.read_bytes()
-
-
-def test_the_camera_of_each_plot_saves_a_large_picture_for_papers(text: str) -> None:
-    assert 'modeBarButtons: [["toImage"]]' in text
-    assert 'toImageButtonOptions: { format: "png", filename: element.id, scale: 4 }' in text

@@ -13,7 +13,7 @@ from PIL import Image
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.engines.pose import OPTICAL
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError
 from throwcollect.view.animation import Rendering, render
 from throwcollect.view.throw_pictures import camera_on, project
 
@@ -94,16 +94,6 @@ def test_a_throw_leads_to_the_right_of_the_picture_wherever_it_goes(heading: flo
     path = np.linspace(0, 1, 20)[:, np.newaxis] * away + [0, 0, 1]
     (left, _), *_, (right, _) = find_shares(path, heading)
     assert right - left == pytest.approx(0.88)
-
-
-def test_an_unknown_trial_or_kind_of_picture_is_an_error(collected: Path, tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="no trial 7"):
-        render(collected, tmp_path / "throw.webp", trials=[7])
-    with pytest.raises(ConfigError, match=r"throw.avi: no picture ends like this\n.*\.webp or \.gif or \.mp4 or \.png"):
-        render(collected, tmp_path / "throw.avi")
-    with pytest.raises(ConfigError, match="a strip of 3 pictures"):
-        render(collected, tmp_path / "throw.gif", strip=3)
-    assert not list(tmp_path.glob("throw.*"))
 
 
 def test_throws_stand_side_by_side_and_begin_together(collected: Path, tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from throwcollect.report.measured import Outcomes
 from throwcollect.report.throw.throw_sections import (
     _show_cells,
     count_throws,
-    draw_coverage_map,
     report_throws,
 )
 from throwcollect.tasks.outcome_styles import style_of
@@ -51,22 +50,6 @@ def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
     assert (first, second, third) == ([[2], [1]], [[1, 1], [0, 1]], [[1, 2]])
     text = panels["Targets: landing distance and hit angle"].text
     assert text == "3 of 4 cells have a throw that landed, at most 1; 1 landed in no cell."
-
-
-def test_cells_have_round_edges_if_no_target_is_configured() -> None:
-    throws = pa.table({"hit_angle_rad": [1.2, 1.21, 1.3]})
-    edges, counts = count_throws(make_landings([1.0, 1.34, 2.4]), throws, target=None)
-    distance, angle = edges.values()
-    assert distance == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance)])
-    assert np.diff(angle) == pytest.approx(0.5)
-    assert counts.sum() == 3
-
-
-@pytest.mark.parametrize(("most", "mark"), [(1, 1), (8, 1), (9, None)])
-def test_the_colour_scale_begins_at_0_and_marks_only_whole_throws(most: int, mark: int | None) -> None:
-    edges = {"distance_m": np.array([1.0, 2.0]), "height_m": np.array([0.0, 1.0])}
-    (cells,) = draw_coverage_map(edges, np.array([[most]])).data
-    assert (cells.zmin, cells.zmax, cells.colorbar.dtick) == (0, most, mark)
 
 
 def test_the_report_on_a_derived_dataset_shows_throws_of_its_own_trials(collected: Path, tmp_path: Path) -> None:
