@@ -27,11 +27,6 @@ def test_locate_adds_the_place_to_an_error_and_keeps_its_type_and_facts() -> Non
     assert outer.locate(place="shard 1").path == Path("x.mcap")
 
 
-def test_an_error_has_its_message_and_its_hint_in_one_line() -> None:
-    assert ConfigError("is missing", expected="a file", hint="write it").one_line == "is missing; try: write it"
-    assert ConfigError("is missing").one_line == "is missing"
-
-
 @pytest.mark.parametrize(
     "error",
     [

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory
 
 
@@ -42,18 +41,3 @@ with new_directory(pathlib.Path(sys.argv[1])) as place:
         assert not list(left.rglob("file"))
     assert [each.name for each in tmp_path.iterdir()] == ["new"]
     assert not list(path.iterdir())
-
-
-def test_an_error_in_a_new_directory_names_the_file_as_it_would_have_been_called(tmp_path: Path) -> None:
-    def fail(file: str) -> None:
-        with new_directory(tmp_path / "new") as outer, new_directory(outer / "part") as inner:
-            raise DatasetError("cannot be written", path=inner / file, place="byte 17", hint="free space")
-
-    with pytest.raises(DatasetError) as caught:
-        fail("plan.parquet")
-    assert (caught.value.path, caught.value.hint) == (tmp_path / "new" / "part" / "plan.parquet", "free space")
-    assert caught.value.message == f"{tmp_path}/new/part/plan.parquet: byte 17: cannot be written"
-    # A file elsewhere, such as one of the source, keeps its name.
-    with pytest.raises(DatasetError, match=f"^{tmp_path}/source: byte 17: cannot be written"):
-        fail(str(tmp_path / "source"))
-    assert list(tmp_path.iterdir()) == []

@@ -127,20 +127,9 @@ def test_environments_work_side_by_side() -> None:
     ("arguments", "message"),
     [
         ({"task": "throw_into"}, r"task\.name: should be 'throw_into'.*got 'throw'"),
-        ({"reward": "shaped"}, "reward 'shaped'"),
         ({"targets": {"target_x_m": (1, 2)}}, "target_y_m"),
-        ({"rate_hz": 60}, "should divide"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         throwcollect.gym.ThrowEnv(CONFIG, overrides=OVERRIDES, **arguments)
-
-
-def test_wrong_options_are_refused(aimed: Any) -> None:
-    with pytest.raises(ConfigError, match=r"options: value\b"):
-        aimed.reset(options={"value": {}})
-    with pytest.raises(ConfigError, match="target: target_hit_angle_rad"):
-        aimed.reset(options={"target": {"target_hit_angle_rad": 1.0}})
-    with pytest.raises(ConfigError, match=r"ball\.mass"):
-        aimed.reset(options={"values": {"ball.mass": 1.0}})

@@ -4,7 +4,6 @@ import sys
 from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
-from unittest.mock import Mock
 
 import pytest
 from tests.e2e.collection import call_here
@@ -14,11 +13,10 @@ from throwcollect import members
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.bullet.bullet_engine import BulletEngine
 from throwcollect.errors import ConfigError, DatasetError, MemberError
-from throwcollect.members import explain_failure, load_member, load_part, names_of
+from throwcollect.members import explain_failure, load_member, names_of
 
 Say = Callable[..., subprocess.CompletedProcess[str]]
 BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
-ROBOT = "throwcollect.robots.robot:Robot"
 SPOON = "throwcollect.tools.spoon.spoon_config:SpoonConfig"
 ARM = """\
 robot: {name: planar_arm}
@@ -57,16 +55,6 @@ def test_a_member_of_another_package_is_found_and_takes_the_place_of_none_of_our
     assert load_member("engines", "bullet") is BulletEngine
     for cached in caches:
         cached.cache_clear()
-
-
-def test_installed_packages_are_asked_once_for_all_families(monkeypatch: pytest.MonkeyPatch) -> None:
-    ask = Mock(return_value=EntryPoints())
-    monkeypatch.setattr(members, "entry_points", ask)
-    members._find_members.cache_clear()
-    for family in ("robots", "tools", "engines", "tasks", "runtimes", "exporters"):
-        assert names_of(family)
-    assert ask.call_count == 1
-    members._find_members.cache_clear()
 
 
 def test_a_configuration_may_name_a_robot_of_another_package(with_plugins: Say, tmp_path: Path) -> None:
@@ -123,18 +111,10 @@ def find_what_is_said(text: str, family: str, value: str, directory: Path, monke
 @pytest.mark.parametrize(
     ("family", "value", "said"),
     [
-        ("robots", "broken:ARM", " cannot be loaded: AttributeError: module 'broken' has no attribute 'ARM'"),
         ("robots", "not_there:ARM", " cannot be loaded: ModuleNotFoundError: No module named 'not_there'"),
         ("engines", "broken:UNLICENSED", " cannot be loaded: SystemExit: 0"),
-        ("robots", "broken:NUMBER", ": broken:NUMBER should be of throwcollect.robots.robot.Robot, is 3"),
         ("engines", "broken:NUMBER", ": broken:NUMBER should be of throwcollect.engines.engine.Engine, is 3"),
-        (
-            "robots",
-            ROBOT,
-            f": {ROBOT} should be of throwcollect.robots.robot.Robot, is <class '{ROBOT.replace(':', '.')}'>",
-        ),
         ("tools", SPOON, f": {SPOON} should have the name of its entry point, 'mine', has 'spoon'"),
-        ("tasks", "broken:Aimless", " cannot be loaded: TypeError: Aimless lacks until"),
     ],
 )
 def test_a_broken_member_is_an_error_that_names_its_package(
@@ -142,23 +122,6 @@ def test_a_broken_member_is_an_error_that_names_its_package(
 ) -> None:
     found = find_what_is_said(BROKEN, family, value, tmp_path, monkeypatch)
     assert found.startswith(f"the {family[:-1]} mine of somebodys 1.0{said}")
-
-
-def test_a_part_of_a_member_that_cannot_be_imported_is_an_error_that_names_the_package(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    install(tmp_path, "somebodys", "tasks", "some:Task")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(ConfigError, match=r"the task mine of somebodys 1\.0: not_there:Task cannot be loaded: Module"):
-        load_part("tasks", "mine", "not_there:Task")
-
-
-def test_a_member_that_ends_the_process_is_an_error() -> None:
-    with (
-        pytest.raises(MemberError, match="cannot judge trial 3: SystemExit: 5"),
-        explain_failure("tasks", "mine", "judge trial 3"),
-    ):
-        sys.exit(5)
 
 
 def test_two_packages_with_a_member_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

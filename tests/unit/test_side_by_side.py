@@ -116,24 +116,6 @@ def test_processes_are_forked_off_one_without_other_threads_of_python() -> None:
     assert (done.stdout, done.stderr) == (f"{have} False\n{have_not} False\n", "")
 
 
-@pytest.mark.skipif(sys.version_info < (3, 11), reason="Python knows no way")
-def test_processes_import_no_module_from_the_working_directory(tmp_path: Path) -> None:
-    for name in ("multiprocessing", "runpy", "types", "queue"):
-        (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the working directory was run')\n")
-    program = (
-        "import operator\n"
-        "from throwcollect.own_process import prepare_environment\n"
-        "from throwcollect.side_by_side import work_side_by_side\n"
-        "prepare_environment()\n"
-        "print(*work_side_by_side(range(4), operator.methodcaller, ('bit_length',), processes=2, doing='counts'))\n"
-    )
-    words = [sys.executable, "-P", "-c", program]
-    # Python hands -P on to its child processes, but a command of throwcollect starts without it.
-    for switch in (words, [sys.executable, "-c", f"import sys; del sys.path[0]\n{program}"]):
-        done = subprocess.run(switch, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
-        assert (done.stdout, done.stderr) == ("0 1 2 2\n", "")
-
-
 def test_processes_do_not_import_the_program(tmp_path: Path) -> None:
     program = tmp_path / "program.py"
     program.write_text(

@@ -72,23 +72,6 @@ def test_a_target_adds_only_the_miss_to_a_throw(simulator: Simulator) -> None:
     assert (plain.target, plain.miss_m) == ({}, None)
 
 
-@pytest.mark.parametrize(
-    ("target", "sentence"),
-    [
-        ({"target_x_m": 1.4}, "target_y_m: is missing beside target_x_m"),
-        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be from .* got nan"),
-        (
-            {"target_x_m": 1e308, "target_y_m": 0.0},
-            r"target_x_m: should be from -1e\+06 to 1e\+06, got 1e\+308",
-        ),
-        ({"x": 1.4}, "x: the task throw has no such target"),
-    ],
-)
-def test_an_invalid_target_is_an_error(simulator: Simulator, target: dict[str, float], sentence: str) -> None:
-    with pytest.raises(ConfigError, match=sentence):
-        simulator.throw(POINT, target=target)
-
-
 def test_several_processes_give_the_same_throws_without_the_file(tmp_path: Path) -> None:
     path = tmp_path / "throws.yaml"
     path.write_text((ROOT / "configs" / "quickstart.yaml").read_text() + "\nsim: {engine: ballistic}\n")
@@ -115,22 +98,6 @@ def test_throws_before_a_refused_point_are_returned(simulator: Simulator) -> Non
 
 
 @pytest.mark.parametrize(
-    ("point", "message"),
-    [
-        (REFUSED, r"points\[1\]: .*" + TOO_FAST + r".* \(task\.duration_s=0\.2\)"),
-        ({"ball.mass_kg": -1.0}, r"points\[1\]\.ball\.mass_kg: should be greater than 0"),
-    ],
-)
-def test_a_wrong_point_of_many_is_named_by_its_index(
-    simulator: Simulator, point: dict[str, float], message: str
-) -> None:
-    throws = simulator.throw_many([{}, point])
-    next(throws)
-    with pytest.raises(ConfigError, match=f"^{message}"):
-        next(throws)
-
-
-@pytest.mark.parametrize(
     ("values", "message"),
     [
         ({"task.duration": 1.0}, "task.duration: unknown key; did you mean 'task.duration_s'"),
@@ -143,15 +110,6 @@ def test_a_wrong_key_or_value_is_an_error_that_names_the_key(
 ) -> None:
     with pytest.raises(ConfigError, match=re.escape(message)):
         simulator.throw(values)
-
-
-def test_numbers_of_trials_and_processes_out_of_range_are_refused(simulator: Simulator) -> None:
-    with pytest.raises(ConfigError, match="trial: got -1\n  expected: 0 to 9999999"):
-        simulator.throw(trial=-1)
-    with pytest.raises(ConfigError, match="trial: got 10000000"):
-        simulator.throw(trial=10_000_000)
-    with pytest.raises(ConfigError, match="processes: got 0"):
-        next(simulator.throw_many([{}], processes=0))
 
 
 def test_a_simulator_of_a_config_throws_as_that_of_its_file(simulator: Simulator) -> None:
@@ -172,11 +130,6 @@ def test_a_simulator_throws_for_several_threads_one_after_the_other(simulator: S
 
     with ThreadPoolExecutor(4) as threads:
         assert list(threads.map(throw, points)) == alone
-
-
-def test_a_missing_configuration_is_an_error_that_names_it(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=re.escape(f"{tmp_path / 'no.yaml'}: no such file")):
-        Simulator(tmp_path / "no.yaml")
 
 
 def test_the_program_of_the_page_runs_without_error_output(tmp_path: Path) -> None:
