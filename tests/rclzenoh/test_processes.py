@@ -5,24 +5,11 @@ import signal
 import subprocess
 import time
 
-from rclzenoh.interfaces import get_message, get_service
+from rclzenoh.interfaces import get_message
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from tests.contract.rig import SERVER, names_of, start_python
 
 String = get_message("std_msgs/msg/String")
-Trigger = get_service("std_srvs/srv/Trigger")
-
-
-def test_a_node_in_another_process_answers_and_leaves_the_graph_at_its_end(rig):
-    process = start_python("-c", SERVER)
-    assert process.stdout.readline() == "ready\n"
-    node = rig.node("client")
-    client = node.create_client(Trigger, "trigger")
-    assert client.wait_for_service(30)
-    assert rig.result(client.call_async(Trigger.Request())).success
-    process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=60)
-    assert rig.spin(lambda: names_of(node) == ["client"])
 
 
 def test_nodes_survive_a_router_that_dies_and_comes_back(rig, monkeypatch):

@@ -59,21 +59,6 @@ def test_a_profile_is_read_with_the_defaults_of_the_middleware():
     assert profile.liveliness_lease_duration == Duration(nanoseconds=2_000_000_005)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        ":",
-        "::,10:,:,:,",
-        "::10:,:,:,,",
-        "9:,:,10:,:,:,,",
-        "::,x:,:,:,,",
-    ],
-)
-def test_decode_returns_none_for_a_malformed_profile(text):
-    assert decode(text) is None
-
-
 def test_history_or_depth_is_required():
     with pytest.raises(ValueError, match="history and/or depth"):
         QoSProfile()

@@ -155,13 +155,3 @@ def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(
     )
     assert rig.spin(lambda: replies)
     assert replies == [None]
-
-
-def test_each_of_many_requests_at_once_is_answered(rig, pair):
-    server, _, client = pair
-    server.create_service(SetBool, "~/set", answer)
-    assert client.wait_for_service(30)
-    # Nobody spins meanwhile, so all of them wait, ten times as many as the announced quality of service says.
-    futures = [client.call_async(SetBool.Request(data=number % 2 == 0)) for number in range(100)]
-    assert rig.spin(lambda: all(future.done() for future in futures))
-    assert [future.result().success for future in futures] == [number % 2 == 0 for number in range(100)]

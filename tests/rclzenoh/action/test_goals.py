@@ -46,15 +46,6 @@ def test_a_goal_makes_only_the_transitions_of_the_state_machine():
     assert moves == {(1, 2), (1, 3), (2, 3), (2, 4), (2, 6), (3, 4), (3, 5), (3, 6)}
 
 
-def test_an_impossible_transition_is_an_error_with_the_reason(table):
-    goal = table[KEYS[3]]
-    with pytest.raises(RuntimeError, match=r"goal 0404.* is succeeded and cannot be aborted"):
-        goal.advance(GoalEvent.ABORT, 0)
-    table.expire(10**9)
-    with pytest.raises(RuntimeError, match="is unknown and cannot be aborted"):
-        goal.advance(GoalEvent.ABORT, 0)
-
-
 @pytest.mark.parametrize(
     ("key", "stamp_s", "code", "meant"),
     [

@@ -104,18 +104,6 @@ def test_data_that_is_not_little_endian_cdr_is_refused(data):
         deserialize(data, get_message("std_msgs/msg/String"))
 
 
-@pytest.mark.parametrize("length", range(4, 300, 7))
-def test_truncated_data_is_refused(length):
-    goal = FJT.Goal()
-    goal.trajectory.joint_names = ["a", "b"]
-    points = get_message("trajectory_msgs/msg/JointTrajectoryPoint")
-    goal.trajectory.points = [points(positions=[1.0, 2.0], velocities=[0.0, 1.0]) for _ in range(4)]
-    data = serialize(goal)
-    assert len(data) > 300
-    with pytest.raises(ValueError, match=r"malformed CDR|bytes of CDR"):
-        deserialize(data[:length], FJT.Goal)
-
-
 @settings(deadline=None, max_examples=300)
 @given(st.binary(max_size=200))
 def test_random_bytes_are_decoded_or_refused_with_a_value_error(body):

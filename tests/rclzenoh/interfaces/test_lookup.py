@@ -1,6 +1,4 @@
-import pytest
-
-from rclzenoh.interfaces import get_action, get_message, get_service
+from rclzenoh.interfaces import get_action, get_service
 
 
 def test_a_service_holds_request_and_response():
@@ -16,10 +14,3 @@ def test_an_action_holds_its_parts_and_its_protocol():
     request = action.Impl.SendGoalService.Request(goal=action.Goal())
     assert request.goal.trajectory.points == []
     assert isinstance(action.Impl.FeedbackMessage().feedback, action.Feedback)
-
-
-@pytest.mark.parametrize("get", [get_message, get_service, get_action])
-def test_a_name_of_another_kind_is_refused(get):
-    name = "std_msgs/msg/String" if get is not get_message else "std_srvs/srv/Empty"
-    with pytest.raises(ValueError, match="expected a name of the form"):
-        get(name)

@@ -62,10 +62,6 @@ def test_messages_compare_by_value_and_can_be_copied():
     assert message != Pose()
 
 
-def test_a_message_shows_its_fields():
-    assert repr(get_message("geometry_msgs/msg/Point")(x=1.0)) == "geometry_msgs.msg.Point(x=1.0, y=0.0, z=0.0)"
-
-
 def test_field_types_are_named_as_in_rosidl():
     assert JointState.get_fields_and_field_types()["position"] == "sequence<double>"
     assert JointState.get_fields_and_field_types()["header"] == "std_msgs/Header"

@@ -33,12 +33,6 @@ def test_the_committed_stubs_match_the_definitions(generator):
         assert path.read_text(encoding="utf-8") == text, f"python packaging/{GENERATOR.name} writes {path.name} again"
 
 
-def test_a_typed_interface_with_an_untyped_part_is_an_error(generator, monkeypatch):
-    monkeypatch.setattr(generator, "MESSAGES", {"Header": "std_msgs/msg/Header"})
-    with pytest.raises(ValueError, match="builtin_interfaces/msg/Time is part of a typed interface"):
-        generator.stubs()
-
-
 @pytest.mark.parametrize(
     ("module", "names", "get"),
     [
