@@ -36,11 +36,3 @@ def test_a_robot_of_another_mass_is_refused(robot: Robot) -> None:
     assert not result.successful
     assert "may differ only in what is seen" in result.reason
     assert "cannot be read as robot description" in robot.set({"robot_description": "<robot"}).reason
-
-
-def test_a_description_that_is_nested_too_deeply_is_refused(robot: Robot) -> None:
-    deep = "<robot><link name='a'>" + 20000 * "<a>" + 20000 * "</a>" + "</link></robot>"
-    result = robot.set({"robot_description": deep})
-    assert not result.successful
-    assert "may differ only in what is seen" in result.reason
-    assert robot.set({"robot_description": OWN}).successful

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -13,22 +12,19 @@ from tests.integration.robot import (
     CONFIG,
     ELBOW,
     PAUSED,
-    PLAYING,
     POSTURE,
     STEP_NS,
-    JointTrajectory,
     Robot,
     goal,
     running_simulation,
     stamp_ns,
     swing,
-    trajectory,
 )
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros import Context, DurabilityPolicy, Parameter, QoSProfile, get_message
 
-SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+SUCCEEDED, ABORTED = 4, 6
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
 JTC = "joint_trajectory_controller/JointTrajectoryController"
 RIGHT_ARM = "right_arm_controller"
@@ -53,14 +49,6 @@ def put(robot: Robot, **parameters: Any) -> Any:
         Parameter(name.replace("__", "."), value=value).to_parameter_msg() for name, value in parameters.items()
     ]
     return ask(robot, "set_parameters_atomically", parameters=messages).result
-
-
-@contextmanager
-def change_parameters(robot: Robot, **parameters: Any) -> Iterator[None]:
-    before = values(robot)
-    assert put(robot, **parameters).successful
-    yield
-    assert put(robot, **{name: before[name.replace("__", ".")] for name in parameters}).successful
 
 
 def test_controllers_are_listed_as_the_controller_manager_does(robot: Robot) -> None:
@@ -95,39 +83,11 @@ def test_parameters_have_the_values_of_the_real_robot(robot: Robot) -> None:
         assert not any(found[name] for name in (*off, "constraints.decelerate_on_cancel"))
 
 
-def test_tolerances_that_are_changed_hold_for_the_next_goal(robot: Robot) -> None:
-    assert robot.set({"robot.effort_scale": 0.01}).successful
-    robot.reset()
-    robot.put_into(PAUSED)
-    first = robot.send(swing())
-    wide = {f"constraints__{joint}__goal": 9.0 for joint in TALOS.controllers[ARM]}
-    with change_parameters(robot, **wide):
-        robot.put_into(PLAYING)
-        assert robot.outcome(first)[:2] == (ABORTED, -5)
-        assert robot.outcome(robot.send(swing()))[0] == SUCCEEDED
-
-
-def test_partial_goals_can_be_allowed(robot: Robot) -> None:
-    wish = goal(ARM, 0.5)
-    wish.trajectory.joint_names = [ELBOW]
-    for point, angle in zip(wish.trajectory.points, (POSTURE[ELBOW], -1.2), strict=True):
-        point.positions, point.velocities, point.accelerations = [angle], [0.0], [0.0]
-    assert not robot.send(wish).accepted
-    with change_parameters(robot, allow_partial_joints_goal=True):
-        assert robot.outcome(robot.send(wish))[0] == SUCCEEDED
-    assert robot.joint(ELBOW) == pytest.approx(-1.2, abs=0.005)
-    assert robot.joint("arm_right_1_joint") == pytest.approx(POSTURE["arm_right_1_joint"], abs=0.005)
-
-
 @pytest.mark.parametrize(
     ("parameter", "value", "reason"),
     [
         ("constraints__goal_time", -1.0, r"constraints\.goal_time out of range"),
-        (f"constraints__{ELBOW}__goal", float("nan"), rf"constraints\.{ELBOW}\.goal out of range"),
-        ("constraints__goal_time", "soon", "Wrong parameter type"),
         ("interpolation_method", "none", "read-only"),
-        (f"constraints__{ELBOW}__max_deceleration_on_cancel", 5.0, "read-only"),
-        ("constraints__no_joint__goal", 0.1, "declared parameter|not declared"),
     ],
 )
 def test_impossible_parameters_are_refused_with_the_reason(
@@ -212,15 +172,6 @@ def other(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFact
         yield robot
 
 
-def test_controllers_can_have_the_names_of_ros_1(other: Robot) -> None:
-    def names() -> set[str]:
-        return {name for name, namespace in other.node.get_node_names_and_namespaces() if namespace == "/sim_1"}
-
-    wanted = {TALOS.graph_name(name, "ros1") for name in TALOS.controllers}
-    other.wait_until(lambda: wanted <= names(), "all controllers are discovered")
-    assert not {ARM, "arm_left_controller"} & names()
-
-
 def test_goals_that_are_refused_can_be_accepted_and_aborted_with_the_reason(other: Robot) -> None:
     other.reset()
     wish = goal(ARM)
@@ -234,46 +185,3 @@ def test_goals_that_are_refused_can_be_accepted_and_aborted_with_the_reason(othe
     assert locked[:2] == (ABORTED, -1)
     assert "arm_right_5_joint is locked at 0 rad" in locked[2]
     assert other.now_ns() == 0
-
-
-def test_a_refused_goal_does_not_abort_the_running_goal(other: Robot) -> None:
-    other.reset()
-    other.put_into(PAUSED)
-    first = other.send(goal(ARM, 0.5, arm_right_4_joint=-1.2), RIGHT_ARM)
-    refused = other.send(goal(ARM, arm_right_4_joint=float("nan")), RIGHT_ARM)
-    assert other.outcome(refused)[:2] == (ABORTED, -1)
-    other.put_into(PLAYING)
-    assert other.outcome(first)[0] == SUCCEEDED
-
-
-def test_a_trajectory_on_the_topic_can_abort_the_goal(other: Robot) -> None:
-    other.reset()
-    other.put_into(PAUSED)
-    handle = other.send(swing(), RIGHT_ARM)
-    publisher = other.node.create_publisher(JointTrajectory, other.topic(f"{RIGHT_ARM}/joint_trajectory"), 10)
-    other.wait_until(lambda: publisher.get_subscription_count() == 1, "the controller listens")
-    publisher.publish(trajectory(ARM, 0.5, arm_right_4_joint=-0.7))
-    assert other.outcome(handle) == (ABORTED, -1, "Current goal preempted by a trajectory on the topic.")
-    other.node.destroy_publisher(publisher)
-    other.put_into(PLAYING)
-
-
-def test_joints_can_brake_when_a_goal_is_cancelled(other: Robot) -> None:
-    other.reset()
-    other.put_into(PAUSED)
-    handle = other.send(swing(), RIGHT_ARM)
-    other.step(250)
-    with other.listening(STATE, f"{RIGHT_ARM}/controller_state") as heard:
-        other.wait_until_found(heard)
-        assert other.result(handle.cancel_goal_async()).return_code == 0
-        assert other.outcome(handle) == (CANCELED, 0, "")
-        other.step(200)
-        other.wait_until(lambda: bool(heard) and stamp_ns(heard[-1].header.stamp) == 449 * STEP_NS, "the state")
-    column = TALOS.controllers[ARM].index(ELBOW)
-    after = [message for message in heard if stamp_ns(message.header.stamp) >= 250 * STEP_NS]
-    speeds = [message.reference.velocities[column] for message in after]
-    assert speeds[0] > 2.0
-    assert speeds == sorted(speeds, reverse=True)
-    assert speeds[-1] == 0
-    assert abs(heard[-1].feedback.velocities[column]) < 0.1
-    other.put_into(PLAYING)

@@ -1,14 +1,13 @@
 """Topics, services and actions of a simulation, as `ros2 node info` and late subscribers see them."""
 
 import xml.etree.ElementTree as ET
-from pathlib import Path
 from typing import Any
 
 import pinocchio
 import pytest
 
 from rclzenoh.keys import EntityKind, Token
-from tests.integration.robot import ARM, CONFIG, PAUSED, Robot
+from tests.integration.robot import ARM, PAUSED, Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_action_server_names_and_types_by_node
 from throwcollect.ros.middleware import uses_rclpy
@@ -48,8 +47,6 @@ PARAMETERS = [
     "SetParameters",
     "SetParametersAtomically",
 ]
-TABLE = Path(__file__).parents[1] / "rclzenoh" / "interfaces" / "official_hashes.txt"
-HASHES = dict(line.split() for line in TABLE.read_text(encoding="utf-8").splitlines())
 
 
 def snake(name: str) -> str:
@@ -121,13 +118,6 @@ def test_the_controllers_are_named_as_on_the_robot() -> None:
     assert set(TALOS.controllers) == {f"{limb}_controller" for limb in limbs}
 
 
-def test_every_type_is_announced_with_the_hash_of_the_official_generator(robot: Robot) -> None:
-    found = {token.ros_type: token.type_hash for token in tokens(robot, *list(EntityKind)[1:])}
-    assert {f"{ACTION}_{part}" for part in ("SendGoal", "GetResult", "FeedbackMessage")} <= set(found)
-    assert len(found) > 30
-    assert {name: HASHES.get(name) for name in found} == found
-
-
 def test_endpoints_have_the_quality_of_service_of_genuine_nodes(robot: Robot) -> None:
     expected = {
         "/rosout": ":1:,1000:,:10,0:,,",
@@ -166,9 +156,3 @@ def test_static_and_moving_transforms_connect_every_link_to_world(robot: Robot, 
         while frame in parents:
             frame = parents[frame]
         assert frame == "world", link.get("name")
-
-
-def test_the_base_stands_where_the_configuration_says(robot: Robot) -> None:
-    static = wait_for_latched(robot, "tf2_msgs/msg/TFMessage", "tf_static")
-    (base,) = [each.transform.translation for each in static.transforms if each.header.frame_id == "world"]
-    assert (base.x, base.y, base.z) == (0.0, 0.0, CONFIG.robot.base_height_m)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, POSTURE, TORSO, Robot, goal, signer, swing, trajectory
+from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, TORSO, Robot, goal, signer, swing, trajectory
 from throwcollect.episode.episode_message import Episode, unpack
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.run_key import Signer
@@ -72,14 +72,6 @@ def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> 
     assert [json.loads(delivery.result)["outcome"] for delivery in deliveries] == ["landed"] * 3
     start_ns = [delivery.header.start_ns for delivery in deliveries]
     assert start_ns == [CONFIG.trial_start_ns(trial) for trial in (4, 2, 3)]
-
-
-def test_an_impossible_trial_is_refused_and_the_next_one_is_simulated(robot: Robot) -> None:
-    wrong, right = lease(robot, {"ball.mass_kg": -1.0}), lease(robot, {}, trial=5)
-    refusal, delivery = wait_for_episodes(robot, wrong, right)
-    assert refusal.trial == wrong.trial
-    assert "ball.mass_kg" in refusal.reason
-    assert delivery.header.trial == 5
 
 
 def test_leases_that_are_not_signed_are_refused(robot: Robot) -> None:
@@ -187,13 +179,6 @@ def test_controllers_are_as_configured_in_every_leased_trial(robot: Robot) -> No
     robot.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
     (touched,) = wait_for_episodes(robot, lease(robot, {}))
     assert touched.digest == untouched.digest
-
-
-def test_a_lease_can_be_ended_by_hand(leased: Robot) -> None:
-    assert leased.set({"trial.number": -1}).successful
-    assert leased.set({"ball.friction": 0.2}).successful
-    leased.reset()
-    assert leased.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
 
 
 def test_an_episode_without_a_lease_has_no_trajectory_in_its_conditions(robot: Robot) -> None:

@@ -3,11 +3,9 @@
 import os
 import random
 import signal
-import string
 import subprocess
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,8 +15,8 @@ from rclzenoh.endpoint import Attachment
 from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.keys import EntityKind, Token, data_key
 from tests.commands import Command
-from tests.integration.robot import ARM, OWN, PLAYING, Robot, connect, environment, goal, start_simulation, swing
-from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
+from tests.integration.robot import ARM, OWN, PLAYING, Robot, environment, goal, swing
+from throwcollect.ros import get_message
 from throwcollect.ros.middleware import uses_rclpy
 
 # These tests do not cover how rclpy and its RMW handle garbage.
@@ -35,7 +33,6 @@ VALID = Attachment(1, 0, bytes(16)).pack()
 CONSEQUENTIAL = ("set_simulation_state", "step_simulation", "simulate_steps")
 """Services and actions whose valid requests may end the process or keep it busy for long."""
 
-LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 CLIENT = """
 import sys
@@ -176,34 +173,6 @@ def assert_works(robot: Robot) -> None:
     assert robot.outcome(handle)[1] == 0
 
 
-@embedded_alone
-def test_a_simulation_survives_malformed_tokens(running: tuple[Command, Robot], endpoint: str) -> None:
-    process, robot = running
-    chance = random.Random(SEED)
-    session, domain = robot.node.context.session, robot.node.context.get_domain_id()
-    letters = string.ascii_letters + string.digits + "%_:,.-~@é\N{GRINNING FACE}"
-    tokens = []
-    for index in range(300):
-        chunks = ["1a", str(index), str(index), "MS", "%", f"%{OWN}", "odd", f"%{OWN}%joint_states"]
-        chunks += ["sensor_msgs::msg::dds_::JointState_", "RIHS01_0", "::,1:,:,:,,"]
-        for _ in range(chance.randint(1, 4)):
-            where = chance.randrange(len(chunks))
-            chunks[where] = "".join(chance.choices(letters, k=chance.choice((1, 3, 20, 5000))))
-        if chance.random() < 0.3:
-            del chunks[chance.randrange(len(chunks)) :]
-        key = "/".join(["@ros2_lv", str(domain), *chunks]).removesuffix("/")
-        try:
-            tokens.append(session.liveliness().declare_token(key))
-        except zenoh.ZError:
-            continue  # Zenoh itself refuses this key.
-    assert len(tokens) > 200
-    assert_works(robot)
-    for token in tokens:
-        token.undeclare()
-    assert_works(robot)
-    assert process.poll() is None
-
-
 def test_a_goal_goes_on_when_its_client_vanishes_and_is_forgotten_in_time(
     running: tuple[Command, Robot], endpoint: str
 ) -> None:
@@ -232,85 +201,3 @@ def test_a_goal_goes_on_when_its_client_vanishes_and_is_forgotten_in_time(
     # On DDS, the result may overtake the status.
     robot.wait_until(lambda: last() == [4], "the status of the new goal alone")
     assert process.poll() is None
-
-
-def test_a_clock_that_jumps_back_keeps_results_and_later_goals(robot: Robot) -> None:
-    assert robot.set({"trial.number": 9}).successful
-    robot.reset()
-    late = robot.send(swing(0.2))
-    assert robot.outcome(late)[1] == 0
-    assert robot.set({"trial.number": 0}).successful
-    robot.reset()
-    assert robot.outcome(late)[1] == 0
-    early = robot.send(swing(0.2))
-    assert robot.outcome(early)[1] == 0
-    assert robot.outcome(late)[1] == 0
-
-
-def start_router(listen: str) -> tuple[subprocess.Popen[str], str]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "throwcollect.ros.router", "--listen", listen], stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None
-    return process, process.stdout.readline().split()[-1]
-
-
-def test_a_simulation_survives_the_loss_of_its_router_and_reconnects(tmp_path: Path) -> None:
-    router, endpoint = start_router("tcp/127.0.0.1:0")
-    simulation = start_simulation(tmp_path, endpoint, OWN)
-    try:
-        with connect(endpoint) as context:
-            robot = Robot(context, OWN)
-            robot.wait_until_ready(simulation)
-            # A simulation checks itself by a client before it is ready; the test waits until that client has gone.
-            robot.wait_until(lambda: not endpoints(robot, EntityKind.CLIENT), "it has asked itself")
-            before = {token.key() for kind in EntityKind for token in endpoints(robot, kind)}
-            assert robot.set({"sim.real_time_factor": 1.0}).successful
-            handle = robot.send(swing(1.0))
-            lost = handle.get_result_async()
-            router.kill()
-            router.communicate()
-            robot.wait_until(lambda: not endpoints(robot, EntityKind.NODE), "it is out of sight")
-            router, _ = start_router(endpoint)
-
-            def list_keys() -> set[str]:
-                return {token.key() for kind in EntityKind for token in endpoints(robot, kind)}
-
-            robot.wait_until(lambda: list_keys() == before, "everything is announced again")
-            # The request for the result was lost with the router, but the result itself was not.
-            assert robot.outcome(handle)[:2] == (4, 0)
-            assert not lost.done()
-            with robot.listening("std_msgs/msg/String", "robot_description", LATE) as heard:
-                robot.wait_until(lambda: bool(heard), "what was published before")
-            assert_works(robot)
-    finally:
-        for process in (router, simulation):
-            process.kill()
-            process.communicate()
-
-
-@embedded_alone
-def test_two_simulations_of_one_name_both_work(running: tuple[Command, Robot], endpoint: str, tmp_path: Path) -> None:
-    process, robot = running
-    (tmp_path / "twin").mkdir()
-    twin = start_simulation(tmp_path / "twin", endpoint, OWN)
-    try:
-        robot.wait_until(lambda: robot.node.count_publishers(robot.topic("episode")) == 2, "the twin is ready")
-        tf = robot.topic("tf")
-        # Identifiers may begin alike, so whole ones are compared.
-        robot.wait_until(
-            lambda: len({bytes(each.endpoint_gid) for each in robot.node.get_publishers_info_by_topic(tf)}) == 2,
-            "both have a publisher with an identifier of its own",
-        )
-        with robot.listening("sensor_msgs/msg/JointState", "joint_states") as heard:
-            assert robot.set({"trial.number": 1}).successful
-            robot.reset()
-            assert robot.outcome(robot.send(swing(0.2)))[1] == 0
-            robot.wait_until(lambda: len(heard) > 50, "samples")
-        assert process.poll() is None
-        assert twin.poll() is None
-    finally:
-        twin.kill()
-        output, _ = twin.communicate()
-    assert f"there is another node /{OWN}/{OWN}" in output
-    assert_works(robot)

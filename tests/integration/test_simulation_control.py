@@ -6,12 +6,10 @@ import pytest
 
 from tests.integration.robot import (
     ARM,
-    CONFIG,
     ELBOW,
     PAUSED,
     PLAYING,
     POSTURE,
-    SAMPLE_NS,
     STEP_NS,
     STOPPED,
     Result,
@@ -104,16 +102,6 @@ def test_a_reset_brings_time_robot_and_ball_back(scope: int, robot: Robot) -> No
     assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
 
 
-@pytest.mark.parametrize("scope", [8, 9, 254])
-def test_a_reset_with_unsupported_scope_bits_is_refused_and_changes_nothing(scope: int, robot: Robot) -> None:
-    robot.put_into(PAUSED)
-    robot.step(5)
-    refused = robot.call("reset_simulation", scope=scope).result
-    assert refused.result == Result.RESULT_FEATURE_UNSUPPORTED
-    assert refused.error_message.startswith(f"scope {scope} cannot be reset")
-    assert robot.now_ns() == 5 * STEP_NS
-
-
 @in_order_of_arrival
 def test_a_reset_of_time_aborts_goals_and_publishes_the_clock_while_paused(robot: Robot) -> None:
     robot.put_into(PAUSED)
@@ -146,50 +134,3 @@ def test_a_reset_of_states_goes_back_to_the_start_while_time_goes_on(robot: Robo
     robot.step(100)
     assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-3)
     assert robot.now_ns() == later + 100 * STEP_NS
-
-
-def test_a_reset_of_states_aborts_goals(robot: Robot) -> None:
-    robot.put_into(PAUSED)
-    handle = robot.send(swing())
-    robot.step(10)
-    assert robot.call("reset_simulation", scope=Reset.SCOPE_STATE).result.result == Result.RESULT_OK
-    assert robot.outcome(handle) == (ABORTED, INVALID_GOAL, "simulation was reset")
-
-
-def test_a_pause_in_the_middle_of_a_goal_does_not_change_the_motion(robot: Robot) -> None:
-    # The first sample and the samples after the motion are left out, as whether they are heard depends on chance.
-    moments = set(range(2 * SAMPLE_NS, 600_000_001, SAMPLE_NS))
-
-    def motion(*, pause: bool) -> dict[int, list[float]]:
-        robot.reset()
-        robot.put_into(PAUSED)
-        with robot.listening("sensor_msgs/msg/JointState", "joint_states") as heard:
-            handle = robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0))
-            robot.step(100)
-            if pause:
-                for _ in range(5):
-                    assert robot.now_ns() == 100 * STEP_NS
-            robot.put_into(PLAYING)
-            assert robot.outcome(handle)[1] == 0
-            robot.wait_until(lambda: stamp_ns(heard[-1].header.stamp) >= max(moments), "the end of the motion")
-            positions = {stamp_ns(message.header.stamp): list(message.position) for message in heard}
-            return {moment: positions[moment] for moment in positions.keys() & moments}
-
-    paused, other = motion(pause=True), motion(pause=False)
-    both = paused.keys() & other.keys()
-    assert [paused[moment] for moment in both] == [other[moment] for moment in both]
-    # A busy machine may drop messages, so half of the samples are enough.
-    assert len(both) >= len(moments) // 2
-    assert max(both) > 500_000_000
-
-
-def test_a_reset_to_an_impossible_start_state_is_refused_until_it_is_corrected(robot: Robot) -> None:
-    assert robot.set({"ball.radius_m": 0.005}).successful
-    refused = robot.call("reset_simulation").result
-    assert refused.result == Result.RESULT_OPERATION_FAILED
-    assert "must be above tool.cup_floor_radius_m = 0.006" in refused.error_message
-    assert robot.put_into(STOPPED).result == SetState.Response.STATE_TRANSITION_ERROR
-    robot.put_into(PLAYING)
-    assert robot.set({"ball.radius_m": CONFIG.ball.radius_m}).successful
-    robot.reset()
-    assert robot.outcome(robot.send(swing()))[1] == 0

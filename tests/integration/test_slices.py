@@ -198,13 +198,6 @@ def test_a_finished_slice_is_not_collected_again(frozen: Path) -> None:
     assert not collect_slice(frozen, Slice(0, 6), overrides=INPROCESS)
 
 
-def test_joining_says_which_slices_are_missing(frozen: Path) -> None:
-    collect(frozen, "1/3")
-    with pytest.raises(DatasetError, match=r"lacks 2 slices of 3: 0/3, 2/3") as caught:
-        join(frozen)
-    assert "--slice 0/3" in str(caught.value)
-
-
 def test_joining_can_be_repeated_after_a_kill_at_any_point(frozen: Path, whole: Path, tmp_path: Path) -> None:
     collect(frozen, "0/2", "1/2")
     killed = subprocess.run([sys.executable, "-c", KILLED_ANYWHERE, frozen, tmp_path / "killed"], check=False)
@@ -302,9 +295,3 @@ def test_a_slice_is_collected_on_a_disk_of_the_node_and_handed_over(
     assert fingerprints(frozen) == fingerprints(whole)
     with pytest.raises(ConfigError, match=r"cluster.scratch: \$MISSING is \$MISSING here, not an absolute path"):
         collect_slice(frozen, Slice(0, 3), overrides=[*INPROCESS, "cluster.scratch=$MISSING"])
-
-
-def test_a_dataset_whose_end_depends_on_results_is_refused(config: Path, tmp_path: Path) -> None:
-    prepare(load(config, ["until.landed=3", "trials=200"]), tmp_path / "data", sweep_directory=tmp_path)
-    with pytest.raises(ConfigError, match=r"until: a dataset whose end"):
-        collect_slice(tmp_path / "data", Slice(0, 2))

@@ -9,9 +9,7 @@ from tests.integration.robot import (
     ELBOW,
     PATIENCE_S,
     PAUSED,
-    PLAYING,
     STEP_NS,
-    STOPPED,
     Result,
     Robot,
     goal,
@@ -53,16 +51,6 @@ def test_steps_advance_the_clock_exactly(steps: int, robot: Robot) -> None:
     assert robot.step(3).result == Result.RESULT_OK
     assert robot.now_ns() == (steps + 3) * STEP_NS
     assert robot.state() == PAUSED
-
-
-@pytest.mark.parametrize("state", [PLAYING, STOPPED])
-def test_steps_are_refused_unless_the_simulation_is_paused(state: int, robot: Robot) -> None:
-    if state != PLAYING:
-        robot.put_into(state)
-    refused = robot.step(1)
-    assert refused.result == Result.RESULT_OPERATION_FAILED
-    assert "paused" in refused.error_message
-    assert robot.now_ns() == 0
 
 
 def test_steps_carry_a_goal_forward(robot: Robot) -> None:
@@ -109,16 +97,6 @@ def test_the_step_action_gives_feedback_on_each_step_and_ends_paused(robot: Robo
     assert robot.state() == PAUSED
 
 
-@pytest.mark.parametrize("state", [PLAYING, STOPPED])
-def test_the_step_action_fails_unless_the_simulation_is_paused(state: int, robot: Robot, action: ActionClient) -> None:
-    if state != PLAYING:
-        robot.put_into(state)
-    status, code, words = end(robot, begin(robot, action, 5))
-    assert (status, code) == (ABORTED, Result.RESULT_OPERATION_FAILED)
-    assert "while the simulation is paused only" in words
-    assert robot.now_ns() == 0
-
-
 def test_other_step_requests_are_refused_while_steps_are_taken(robot: Robot, action: ActionClient) -> None:
     robot.put_into(PAUSED)
     handle = begin(robot, action, FOR_EVER)
@@ -135,24 +113,6 @@ def test_other_step_requests_are_refused_while_steps_are_taken(robot: Robot, act
     assert words.endswith(f" of {FOR_EVER} steps")
     assert int(words.split()[2]) * STEP_NS == robot.now_ns()
     assert robot.step(1).result == Result.RESULT_OK
-
-
-@pytest.mark.parametrize(
-    ("interrupt", "words"),
-    [
-        (lambda robot: robot.reset(), "the simulation was reset, after "),
-        (lambda robot: robot.put_into(PLAYING), "the simulation is PLAYING now, after "),
-        (lambda robot: robot.put_into(STOPPED), "the simulation is STOPPED now, after "),
-    ],
-)
-def test_a_reset_or_another_state_ends_steps(interrupt: Any, words: str, robot: Robot, action: ActionClient) -> None:
-    robot.put_into(PAUSED)
-    handle = begin(robot, action, FOR_EVER)
-    robot.wait_until(lambda: robot.now_ns() > 0, "steps are taken")
-    interrupt(robot)
-    status, code, message = end(robot, handle)
-    assert (status, code) == (ABORTED, Result.RESULT_OPERATION_FAILED)
-    assert message.startswith(words)
 
 
 def test_steps_go_on_beyond_the_end_of_a_trial_which_yields_its_episode(robot: Robot) -> None:
