@@ -1,8 +1,4 @@
-"""A Slurm of several nodes that are all this machine, for tests; root alone can start it.
-
-From the command line: ``python tests/cluster/slurm.py up DIR [NODES]``, ``down DIR``, ``kill-node DIR NODE``,
-``kill-slurmd DIR NODE``, ``revive DIR NODE``. Commands of Slurm find it by ``SLURM_CONF=DIR/slurm.conf``.
-"""
+"""A Slurm of several nodes that are all this machine, for tests; root alone can start it."""
 
 from __future__ import annotations
 
@@ -12,7 +8,6 @@ import shutil
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -352,26 +347,3 @@ def _wait(condition: Callable[[], bool], evidence: Callable[[], str]) -> None:
         if time.monotonic() > deadline:
             raise TimeoutError(evidence())
         time.sleep(0.05)
-
-
-def main(arguments: list[str]) -> None:
-    """What the command line asks for."""
-    match arguments:
-        case ["up", directory]:
-            Slurm(Path(directory)).up()
-        case ["up", directory, nodes]:
-            Slurm(Path(directory)).up(int(nodes))
-        case ["down", directory]:
-            Slurm(Path(directory)).down()
-        case ["kill-node", directory, node]:
-            Slurm(Path(directory)).kill_node(node)
-        case ["kill-slurmd", directory, node]:
-            Slurm(Path(directory)).kill_slurmd(node)
-        case ["revive", directory, node]:
-            Slurm(Path(directory)).revive(node)
-        case _:
-            sys.exit(__doc__)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

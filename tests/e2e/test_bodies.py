@@ -8,17 +8,12 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from mcap.reader import make_reader
-from PIL import Image
 
 import throwcollect
-from rclzenoh.interfaces import deserialize, get_message
 from tests.e2e.collection import collect_here
 from throwcollect.config.loader import load
 from throwcollect.dataset.verify import verify
 from throwcollect.export.export import export
-from throwcollect.view.animation import render
-from throwcollect.view.viewer_directory import view
 
 pytestmark = pytest.mark.e2e
 
@@ -98,32 +93,3 @@ def test_policies_get_the_bodies_as_state_of_the_environment(dataset: Path, push
     seen = {round(row[state.index("can.x")], 4) for row in rows}
     can = throwcollect.load(dataset)[pushed].bodies["can"]
     assert {round(float(x), 4) for x in can.position[:, 0].astype(np.float32)} <= seen
-
-
-def test_viewers_draw_a_body_in_its_own_frame(dataset: Path, pushed: int, tmp_path: Path) -> None:
-    view(dataset, tmp_path / "view", trials=[pushed])
-    (file,) = (tmp_path / "view").glob("*.mcap")
-    places, frames = [], set()
-    with file.open("rb") as stream:
-        for schema, channel, message in make_reader(stream).iter_messages(topics=["/tf", "/view/throw"]):
-            content = deserialize(message.data, get_message(schema.name))
-            if channel.topic == "/tf":
-                places += [each.transform.translation.x for each in content.transforms if each.child_frame_id == "can"]
-            else:
-                frames |= {marker.header.frame_id for marker in content.markers if marker.ns == "bodies"}
-    assert frames == {"world", "can", "brick", "ball"}
-    assert places == throwcollect.load(dataset)[pushed].bodies["can"].position[:, 0].tolist()
-
-
-def test_pictures_show_where_a_body_is(dataset: Path, pushed: int, tmp_path: Path) -> None:
-    render(dataset, tmp_path / "throw.webp", trials=[pushed], slow=0.1, size=(240, 180))
-
-    def find_red(frame: int) -> np.ndarray:
-        with Image.open(tmp_path / "throw.webp") as picture:
-            picture.seek(frame)
-            pixels = np.array(picture.convert("RGB"), int)
-        return np.argwhere((pixels[..., 0] > 120) & (pixels[..., 1] < 90) & (pixels[..., 2] < 80)).mean(axis=0)
-
-    with Image.open(tmp_path / "throw.webp") as picture:
-        last = picture.n_frames - 1
-    assert np.linalg.norm(find_red(last) - find_red(0)) > 1.5

@@ -42,11 +42,3 @@ def test_rounds_are_datasets_that_can_be_continued_and_merged(config: Path, tmp_
     merged = call_here("dataset", "merge", *found, rounds / "all")
     assert merged.returncode == 0, merged.stderr
     assert load(rounds / "all" / "config.yaml").sweep.target == load(config).sweep.target
-
-
-def test_without_a_target_or_trials_nothing_is_written(config: Path, tmp_path: Path) -> None:
-    for change, key in (("sweep.target=null", "sweep.target"), ("trials=2", "trials")):
-        refused = call_here("cover", *INPROCESS, config, "--set", change, "--output", tmp_path / "rounds")
-        assert refused.returncode == 2, refused.stderr
-        assert key in refused.stderr
-    assert not (tmp_path / "rounds").exists()

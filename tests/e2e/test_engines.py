@@ -13,17 +13,6 @@ from tests.e2e.collection import call_here, collect_here, write_config
 pytestmark = pytest.mark.e2e
 
 
-def test_a_collection_without_contacts_can_be_verified_and_replayed(tmp_path: Path) -> None:
-    config, directory = write_config(tmp_path, trials=6), tmp_path / "throws"
-    # At the end three of the trials are simulated once more, in another process, and compared bit for bit.
-    options = ("--set", "sim.engine=ballistic", "--set", "run.replay=3")
-    first = collect_here(config, directory, *options)
-    assert first["outcomes"] == {"landed": 6}
-    verified = call_here("dataset", "verify", directory, "--replay", "6")
-    assert verified.returncode == 0, verified.stderr
-    assert "leaves the tool when the tool would have to pull it" in (directory / "README.md").read_text()
-
-
 def test_a_collection_of_mujoco_can_be_verified_and_compared_with_bullet(tmp_path: Path) -> None:
     config, directory = write_config(tmp_path, trials=6), tmp_path / "throws"
     first = collect_here(config, directory, "--set", "sim.engine=mujoco")

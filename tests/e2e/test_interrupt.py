@@ -1,9 +1,7 @@
 """Interruptions and losses leave no torn files and no processes, and messages name their cause."""
 
 import io
-import json
 import os
-import shutil
 import signal
 from collections import Counter
 from collections.abc import Iterator
@@ -176,21 +174,6 @@ def test_a_restarted_coordinator_recovers_the_recorded_episodes(
     assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") > 0
 
 
-def test_a_finished_dataset_whose_recording_was_cut_goes_on_to_the_same_files(
-    config: Path, reference: Path, tmp_path: Path
-) -> None:
-    directory = Path(shutil.copytree(reference, tmp_path / "data"))
-    said = call_here("resume", directory, *INPROCESS)
-    assert (said.returncode, "every trial has ended, nothing is left to do" in said.stderr) == (0, True)
-    shard = directory / "small_00000.mcap"
-    size = shard.stat().st_size
-    os.truncate(shard, size * 2 // 3)
-    said = call_here("resume", directory, *INPROCESS)
-    assert said.returncode == 0, said.stderr
-    assert f"{directory}: small_00000.mcap: " in said.stderr
-    assert fingerprints(directory) == fingerprints(reference)
-
-
 def test_a_killed_launcher_ends_its_nodes_and_resuming_after_a_power_cut_keeps_the_episodes_on_the_disk(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
@@ -235,24 +218,6 @@ def test_the_trial_of_a_hanging_simulation_goes_to_another(
     assert "no episode within 2.5 s" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
     assert_gone(nodes)
-
-
-def test_a_trial_without_retries_left_is_recorded_as_lost(
-    config: Path, reference: Path, tmp_path: Path, started: list[Running]
-) -> None:
-    running, _ = begin(started, config, tmp_path / "data", "--set", "run.retries=0", "--json")
-    in_the_middle(running, whole=reference)
-    running.node("--name", "sim_0").kill()
-    code, out, err = running.finish()
-    assert code == 5, err
-    assert f"throwcollect: 1 of {TRIALS} trials is lost; throws.parquet says why" in err
-    assert f"throwcollect resume {tmp_path / 'data'}" in err
-    summary = json.loads(out)
-    assert summary["outcomes"]["lost"] == 1
-    assert summary["episodes"] == TRIALS - 1
-    assert "sim_0 was lost (ended by SIGKILL)" in err
-    rows = throws(tmp_path / "data")
-    assert [row["reason"] for row in rows if row["outcome"] == "lost"] == ["/sim_0: left the ROS graph"]
 
 
 def throws(directory: Path) -> list[dict[str, object]]:

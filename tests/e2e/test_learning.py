@@ -5,7 +5,6 @@ import json
 import re
 import runpy
 import shlex
-import shutil
 from pathlib import Path
 
 import pytest
@@ -128,35 +127,11 @@ def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> N
     assert throw.miss_m < 0.03
 
 
-def test_a_score_measures_hits_in_the_own_and_in_another_world(place: Path) -> None:
-    other = ["--config", place / "throws.yaml", "--set", "scene.gravity_mps2=8.5"]
-    found = call_here("score", place / "model", "--targets", "5", "--seeds", "2", *other, "--json")
-    assert found.returncode == 0, found.stderr
-    score = json.loads(found.stdout)
-    assert score["trained"][-1]["errors"]["median"] < 0.03
-    assert score["trained"][-1]["errors"]["median"] < score["distilled"]["median"] < 0.1
-    before, *_, after = (each["errors"]["median"] for each in score["adapted"])
-    assert after < before
-    assert json.loads((place / "model" / "score.json").read_text()) == score
-    assert "## How it hits" in (place / "model" / "README.md").read_text()
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["aim", "model"], "no target"),
-        (["aim", "model", "--at", "1.4"], "--at 1.4\n  expected: 2 numbers: landing_x_m,landing_y_m"),
-        (
-            ["aim", "model", "--targets", "throws.yaml"],
-            "--targets: should end in .csv or .parquet",
-        ),
-        (["aim", "data", "--at", "1,0"], "data: holds no model: there is no model.json\n  try: throwcollect fit "),
-        (["fit", "data", "-o", "data"], "exists"),
         (["fit", "data", "-o", "new", "--where", "trial < 0"], "fulfils 'trial < 0'"),
-        (["fit", "data", "-o", "new", "--where", "trial < 5"], "at least 18 for 5 parameters"),
-        (["adapt", "model", "model/config.yaml", "-o", "new"], "THROWS: should end in .csv"),
-        (["score", "model", "--targets", "0"], "targets: got 0"),
-        (["score", "model", "--set", "ball.mass_kg=1"], "--config CONFIG"),
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),
     ],
 )
@@ -167,30 +142,6 @@ def test_a_wrong_learning_command_gives_one_message(place: Path, arguments: list
     assert message in said.stderr
     assert "Traceback" not in said.stderr
     assert not (place / "new").exists()
-
-
-def test_throws_of_another_robot_are_refused(place: Path) -> None:
-    shutil.copytree(place / "model", place / "other")
-    path = place / "other" / "model.json"
-    path.write_text(path.read_text().replace('"robot": "talos"', '"robot": "arm"'))
-    said = call_here("adapt", place / "other", place / "data", "-o", place / "new")
-    assert said.returncode == 2
-    assert "the task throw of the robot talos\n  expected: throw of arm, as the model has it" in said.stderr
-
-
-def test_a_target_out_of_reach_is_reported_with_the_nearest_throw(place: Path) -> None:
-    said = call_here("aim", place / "model", "--at", "9,0")
-    assert said.returncode == 1
-    told = r"out of reach: 9\.000,0\.000; no throw .*\n  the nearest throw ends at \d\.\d+,-?\d\.\d+ \(7\d\d\.\d+ cm"
-    assert re.search(told, said.stderr), said.stderr
-
-
-def test_fit_learns_the_same_model_from_a_directory_and_a_loaded_dataset(place: Path) -> None:
-    directory = place / "data"
-    by_path, loaded = throwcollect.fit(str(directory)), throwcollect.fit(throwcollect.load(directory))
-    assert by_path.model_dump_json() == loaded.model_dump_json()
-    with pytest.raises(throwcollect.DatasetError, match="holds no dataset"):
-        throwcollect.fit(place / "nowhere")
 
 
 def test_the_python_program_of_the_page_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.e2e.collection import CONFIG, FAST, call_here, collect, collect_here, fingerprints, write_config
+from tests.e2e.collection import CONFIG, FAST, collect, collect_here, fingerprints, write_config
 
 ROOT = CONFIG.replace("replay: 0", "replay: 0, simulations: 1, root_namespace: true")
 
@@ -15,10 +15,3 @@ def test_a_simulation_in_the_root_namespace_collects_the_same_files(tmp_path: Pa
     assert fingerprints(rooted) == fingerprints(usual)
     journal = (rooted / "logs" / "journal.jsonl").read_text()
     assert '"simulation":"sim_0"' in journal.replace(" ", "")
-
-
-def test_several_simulations_in_the_root_namespace_are_refused(tmp_path: Path) -> None:
-    path = write_config(tmp_path, trials=6, text=ROOT, sim=FAST)
-    ended = call_here("up", "-n", "2", "--runtime", "local", path, "--output", tmp_path / "a")
-    assert ended.returncode == 2
-    assert "run.root_namespace: should be left out, as 2 simulations (-n) cannot share" in ended.stderr

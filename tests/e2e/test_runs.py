@@ -261,24 +261,6 @@ def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, re
     assert "interrupted: finishing the running trials; once more ends at once" in err
 
 
-def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
-    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "used").mkdir()
-    (tmp_path / "used" / "notes.txt").write_text("mine")
-    for arguments, message in (
-        (["none.yaml"], "none.yaml: no such file"),
-        ([config, "--output", "used"], "used: holds notes.txt"),
-        ([config, "--set", "sweep.parameters.task.duration_s={min: 0.2, max: 0.2}"], "all refused"),
-    ):
-        code, out, err = say("up", "-d", *arguments)
-        assert (code, out) == (2, "")
-        assert message in err
-    assert list((tmp_path / "state" / "runs").iterdir()) == []
-    assert not (tmp_path / "datasets").exists()
-
-
 @pytest.fixture
 def viewed() -> Iterator[str]:
     """The address of a server that `view` has begun."""

@@ -379,25 +379,6 @@ def test_view_starts_only_one_server(place: Place, monkeypatch: pytest.MonkeyPat
         psutil.Process(place.address()["pid"]).kill()
 
 
-def test_an_unusable_address_or_certificate_gives_one_message(place: Place, tmp_path: Path) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = str(taken.getsockname()[1])
-        said = call_here("serve", "--port", port)
-    assert said.returncode == 2
-    assert said.stderr.startswith(f"throwcollect: --host 127.0.0.1 --port {port}: cannot listen there: Address")
-    said = call_here("serve", "--host", "0.0.0.0", "--port", "0")  # noqa: S104 - it is refused
-    assert said.returncode == 2
-    assert "--host 0.0.0.0: anybody on that network could read the token" in said.stderr
-    (tmp_path / "no.pem").write_text("no certificate\n")
-    for file in ("none.pem", "no.pem"):
-        cert = ("--tls-cert", tmp_path / "no.pem")
-        said = call_here("serve", "--port", "0", *cert, "--tls-key", tmp_path / file)
-        assert said.returncode == 2
-        assert f"--tls-key {tmp_path / file}: cannot be used: " in said.stderr
-
-
 def test_a_server_speaks_ipv6_and_tls(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     key = RunKey(tmp_path / "key")
     key.create()

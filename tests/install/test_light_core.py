@@ -212,14 +212,8 @@ except throwcollect.MissingExtraError as error:
     ("extra", "arguments"),
     [
         ("collect", ("plan", QUICKSTART)),
-        ("collect", ("up", QUICKSTART)),
-        ("collect", ("ps",)),
         ("collect", ("ros", "topic", "list")),
-        ("collect", ("router",)),
-        ("collect", ("dataset", "view", "DATASET", "out")),
         ("report", ("dataset", "report", "DATASET")),
-        ("export", ("dataset", "export", "DATASET", "out", "--to", "hdf5")),
-        ("export", ("dataset", "export", "DATASET", "out", "--to", "mat")),
         ("export", ("dataset", "export", "DATASET", "out", "--to", "npz", "--rate", "77")),
     ],
 )
@@ -233,10 +227,3 @@ def test_a_command_without_its_extra_names_that_extra(
     assert first.startswith("throwcollect: this needs ")
     assert rest == [f"  try: pip install 'throwcollect[{extra}]'"]
     assert not (tmp_path / "out").exists()
-
-
-def test_replay_without_pybullet_is_an_error_with_a_hint(environment: Path, dataset: Path) -> None:
-    said = run(environment, "throwcollect", "dataset", "replay", dataset, "--all")
-    assert said.returncode == 2
-    assert "this needs pybullet, which is not installed" in said.stderr
-    assert len(said.stderr.splitlines()) == 2
