@@ -218,10 +218,3 @@ def test_the_trial_of_a_hanging_simulation_goes_to_another(
     assert "no episode within 2.5 s" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
     assert_gone(nodes)
-
-
-def throws(directory: Path) -> list[dict[str, object]]:
-    import pyarrow.parquet as pq
-
-    rows: list[dict[str, object]] = pq.read_table(directory / "throws.parquet").to_pylist()
-    return rows

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio
 import pytest
@@ -283,16 +281,3 @@ def test_a_tool_that_rests_is_left_to_the_check(reason, feasibility):
     config = throw({joint: TASK.start[joint] for joint in TASK.end})
     assert reason(config).startswith("task.end moves no joint")
     assert not feasibility.find_feasible([(config, task_of(config).trajectory())] * 2).any()
-
-
-@pytest.fixture
-def talos(tmp_path, monkeypatch):
-    """Talos with copies of its descriptions, and its own meshes."""
-    for part in (TALOS.urdf, TALOS.srdf):
-        (tmp_path / part).parent.mkdir(parents=True)
-        (tmp_path / part).write_text((TALOS.share() / part).read_text())
-    meshes = TALOS.urdf.replace("robots/talos_reduced.urdf", "meshes")
-    (tmp_path / meshes).symlink_to(TALOS.share() / meshes)
-    copied = replace(TALOS, share=lambda: tmp_path)
-    monkeypatch.setattr("throwcollect.robots.description.load_member", lambda *_: copied)
-    return copied

@@ -69,12 +69,6 @@ def test_a_call_fails_after_its_timeout_or_when_its_service_disappears(party: Pa
     assert party.next(id=2)["values"] == "/slow: it has gone without an answer"
 
 
-def call(node: Node, service: str = "/clock") -> Future:
-    client = node.create_client(SetBool, service)
-    assert client.wait_for_service(30)
-    return client.call_async(SetBool.Request(data=True))
-
-
 @pytest.mark.parametrize(
     ("kind", "type_name"), [("service", "std_srvs/SetBool"), ("action", "control_msgs/FollowJointTrajectory")]
 )
