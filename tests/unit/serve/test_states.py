@@ -19,12 +19,9 @@ class World(States):
         super().__init__(Catalogue({}))
         self.instances = 0
         self.looks = 0
-        self.error: Exception | None = None
 
     def _look(self) -> WholeState:
         self.looks += 1
-        if self.error is not None:
-            raise self.error
         return WholeState([ComponentState("a", "A", "session", 1, [str(self.instances)])], [])
 
 
