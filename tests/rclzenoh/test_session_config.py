@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rclzenoh.exceptions import ConfigurationError
 from rclzenoh.session_config import (
     CONFIG_FILE_VARIABLE,
     OVERRIDE_VARIABLE,
@@ -48,6 +49,13 @@ def test_the_router_comes_from_the_override_or_the_configuration_file(monkeypatc
 @pytest.mark.parametrize("make", [environment_config, lambda: client_config(ENDPOINT), lambda: router_config(ENDPOINT)])
 def test_a_session_needs_no_shared_memory(make):
     assert make().get_json("transport/shared_memory/enabled") == "false"
+
+
+def test_an_unreadable_key_is_an_error_that_names_it(key):
+    key.certificate.unlink()
+    with pytest.raises(ConfigurationError, match=f"cannot be read: {key.certificate}: No such file"):
+        client_config(ENDPOINT, key)
+    client_config("tcp/127.0.0.1:7447", key)
 
 
 def test_a_client_listens_nowhere_whatever_the_configuration_file_says(monkeypatch, tmp_path):

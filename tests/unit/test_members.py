@@ -138,25 +138,6 @@ def test_two_packages_with_a_member_of_one_name_are_refused(tmp_path: Path, monk
     members._find_members.cache_clear()
 
 
-def test_a_broken_engine_is_an_error_before_a_run_begins(tmp_path: Path) -> None:
-    install(tmp_path, "somebodys", "engines", "not_there:Engine")
-    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    (tmp_path / "throws.yaml").write_text(
-        "trials: 1\nsim: {engine: mine}\nsweep: {parameters: {task.duration_s: {values: [1.1]}}}\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-m", "throwcollect", "up", "--runtime", "local", "throws.yaml"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert "the engine mine of somebodys 1.0 cannot be loaded" in done.stderr
-    assert "sim_0" not in done.stderr
-
-
 def test_broken_members_stop_only_configurations_that_name_them(tmp_path: Path) -> None:
     for family in ("robots", "tools", "tasks"):
         install(tmp_path, f"broken_{family}", family, "not_there:Member")

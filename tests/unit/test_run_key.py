@@ -85,6 +85,12 @@ def test_a_signature_is_valid_only_for_its_key_and_text(tmp_path: Path, monkeypa
     assert not Signer(b"").has_signed(signature, b"an episode")
 
 
+def test_a_missing_key_is_an_error_that_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
+    with pytest.raises(ConfigError, match=r"the key of the run cannot be read: .*gone/key.pem: No such file"):
+        Signer.of_environment()
+
+
 def test_a_key_can_be_made_again_from_its_secret(tmp_path: Path) -> None:
     one, other = RunKey(tmp_path / "one"), RunKey(tmp_path / "other")
     one.create()

@@ -9,6 +9,7 @@ import pytest
 import throwcollect
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.trajectories import list_columns
+from throwcollect.errors import DatasetError
 from throwcollect.robots.talos import TALOS
 
 COLUMNS = tuple(list_columns(["ball"]))
@@ -81,6 +82,18 @@ def test_padded_trajectories_have_one_shape(loaded: Dataset) -> None:
             assert np.array_equal(row[:length], one[name])
             assert np.isnan(row[length:]).all()
     assert found.padded("time_s", fill=-1).min() == -1
+
+
+def test_trajectories_refuse_a_recording_with_a_flipped_bit(dataset: Path) -> None:
+    loaded = throwcollect.load(dataset)
+    path, start = dataset / "quick_00002.mcap", loaded[6].row["chunk_offset"]
+    whole = path.read_bytes()
+    for place in range(start + 60, start + 5000, 397):
+        contents = bytearray(whole)
+        contents[place] ^= 1
+        path.write_bytes(contents)
+        with pytest.raises(DatasetError, match=rf"quick_00002\.mcap: byte {start}: chunk: "):
+            loaded.trajectories(["time_s"])
 
 
 @pytest.mark.parametrize("topics", [["clock"], ["clock", "tf", "controller_state"]])

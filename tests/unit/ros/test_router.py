@@ -8,7 +8,7 @@ import pytest
 from rclzenoh import context
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 from throwcollect import ros
-from throwcollect.errors import ThrowcollectError
+from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import VARIABLE
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
@@ -49,6 +49,15 @@ def test_a_protected_router_admits_only_clients_with_its_key(environment, rig, m
                 ros.init()
             assert "python -m throwcollect.ros.router" in caught.value.hint
             assert ".rs" not in caught.value.evidence
+
+
+def test_a_protected_router_needs_a_key_that_can_be_read(key):
+    with pytest.raises(ConfigError, match=r"tls/127.0.0.1:\d+: no key is named") as caught, router("tls/127.0.0.1:0"):
+        pass
+    assert "--key DIR" in caught.value.expected
+    key.private_key.unlink()
+    with pytest.raises(ConfigError, match=r"cannot be read: .*/key.pem: No such file"), router("tls/127.0.0.1:0", key):
+        pass
 
 
 def test_the_router_command_makes_a_missing_key_and_keeps_an_existing_one(tmp_path):

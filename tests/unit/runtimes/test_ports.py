@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from throwcollect.config.run import RunConfig
 from throwcollect.ros.router_endpoint import (
     format_endpoint,
     reach_from_elsewhere,
@@ -28,3 +29,18 @@ def test_a_router_that_listens_everywhere_is_reached_at_a_single_address() -> No
     assert reach_from_here("node7") == "node7"
     assert reach_from_elsewhere("10.0.0.1") == "10.0.0.1"
     assert reach_from_elsewhere(everywhere) not in (everywhere, "")
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"simulations": 0}, "no other machine can join"),
+        ({"listen": "tcp/0.0.0.0:7447", "open": True}, "other machines can reach the run"),
+        ({"listen": "tcp/0.0.0.0:7447", "runtime": "inprocess"}, "should be local"),
+    ],
+)
+def test_options_that_contradict_joining_from_other_machines_are_refused(
+    values: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        RunConfig.model_validate(values)
