@@ -163,10 +163,12 @@ def test_datasets_are_read_exported_and_derived_as_with_all_extras(
         ("config", QUICKSTART),
     ):
         said = forker.run(*arguments)
-        assert (said.returncode, said.stderr) == (0, ""), arguments
+        # On a slow machine, work tells how far it has come.
+        told = [line for line in said.stderr.splitlines() if " trials " not in line]
+        assert (said.returncode, told) == (0, []), arguments
         assert said.stdout, arguments
-    told = forker.run("dataset", "stats", dataset, "--json").stdout
-    assert json.loads(told)["samples"] == compute_statistics(dataset).samples
+    stats = forker.run("dataset", "stats", dataset, "--json").stdout
+    assert json.loads(stats)["samples"] == compute_statistics(dataset).samples
     said = run(environment, "throwcollect", "dataset", "filter", dataset, tmp_path / "few", "--where", "trial < 3")
     assert said.returncode == 0, said.stderr
     names = sorted(path.name for path in first.iterdir() if path.name not in OF_THE_MOMENT)
