@@ -222,9 +222,13 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
     # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
     if run is None and any(each.status == "running" for each in Records().all()):
         return None
-    from throwcollect.cluster.cluster_run import find_cluster_run
+    from throwcollect.cluster.submission import find_submitted
 
-    return find_cluster_run(run)
+    if (directory := find_submitted(run)) is None:
+        return None
+    from throwcollect.cluster.cluster_run import ClusterRun
+
+    return ClusterRun.open(directory)
 
 
 def _make_document(run: Run) -> dict[str, Any]:

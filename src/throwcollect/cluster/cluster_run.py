@@ -11,7 +11,7 @@ from pathlib import Path
 
 from throwcollect.cluster import slurm
 from throwcollect.cluster.slurm import ArrayTask
-from throwcollect.cluster.submission import CLUSTER, Submission, find_queued, is_submitted, read_submission
+from throwcollect.cluster.submission import CLUSTER, Submission, read_submission
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.configuration import read_config
@@ -228,16 +228,3 @@ def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> It
         if look.complete or not look.lives or not keep_on():
             return
         time.sleep(_POLL_S)
-
-
-def find_cluster_run(named: str | None) -> ClusterRun | None:
-    """Find the submitted dataset that a command names by its directory; None if it names something else.
-
-    Without a name, the command means the only dataset in the queue that lies below the current directory.
-    """
-    if named is not None:
-        directory = Path(named)
-        # An empty name would be the path of the current directory.
-        return ClusterRun.open(directory.absolute()) if named and is_submitted(directory) else None
-    here = [each for each in find_queued() if each.is_relative_to(Path.cwd())]
-    return ClusterRun.open(here[0]) if len(here) == 1 else None

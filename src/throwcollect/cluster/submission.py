@@ -101,3 +101,15 @@ def find_queued() -> list[Path]:
         return [path for path in map(Path, slurm.find_directories()) if is_submitted(path)]
     except (ConfigError, WorkerError):
         return []
+
+
+def find_submitted(named: str | None) -> Path | None:
+    """Find the submitted dataset that a command names by its directory; None if it names something else.
+
+    Without a name, the command means the only dataset in the queue that lies below the current directory.
+    """
+    if named is not None:
+        # An empty name would be the path of the current directory.
+        return Path(named).absolute() if named and is_submitted(Path(named)) else None
+    here = [each for each in find_queued() if each.is_relative_to(Path.cwd())]
+    return here[0] if len(here) == 1 else None
