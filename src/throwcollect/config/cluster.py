@@ -1,7 +1,5 @@
 """Keys for collections on a cluster: what a batch script asks of the scheduler, and how a task begins."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field, PositiveInt

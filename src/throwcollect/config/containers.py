@@ -1,7 +1,5 @@
 """Keys for runs in containers: the image, and the options of each kind of node."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -27,29 +25,32 @@ class ContainerOptions(TypedDict, total=False):
     No others are allowed: they would give a container power over its host, or are decided by the launcher.
     """
 
-    __pydantic_config__ = ConfigDict(extra="forbid", use_attribute_docstrings=True)  # type: ignore[misc]
-    dns: list[str]
-    """Addresses of name servers."""
-    extra_hosts: dict[str, str]
-    """Further host names and their addresses."""
-    labels: dict[str, str]
-    """Further labels."""
-    group_add: list[str | int]
-    """Further groups of the process."""
-    shm_size: Size
-    """Size of /dev/shm, such as `512m`."""
-    tmpfs: dict[str, str]
-    """Further directories in memory and their mount options; options for /tmp are added to those that it has anyway."""
-    ulimits: dict[str, int]
-    """Resource limits by their names, such as `nofile`."""
-    pids_limit: PositiveInt
-    """Upper bound of threads and processes, instead of 512."""
-    devices: list[Device]
-    """Graphics processors of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."""
-    gpus: Annotated[int, Field(ge=-1)]
-    """Number of GPUs that the engine provides, as `docker run --gpus` does; -1 for all."""
-    runtime: str
-    """OCI runtime that the engine knows, such as `nvidia`."""
+    __pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[misc]
+    dns: Annotated[list[str], Field(description="Addresses of name servers.")]
+    extra_hosts: Annotated[dict[str, str], Field(description="Further host names and their addresses.")]
+    labels: Annotated[dict[str, str], Field(description="Further labels.")]
+    group_add: Annotated[list[str | int], Field(description="Further groups of the process.")]
+    shm_size: Annotated[Size, Field(description="Size of /dev/shm, such as `512m`.")]
+    tmpfs: Annotated[
+        dict[str, str],
+        Field(
+            description="Further directories in memory and their mount options; options for /tmp are added to those "
+            "that it has anyway."
+        ),
+    ]
+    ulimits: Annotated[dict[str, int], Field(description="Resource limits by their names, such as `nofile`.")]
+    pids_limit: Annotated[PositiveInt, Field(description="Upper bound of threads and processes, instead of 512.")]
+    devices: Annotated[
+        list[Device],
+        Field(
+            description="Graphics processors of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."
+        ),
+    ]
+    gpus: Annotated[
+        int,
+        Field(ge=-1, description="Number of GPUs that the engine provides, as `docker run --gpus` does; -1 for all."),
+    ]
+    runtime: Annotated[str, Field(description="OCI runtime that the engine knows, such as `nvidia`.")]
 
 
 class NodeContainerConfig(Section):

@@ -1,7 +1,5 @@
 """Keys by which the joint trajectory controllers may be made to differ from those of ros2_controllers."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Keys of the families of motions: how joints go from a start to an end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 

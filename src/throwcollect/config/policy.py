@@ -1,7 +1,5 @@
 """Keys of a policy: what commands the joints of a trial, step by step, in place of a planned motion."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Keys of the robot: one that is installed, or one that is described by a URDF."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -57,7 +55,7 @@ class RobotConfig(Section):
         """Height of the mount that viewers draw below the base: none, as the robot has feet."""
         return 0.0
 
-    def without_place(self) -> RobotConfig:
+    def without_place(self) -> "RobotConfig":
         """Make a section that is the same wherever the robot's files lie."""
         return self
 

@@ -1,7 +1,5 @@
 """Keys for how a collection is run, wherever its nodes live."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Keys of the world around the robot: the ball, the ground, the air, and the bodies of the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal

@@ -4,14 +4,13 @@ A key is written once, here. The reference in ``docs/configuration.md`` and the 
 Units are part of the name: ``_s``, ``_m``, ``_kg``, ``_hz``, ``_mps2``; angles are radians.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PositiveInt
+from typing_extensions import Self
 
 from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
@@ -281,7 +280,7 @@ class Config(Section):
                 ):
                     yield f"{section}.{joint}", "start should name this joint, too"
 
-    def without_run(self) -> Config:
+    def without_run(self) -> Self:
         """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""
         return self.with_files_in(Path()).model_copy(
             update={
@@ -292,7 +291,7 @@ class Config(Section):
             }
         )
 
-    def with_files_in(self, directory: Path) -> Config:
+    def with_files_in(self, directory: Path) -> Self:
         """Make a copy of this configuration whose motions and bodies, if they are in files, are those of a dataset."""
         changes: dict[str, Any] = {}
         if isinstance(self.task.trajectory, MotionFile):
@@ -305,7 +304,7 @@ class Config(Section):
             changes["scene"] = self.scene.model_copy(update={"bodies": {**self.scene.bodies, **placed}})
         return self.model_copy(update=changes) if changes else self
 
-    def run_as(self, other: Config) -> Config:
+    def run_as(self, other: Self) -> Self:
         """Make a copy of this configuration that takes all keys that do not change the dataset from another one."""
         return self.model_copy(update={name: getattr(other, name) for name in ("run", "containers", "cluster")})
 

@@ -1,7 +1,5 @@
 """Keys of sensors: cameras and lidars that see the recorded states of a trial."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 

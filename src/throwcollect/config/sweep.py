@@ -1,7 +1,5 @@
 """Keys for the sweep: the keys that vary from trial to trial, and the targets that throws are spread over."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal

@@ -1,7 +1,5 @@
 """Keys of every task: a motion of some joints, where it should end, and which outcome is a success."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar

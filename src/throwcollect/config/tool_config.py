@@ -1,8 +1,8 @@
 """Keys of every tool."""
 
-from __future__ import annotations
-
 from typing import ClassVar
+
+from typing_extensions import Self
 
 from throwcollect.config.section import Section
 
@@ -20,6 +20,6 @@ class ToolConfig(Section):
     name: str
     """Tool model."""
 
-    def without_release(self) -> ToolConfig:
+    def without_release(self) -> Self:
         """Make a copy without the time of a release; tools whose copies are equal are loaded and checked only once."""
         return self

@@ -1,7 +1,5 @@
 """Keys of the task `slide`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 

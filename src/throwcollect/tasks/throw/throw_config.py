@@ -1,7 +1,5 @@
 """Keys of the task `throw`."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field

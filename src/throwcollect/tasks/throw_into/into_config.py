@@ -1,7 +1,5 @@
 """Keys of the task `throw_into`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal

@@ -1,10 +1,9 @@
 """Keys of the claw."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
+from typing_extensions import Self
 
 from throwcollect.config.key import Key
 from throwcollect.config.tool_config import ToolConfig
@@ -32,6 +31,6 @@ class ClawConfig(ToolConfig):
     mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.25
     """Mass of the claw, without the ball."""
 
-    def without_release(self) -> ClawConfig:
+    def without_release(self) -> Self:
         """Make a copy with the same release as all other copies."""
         return self.model_copy(update={"release_s": 0.0})
