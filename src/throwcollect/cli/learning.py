@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -191,8 +192,6 @@ def score(
         policy (MODULE:FUNCTION): Score this policy instead; MODEL may be a dataset.
         hit: With --policy: largest miss of a hit, in its unit.
     """
-    from contextlib import ExitStack
-
     from throwcollect.learning.model import CONFIG, load_model
     from throwcollect.simulator import Simulator
 
@@ -303,8 +302,6 @@ def _score_policy(
     directory: Path, policy: str, worlds: dict[Path, list[str]], count: int, seeds: range, hit: float, *, json: bool
 ) -> None:
     """Score a policy at targets that a model or a dataset has, in some worlds, each with what `--set` changes."""
-    from contextlib import ExitStack
-
     from throwcollect.config.loader import load as load_config
     from throwcollect.config.policy import PolicyConfig
     from throwcollect.config.values import with_values

@@ -11,7 +11,7 @@ import typer
 from throwcollect.cli.options import JsonOption
 from throwcollect.cli.printing import show
 from throwcollect.errors import ConfigError
-from throwcollect.wording import command
+from throwcollect.wording import command, suggest
 
 if TYPE_CHECKING:
     from throwcollect.config.robot_config import RobotConfig
@@ -78,7 +78,6 @@ def read_robot(robot: str, flange: str | None = None, settings: list[str] | None
     from throwcollect.config.loader import read_robot_section, value_as_yaml
     from throwcollect.members import names_of
     from throwcollect.robots.importing import SECTION
-    from throwcollect.wording import suggest
 
     path, keys = Path(robot), [f"robot.{each}" for each in settings or ()]
     if robot in names_of("robots"):

@@ -16,6 +16,7 @@ from throwcollect.runs.records import Records
 from throwcollect.runs.run import Run
 from throwcollect.runs.run_record import Origin
 from throwcollect.runs.run_selection import require_living
+from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Host, RunContext
 
 if TYPE_CHECKING:
@@ -71,7 +72,6 @@ def _wait_for_router(run: str, spec: ContainerSpec, interruptions: Callable[[], 
 def _find_join_options(run: Run, spec: ContainerSpec) -> JoinOptions | None:
     """Find the options with which a container joins a run; None while the run has no router yet."""
     from throwcollect.runtimes.docker.component import find_join_options
-    from throwcollect.runtimes.registry import get_runtime
 
     record = require_living(run)
     if record.kind == "container" or (record.runtime and not get_runtime(record.runtime).can_be_scaled):
