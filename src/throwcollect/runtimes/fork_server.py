@@ -20,6 +20,7 @@ _IMPORTED = (
     "throwcollect.ros.nodes.coordinator.node",
     "throwcollect.ros.nodes.simulation.process",
     "throwcollect.ros.router",
+    "pinocchio",
 )
 
 os.setsid()

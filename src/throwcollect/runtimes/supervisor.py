@@ -11,6 +11,7 @@ from throwcollect.config.run import RunConfig
 from throwcollect.errors import Interrupted, UnreachableError, WorkerError
 from throwcollect.runtimes.nodes import NodeExit, NodeHost, NodeRole, NodeSpec
 from throwcollect.runtimes.runtime import NodeState, Status
+from throwcollect.side_by_side import count_cores
 from throwcollect.wording import format_count
 
 _FIRST_BACKOFF_S = 0.2
@@ -54,10 +55,10 @@ class Supervisor:
         self.host.close()
 
     def start(self) -> None:
-        """Start all nodes."""
+        """Start all nodes, or as many as `_start_due` starts at a time."""
         self._start_deadline = time.monotonic() + self._run.start_timeout_s
-        for node in self._roster.values():
-            self.host.start(node)
+        self._due = dict.fromkeys(self._roster, 0.0)
+        self._start_due()
 
     def change(self, roster: Sequence[NodeSpec]) -> None:
         """Change the roster: start the nodes that are new, and end those that are not in it any more."""
@@ -75,9 +76,8 @@ class Supervisor:
         # If no simulation that was ready is left, the new ones need a new deadline: the old one may have passed.
         if not self._has_worked:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
-        for name, node in self._roster.items():
-            if name not in before:
-                self.host.start(node)
+        self._due |= {name: 0.0 for name in self._roster if name not in before}
+        self._start_due()
 
     def poll(self) -> tuple[NodeExit | None, list[str]]:
         """Look after the nodes, and start again those that ended.
@@ -100,10 +100,7 @@ class Supervisor:
             else:
                 fate = "is started again" if self._schedule_restart(node) else "is given up"
                 news.append(f"{node.name} was lost ({node.reason}) and {fate}{_quote_last_line(node)}")
-        now = time.monotonic()
-        for name in [name for name, due in self._due.items() if due <= now]:
-            del self._due[name]
-            self.host.start(self._roster[name])
+        self._start_due()
         # Once the main node has come to its own end, the run needs no simulation any more.
         if end is None:
             self._check_that_run_can_go_on()
@@ -156,12 +153,23 @@ class Supervisor:
         if name in self._given_up:
             status = "lost"
         elif name in self._due or name not in self.host.running():
-            status = "restarting"
+            status = "restarting" if name in self._restarts else "starting"
         elif name in self._frozen_since:
             status = "frozen"
         elif handle is None or (self._roster[name].role is NodeRole.EXPENDABLE and name not in self._ready):
             status = "starting"
         return NodeState(name, status, self._restarts.get(name, 0), handle, self._last_end.get(name))
+
+    def _start_due(self) -> None:
+        """Start the nodes that are due, but of simulations at most one a core at a time: the first is ready earlier."""
+        now, room = time.monotonic(), count_cores() - len({*self._expendables} & {*self.host.running()} - self._ready)
+        for name in [name for name, due in self._due.items() if due <= now]:
+            is_simulation = name in self._expendables
+            if is_simulation and room <= 0:
+                continue
+            room -= is_simulation
+            del self._due[name]
+            self.host.start(self._roster[name])
 
     def _end_frozen(self) -> list[str]:
         """Kill nodes that have been frozen for long; the result has a line for each of them."""

@@ -119,6 +119,7 @@ class FakeRuntime(NodeHost):
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr(module, "time", clock)
+    monkeypatch.setattr(module, "count_cores", lambda: 2)
     return clock
 
 
@@ -158,6 +159,25 @@ def test_the_router_is_started_first_and_the_coordinator_last(runtime: FakeRunti
         ("sim_1", ("sim", "/data/config.yaml", "--name", "sim_1")),
         ("coordinator", ("coordinator", "/data")),
     ]
+
+
+def test_of_many_simulations_as_many_as_cores_start_at_a_time(runtime: FakeRuntime, clock: Clock) -> None:
+    supervisor = Supervisor(runtime, RunConfig(), roster(runtime, 5))
+    supervisor.start()
+    assert runtime.started == [ROUTER, "sim_0", "sim_1", COORDINATOR]
+    supervisor.poll()
+    assert runtime.started == []
+    assert state(supervisor, "sim_2") == NodeState("sim_2", "starting", 0, None, None)
+    runtime.logs.ready_ones.add("sim_1")
+    supervisor.poll()
+    assert runtime.started == ["sim_2"]
+    runtime.die("sim_0")
+    supervisor.poll()
+    assert runtime.started == ["sim_3"]
+    runtime.logs.ready_ones |= {"sim_2", "sim_3"}
+    clock.now += 1
+    supervisor.poll()
+    assert sorted(runtime.started) == ["sim_0", "sim_4"]
 
 
 @pytest.mark.parametrize("hint", ["  try: something else", "note: run with `RUST_BACKTRACE=1` environment variable"])
