@@ -13,15 +13,15 @@ import tempfile
 import time
 from pathlib import Path
 
+from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Episode, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of, trajectory_of
-from throwcollect.trial.conditions import Settings, explain_difference
+from throwcollect.trial.conditions import Settings
 
 _SECRET = b"key of a run"
 _SIGNER = Signer(_SECRET)
@@ -37,7 +37,7 @@ def measure(directory: Path) -> tuple[float, float]:
     messages = list(sign_episodes(dataset, _SIGNER).values())
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        taken_in = _take_in(messages, dataset.plan, Settings(dataset.config), Path(scratch) / "data")
+        taken_in = _take_in(messages, dataset.plan, Path(scratch) / "data")
         return taken_in, _raw(messages, Path(scratch) / "raw")
 
 
@@ -48,30 +48,23 @@ def sign_episodes(dataset: Dataset, signer: Signer) -> dict[int, bytes]:
     for episode in dataset.episodes():
         config = dataset.plan.config_of(dataset.plan.trial(episode.header.trial))
         result = columns.to_json(judge_episode(config, episode))
-        conditions = settings.conditions_of(config, trajectory_of(config).digest)
+        conditions = settings.conditions_of(settings.read_values(config), trajectory_of(config).digest)
         judged = Episode(episode.header, episode.chunk, result=result, conditions=conditions)
         messages[episode.header.trial] = pack(judged, signer)
     return messages
 
 
-def _take_in(messages: list[bytes], plan: Plan, settings: Settings, directory: Path) -> float:
+def _take_in(messages: list[bytes], plan: Plan, directory: Path) -> float:
     create(directory, plan)
-    writer = DatasetWriter(directory, plan)
-    task = task_of(plan.config)
-    columns = task.columns
-    began = time.perf_counter()
-    for message in messages:
-        episode = unpack(message, _SIGNER)
-        assert isinstance(episode, Episode)
-        trial = plan.trial(episode.header.trial)
-        config = plan.config_of(trial)
-        expected = settings.conditions_of(config, trajectory_of(config).digest)
-        if explain_difference(episode.conditions, expected):
-            raise ValueError(f"trial {trial.number} is refused")
-        writer.append(episode, columns.from_json(task.outcomes, episode.result))
-    seconds = time.perf_counter() - began
-    writer.close()
-    return len(messages) / seconds
+    with TrialCollection.open(directory, say=lambda _: None) as collection:
+        began = time.perf_counter()
+        for message in messages:
+            episode = unpack(message, _SIGNER)
+            assert isinstance(episode, Episode)
+            if not collection.take_in("/sim_0", episode):
+                raise ValueError(f"trial {episode.header.trial} is refused")
+            collection.write_one()
+        return len(messages) / (time.perf_counter() - began)
 
 
 def _raw(messages: list[bytes], path: Path) -> float:

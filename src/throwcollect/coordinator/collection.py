@@ -20,11 +20,12 @@ from throwcollect.coordinator.progress import Progress, TrialRate
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.summary import explain_loss
+from throwcollect.dataset.throws_table import Row
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.sweep.plan import Check, refusal
-from throwcollect.tasks.result import Result
+from throwcollect.tasks.result import LOST, Result
 from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.trial.conditions import Settings, explain_difference
 from throwcollect.wording import command, format_count
@@ -68,7 +69,9 @@ class TrialCollection:
         task = task_of(self._config)
         self._columns, self._outcome_names = task.columns, task.outcomes
         self._lookahead = Lookahead()
-        self._backlog: deque[tuple[Episode, Result]] = deque()
+        self._agreed: set[str] = set()
+        """Simulations that have handed over an episode whose motion was compared with that of the plan."""
+        self._backlog: deque[tuple[Episode, Row]] = deque()
         self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
         self._rate = TrialRate()
@@ -157,7 +160,7 @@ class TrialCollection:
             self._next_to_check += 1
             self._leases.add([trial])
         self._leases.recall(trial)
-        self._note(trial, result)
+        self._note(trial, result.outcome.value)
         self._rate = TrialRate(self._leases.ended)
         return True
 
@@ -171,6 +174,7 @@ class TrialCollection:
         self.take_back(simulation, reason, alive=None)
         self._leases.forget(simulation)
         self._lookahead.forget(simulation)
+        self._agreed.discard(simulation)
         del self._names[simulation]
 
     def settle(self, simulation: str, *, alive: bool) -> None:
@@ -209,14 +213,13 @@ class TrialCollection:
             return False
         try:
             result = self._columns.from_json(self._outcome_names, episode.result)
-            config = self.writer.plan.config_of(self.writer.plan.trial(trial))
-            expected = self._settings.conditions_of(config, trajectory_of(config).digest)
-            reason = explain_difference(episode.conditions, expected)
+            reason = explain_difference(episode.conditions, self._expect(simulation, episode))
         except DatasetError as error:
             reason = error.message
         if reason is not None:
             self.refuse(simulation, trial, f"its episode is refused: {reason}")
             return False
+        self._agreed.add(simulation)
         self._lookahead.end(simulation)
         self._leases.complete(simulation, trial)
         self._warn_of_set_aside()
@@ -244,7 +247,7 @@ class TrialCollection:
         """Write the oldest episode of the backlog."""
         episode, result = self._backlog.popleft()
         self.writer.append(episode, result)
-        self._note(episode.header.trial, result)
+        self._note(episode.header.trial, result["outcome"])
 
     def check_next(self) -> bool:
         """Check whether the robot can do the next trial of the plan, which takes some milliseconds.
@@ -323,12 +326,24 @@ class TrialCollection:
         # Unless it was told otherwise, a simulation lives in a namespace that has the name of its node.
         return self._names.get(simulation, simulation.strip("/"))
 
-    def _note(self, trial: int, result: Result) -> None:
-        self._outcomes[result.outcome.value] += 1
-        self._prefix.end(trial, succeeded=result.outcome.value == self._config.task.success)
+    def _note(self, trial: int, outcome: str) -> None:
+        self._outcomes[outcome] += 1
+        self._prefix.end(trial, succeeded=outcome == self._config.task.success)
+
+    def _expect(self, simulation: str, episode: Episode) -> str:
+        """Write the conditions of an episode that the plan asks for.
+
+        A simulation that has computed one motion as this process does, from the same sources, computes all alike. So
+        this process works out only the first one of each simulation; replays compare some throws at the end.
+        """
+        plan, motion = self.writer.plan, episode.conditions.rpartition("\n")[2]
+        trial = plan.trial(episode.header.trial)
+        if simulation not in self._agreed:
+            motion = trajectory_of(plan.config_of(trial)).digest
+        return self._settings.conditions_of(trial.values, motion)
 
     def _warn_of_set_aside(self) -> None:
-        aside = {name: reason for name in self._names if (reason := self._leases.why_set_aside(name)) is not None}
+        aside = self._leases.set_aside
         for simulation in aside.keys() - self._set_aside.keys():
             self.warn(f"{simulation}: gets no more trials, because {aside[simulation]}")
         self._set_aside = aside
@@ -343,4 +358,4 @@ class TrialCollection:
 
     def _lose(self, trial: int, reasons: list[str]) -> None:
         self.writer.append_lost(trial, "; ".join(reasons))
-        self._note(trial, task_of(self._config).lose("; ".join(reasons)))
+        self._note(trial, LOST)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 _OPEN, _SUCCEEDED, _FAILED = range(3)
 
@@ -76,6 +77,11 @@ class Leases:
         """Number of trials that no simulation holds, and that are to be done."""
         return self._waiting_fresh + len(self._returned)
 
+    @property
+    def set_aside(self) -> dict[str, str]:
+        """Why simulations get no more trials, by their addresses."""
+        return {name: why for name in self._wrong_refusals if (why := self.why_set_aside(name)) is not None}
+
     def why_set_aside(self, simulation: str) -> str | None:
         """Say why a simulation gets no more trials; None if it gets more."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
@@ -108,7 +114,9 @@ class Leases:
     def lease(self, simulation: str, *, others: Collection[str] = ()) -> int | None:
         """Give the next trial to a simulation; None if none waits for it. `others` are all simulations of the run."""
         # If all simulations are doubted, they all go on, because the trials may be to blame.
-        rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
+        rivals: list[str] = []
+        if self._returned or self._refusals:
+            rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
         if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
             return None
         trial = next((trial for trial in sorted(self._returned) if self._may_try(simulation, trial, rivals)), None)
@@ -131,7 +139,8 @@ class Leases:
 
     def complete(self, simulation: str, trial: int) -> None:
         """Note that a simulation has done an open trial, which it may hold, or have held before."""
-        holder = next((name for name, held in self._held.items() if trial in held), None)
+        # Nearly always, the simulation itself holds the trial.
+        holder = next((name for name in chain((simulation,), self._held) if trial in self._held.get(name, ())), None)
         if holder is not None:
             self._drop(holder, trial)
         elif trial in self._returned:

@@ -42,6 +42,7 @@ from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import Result
+from throwcollect.tasks.task import task_of
 
 
 class SessionDataset:
@@ -91,7 +92,7 @@ class SessionDataset:
             for earlier, recording in enumerate(recordings):
                 writer.take_shard(earlier, recording, throws.slice(earlier, 1))
             try:
-                writer.append(episode, result)
+                writer.append(episode, task_of(self._config).columns.write(result))
             except DatasetError:
                 # On a full disk, nothing else may free the room that it takes.
                 remove(part)

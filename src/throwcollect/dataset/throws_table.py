@@ -118,23 +118,26 @@ class ThrowsTable:
 
     def row(self, trial: Trial, result: Result, place: Row | None) -> Row:
         """Make the row of a trial that was run; `place` are its `place_columns`, None if it has no episode."""
-        row = self._start_row(trial, result.outcome.value, result.reason)
-        row.update(self._columns.write(result))
+        return self.join(trial, self._columns.write(result), place)
+
+    def join(self, trial: Trial, result: Row, place: Row | None) -> Row:
+        """Make the row of a trial as `row` does, from the columns of its result (`ResultColumns.write`)."""
+        row = self._start_row(trial) | result
         row.update(self._misses.measure(trial.target, row))
         return row | (place or {})
 
     def make_refused_row(self, trial: Trial) -> Row:
         """Make the row of a trial that the plan refused."""
-        return self._start_row(trial, REFUSED, trial.refused)
+        return {**self._start_row(trial), "outcome": REFUSED, "reason": trial.refused}
 
     def result(self, row: Row) -> Result:
         """Make the result of a trial that was run from its row, as `row` wrote it."""
         result: Result = self._columns.read(self._outcomes(row["outcome"]), row["reason"], row)
         return result
 
-    def _start_row(self, trial: Trial, outcome: str, reason: str | None) -> Row:
+    def _start_row(self, trial: Trial) -> Row:
         values = {column_of(key): trial.values[key] for key in self._parameters}
-        return {"trial": trial.number, **values, **trial.target, "outcome": outcome, "reason": reason}
+        return {"trial": trial.number, **values, **trial.target}
 
     def table(self, rows: Iterable[Row]) -> pa.Table:
         """Make an Arrow table of rows, in the given order; a value that a row lacks is null."""

@@ -164,17 +164,17 @@ class DatasetWriter:
         if recording is not None:
             self._recordings[number] = recording
 
-    def append(self, episode: Episode, result: Result) -> None:
-        """Write an episode, whose trial ended with this result."""
+    def append(self, episode: Episode, result: Row) -> None:
+        """Write an episode, whose trial ended with a result of these columns (`ResultColumns.write`)."""
         trial = episode.header.trial
         number = self._find_waiting_shard(trial)
         shard = self._get_shard(number)
         shard.append(episode)
         # The offset is not known before the shard is written in order of trials; `_close_shard` puts it in.
         place = place_columns(shard.path.name, -1, episode)
-        row = shard.rows[trial] = self._make_row(trial, result, place)
+        row = shard.rows[trial] = self._table.join(self.plan.trial(trial), result, place)
         ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
-        self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest, **ends)
+        self.note("commit", trial=trial, outcome=row["outcome"], digest=episode.digest, **ends)
         self._finish_shard_if_complete(number)
 
     def append_lost(self, trial: int, reason: str) -> None:

@@ -213,7 +213,8 @@ class Simulator:
         if motion is not None:
             # A trial that a client sets up later starts from the configuration, and not from the values of this trial.
             self.trial.set_up_nothing()
-        conditions = self._settings.conditions_of(config, motion.digest if motion else "")
+        values = self._settings.read_values(config)
+        conditions = self._settings.conditions_of(values, motion.digest if motion else "")
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the frames of bodies.
         result = self._judge(config, motion, table.samples, header) if motion else ""

@@ -99,9 +99,9 @@ class ResultColumns(Generic[AnyResult]):
             for column in found
         )
 
-    def write(self, result: AnyResult) -> dict[str, object]:
-        """Make the values of all columns, by name; None where nothing was measured."""
-        values: dict[str, object] = {}
+    def write(self, result: AnyResult) -> dict[str, Any]:
+        """Make outcome, reason and the values of all columns, by name; None where nothing was measured."""
+        values: dict[str, Any] = {"outcome": result.outcome.value, "reason": result.reason}
         for name, columns, names in self._fields:
             value = getattr(result, name)
             parts = [None] * len(names) if value is None else columns.split(value, self._joints)
@@ -109,7 +109,7 @@ class ResultColumns(Generic[AnyResult]):
         return values
 
     def to_json(self, result: AnyResult) -> str:
-        """Write a result in JSON: its outcome, its reason, and the values of all columns.
+        """Write in JSON what `write` makes of a result.
 
         Raises:
             TypeError: If a value is not of the kind of its column.
@@ -119,13 +119,15 @@ class ResultColumns(Generic[AnyResult]):
         for column in self.columns:
             if not isinstance(value := values[column.name], (*_KINDS[column.kind], NoneType)):
                 raise TypeError(f"{column.name}: should be a {column.kind}, is {value!r}")
-        return json.dumps({**values, "outcome": result.outcome.value, "reason": result.reason}, allow_nan=False)
+        return json.dumps(values, allow_nan=False)
 
-    def from_json(self, outcomes: type[Outcome], text: str) -> AnyResult:
-        """Read the text that `to_json` writes."""
+    def from_json(self, outcomes: type[Outcome], text: str) -> dict[str, Any]:
+        """Read the text that `to_json` writes; returns what `write` has made."""
         try:
-            row = json.loads(text)
-            return self.read(outcomes(row["outcome"]), row["reason"], row)
+            values: dict[str, Any] = json.loads(text)
+            names = ["outcome", "reason", *(column.name for column in self.columns)]
+            outcomes(values["outcome"])
+            return {name: values[name] for name in names}
         except (ValueError, LookupError, TypeError) as error:
             raise DatasetError(f"result of a trial: {error}") from error
 

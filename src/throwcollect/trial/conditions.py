@@ -15,6 +15,7 @@ from throwcollect.build import build_digest
 from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves, sweepable_keys
+from throwcollect.sweep.trials import Values
 
 _EFFECTS_IN_DIGEST = (Effect.PHYSICS, Effect.ENCODING)
 
@@ -50,28 +51,31 @@ class Settings:
     """
 
     def __init__(self, config: Config) -> None:
+        self._config = config
         keys = list(leaves(config))
-        physics = set(sweepable_keys(config, Effect.PHYSICS))
-        self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in keys if leaf.name in physics]
+        swept = set(sweepable_keys(config))
+        self._configured = {leaf.name: leaf.value for leaf in keys if leaf.name in swept}
         heeded = {leaf.name: leaf.value for leaf in keys if leaf.key.effect in _EFFECTS_IN_DIGEST}
         # Of `task.end`, only the names count: they decide which joints are locked. The angles are in the trajectory.
         heeded["task.end"] = sorted(config.task.end)
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
-    def conditions_of(self, trial: Config, trajectory: str) -> str:
-        """Write the conditions of an episode, by its trial's configuration and the digest of its trajectory, in lines.
+    def conditions_of(self, values: Values, trajectory: str) -> str:
+        """Write the conditions of an episode, by its trial's values and the digest of its trajectory, in lines.
 
         They are digests of what computes (`build_of`) and of the collection's settings, the values of the trial that
-        replace these in JSON, and the trajectory that the controllers were given; empty if there was no lease.
+        differ from these in JSON, and the trajectory that the controllers were given; empty if there was no lease.
         """
-        values = json.dumps(self.find_replaced(trial), sort_keys=True)
-        return "\n".join((build_of(trial), self.digest, values, trajectory))
+        replaced = {key: float(value) for key, value in values.items() if value != self._configured[key]}
+        lines = build_of(self._config), self.digest, json.dumps(replaced, sort_keys=True), trajectory
+        return "\n".join(lines)
 
-    def find_replaced(self, trial: Config) -> dict[str, float]:
-        """Find the values of a trial's configuration that replace values of the collection's, by dotted key."""
-        values = ((key, _get_value(trial, path), configured) for key, path, configured in self._physics)
-        return {key: float(value) for key, value, configured in values if value != configured}
+    def read_values(self, trial: Config) -> Values:
+        """Read from a trial's configuration the values of all sections that differ from the collection's."""
+        changed = {name for name, section in trial.__dict__.items() if section is not getattr(self._config, name)}
+        paths = ((key, key.split(".")) for key in self._configured)
+        return {key: _get_value(trial, path) for key, path in paths if path[0] in changed}
 
 
 def _get_value(config: Config, path: Sequence[str]) -> Any:

@@ -127,6 +127,18 @@ def test_a_wrong_episode_of_a_trial_that_its_simulation_does_not_hold_changes_no
     assert not events(tmp_path, "fail")
 
 
+def test_a_simulation_that_computes_another_motion_is_refused_at_its_first_episode(
+    collection: TrialCollection, deliveries: list[Episode]
+) -> None:
+    said: list[str] = []
+    collection.warn = said.append
+    collection.lease("/sim_0")
+    same = deliveries[0].conditions.rpartition("\n")[0]
+    assert not collection.take_in("/sim_0", change(deliveries[0], conditions=f"{same}\nanother motion"))
+    assert "its controllers were given another trajectory" in said[0]
+    assert collection.take_in("/sim_0", deliveries[1])
+
+
 def test_a_simulation_gets_more_trials_once_half_of_its_lease_is_done(
     collection: TrialCollection, deliveries: list[Episode]
 ) -> None:

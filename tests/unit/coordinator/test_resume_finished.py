@@ -40,7 +40,7 @@ class Trials:
         writer = DatasetWriter.open(directory)
         writer.recover(lambda trial, _: kept.add(trial) is None)
         for trial in sorted(ALL - kept):
-            writer.append(self.episodes[trial], self.results[trial])
+            writer.append(self.episodes[trial], self.collection.columns.write(self.results[trial]))
         writer.finish()
         writer.close()
         return kept

@@ -108,6 +108,7 @@ class Collection:
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
         self.config = Config.model_validate({**SETTINGS, **(settings or {})})
         self.plan: Plan = make_plan(self.config)
+        self.columns = task_of(self.config).columns
         self.encoder = ChunkEncoder(
             Channels(self.config, full_description(self.config)), level=self.config.record.zstd_level
         )
@@ -138,7 +139,7 @@ class Collection:
                 writer.append_lost(trial, "two simulations were lost")
             else:
                 episode = self.episode(trial, change)
-                writer.append(episode, self.result(episode))
+                writer.append(episode, self.columns.write(self.result(episode)))
 
     def collect(
         self,

@@ -59,11 +59,12 @@ class Trials:
 
     def __init__(self, collection: Any) -> None:
         self.plan = collection.plan
+        self.columns = collection.columns
         self.episodes = [collection.episode(trial) for trial in range(TRIALS)]
         self.results: list[ThrowResult] = [collection.result(episode) for episode in self.episodes]
 
     def append(self, writer: DatasetWriter, trial: int) -> None:
-        writer.append(self.episodes[trial], self.results[trial])
+        writer.append(self.episodes[trial], self.columns.write(self.results[trial]))
 
     def go_on(self, directory: Path, order: list[int] | None = None) -> set[int]:
         """Resume, run the missing trials, and finish; returns the trials that were kept."""

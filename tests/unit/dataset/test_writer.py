@@ -201,7 +201,7 @@ def test_the_writer_refuses_second_refused_and_unknown_episodes(collection: Any,
     stranger = collection.episode(1)
     stranger = Episode(replace(stranger.header, trial=99), stranger.chunk)
     with pytest.raises(DatasetError, match="no episode of trial 99 is waited for"):
-        writer.append(stranger, collection.result(collection.episode(1)))
+        writer.append(stranger, collection.columns.write(collection.result(collection.episode(1))))
     writer.close()
 
 

@@ -1,5 +1,6 @@
 """A simulator turns a trial into its episode, result and conditions."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -45,10 +46,10 @@ def test_a_trial_has_the_result_that_judging_its_episode_gives(engine: str) -> N
     assert not simulator.trial.leased
     trial = with_values(config, VALUES)
     task = task_of(config)
-    assert task.columns.from_json(task.outcomes, episode.result) == judge_episode(trial, episode)
+    assert task.columns.from_json(task.outcomes, episode.result) == task.columns.write(judge_episode(trial, episode))
     episode.chunk.check_records()
     *_, values, trajectory = episode.conditions.split("\n")
-    assert (values, trajectory) == ('{"ball.mass_kg": 0.05}', task_of(trial).trajectory().digest)
+    assert (values, trajectory) == (json.dumps(VALUES), task_of(trial).trajectory().digest)
     simulator.close()
 
 

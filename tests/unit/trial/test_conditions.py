@@ -1,8 +1,9 @@
+import json
+
 import pytest
 from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.build import build_digest
-from throwcollect.config.key import Effect
 from throwcollect.config.schema import Config
 from throwcollect.config.values import sweepable_keys, values_by_key, with_values
 from throwcollect.sim.simulator import Simulator
@@ -75,13 +76,14 @@ def test_keys_that_simulations_use_change_the_settings_digest(key: str, value: o
     assert Settings(change(key, value)).digest != Settings(CONFIG).digest
 
 
-def test_find_replaced_names_each_physics_key_that_a_trial_changes() -> None:
+def test_conditions_name_each_value_that_a_trial_changes_whether_it_is_planned_or_used() -> None:
     settings = Settings(CONFIG)
-    physics = sweepable_keys(CONFIG, Effect.PHYSICS)
-    assert settings.find_replaced(CONFIG) == {}
-    trial = with_values(CONFIG, {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8, "task.duration_s": 1.3})
-    assert {"ball.mass_kg", "task.start.arm_right_4_joint"} <= set(physics)
-    assert settings.find_replaced(trial) == {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8}
+    assert settings.conditions_of(settings.read_values(CONFIG), "").split("\n")[2] == "{}"
+    changed = {"ball.mass_kg": 0.06, "task.duration_s": 1.3, "task.start.arm_right_4_joint": -1.8}
+    assert set(changed) <= set(sweepable_keys(CONFIG))
+    planned = settings.conditions_of({**changed, "ball.friction": CONFIG.ball.friction}, "")
+    assert json.loads(planned.split("\n")[2]) == changed
+    assert settings.conditions_of(settings.read_values(with_values(CONFIG, changed)), "") == planned
 
 
 def test_the_conditions_of_a_simulated_episode_are_those_of_its_trial_alone() -> None:
@@ -90,8 +92,8 @@ def test_the_conditions_of_a_simulated_episode_are_those_of_its_trial_alone() ->
     simulator, settings = Simulator(plan.config), Settings(plan.config)
     episode = simulator.run(plan.trials[1])
     simulator.close()
-    configs = [plan.config_of(trial) for trial in plan.trials]
-    expected = [settings.conditions_of(config, trajectory_of(config).digest) for config in configs]
+    motion = trajectory_of(plan.config).digest
+    expected = [settings.conditions_of(trial.values, motion) for trial in plan.trials]
     assert explain_difference(episode.conditions, expected[1]) is None
     assert "its values are not those" in (explain_difference(episode.conditions, expected[0]) or "")
 
