@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -148,10 +148,12 @@ def is_begun(directory: Path) -> bool:
         return False
 
 
-def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full: bool) -> Iterator[Finding]:
+def find_changed_files(
+    directory: Path, entries: Iterable[FileEntry], *, in_full: bool, hashed: Collection[FileEntry] = ()
+) -> Iterator[Finding]:
     """Find the files of a dataset that are not as entries of a manifest say.
 
-    They are compared byte by byte in full, or else only by their sizes.
+    They are compared byte by byte in full, except for those that were `hashed` before, or else only by their sizes.
     """
     for entry in entries:
         path = directory / entry.path
@@ -160,7 +162,7 @@ def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full
             continue
         try:
             actual = replace(entry, bytes=size_of_file(path))
-            if in_full and actual == entry:
+            if in_full and actual == entry and entry not in hashed:
                 actual = entry_of_file(path, entry.path)
         except DatasetError as error:
             yield Finding(entry.path, "", error.problem)

@@ -5,7 +5,7 @@ What follows from a file that cannot be read is not checked; the manifest still 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -31,7 +31,7 @@ from throwcollect.dataset.directory import (
     config_path,
     shard_of,
 )
-from throwcollect.dataset.manifest import Finding, find_changed_files, list_promised_names, read_manifest
+from throwcollect.dataset.manifest import FileEntry, Finding, find_changed_files, list_promised_names, read_manifest
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.provenance import find_changes
 from throwcollect.dataset.summary_files import combine_digests, metadata_text
@@ -82,11 +82,10 @@ def verify(directory: Path, *, processes: int = 1) -> list[Finding]:
         findings.append(Finding.of(METADATA, error))
         readable = False
     tables = _read_tables(directory)
-    # Other processes check the recordings, while this one hashes files.
     with _checking_recordings(directory, tables, processes) as checked:
-        findings += find_damage(directory, in_full=True)
-        findings += tables.findings
         reports = list(checked)
+    findings += find_damage(directory, in_full=True, hashed=[report.entry for report in reports if report.entry])
+    findings += tables.findings
     findings += [finding for report in reports for finding in report.findings]
     if readable and tables.throws is not None:
         findings += _find_metadata_problems(directory, tables.throws, reports)
@@ -98,11 +97,11 @@ def find_unchecked(config: Config) -> tuple[str, ...]:
     return () if robot_is_available(config) else ("what came of the throws",)
 
 
-def find_damage(directory: Path, *, in_full: bool) -> list[Finding]:
+def find_damage(directory: Path, *, in_full: bool, hashed: Collection[FileEntry] = ()) -> list[Finding]:
     """Find the files of a finished dataset that are missing, changed, or not in its manifest.
 
     Data card and provenance differ between equal collections, so they are not in the manifest; the provenance has their
-    hashes. In full, every byte of each file is read, or else only its size is compared.
+    hashes. In full, every byte of each file is read, unless it was `hashed` before, or else only its size is compared.
     """
     findings = [Finding(name, "", "is missing") for name in (CARD, PROVENANCE) if not (directory / name).exists()]
     if in_full and (directory / PROVENANCE).exists():
@@ -112,7 +111,7 @@ def find_damage(directory: Path, *, in_full: bool) -> list[Finding]:
     except DatasetError as error:
         return [*findings, Finding.of(MANIFEST, error)]
     covered = {entry.path for entry in entries}
-    findings += find_changed_files(directory, entries, in_full=in_full)
+    findings += find_changed_files(directory, entries, in_full=in_full, hashed=hashed)
     return findings + [
         Finding(name, "", f"is not in {MANIFEST}") for name in list_promised_names(directory) if name not in covered
     ]

@@ -17,7 +17,7 @@ from throwcollect.config.values import column_of
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.judging import judge_episode
-from throwcollect.dataset.manifest import Finding
+from throwcollect.dataset.manifest import FileEntry, Finding
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import McapContents, WholeEpisode, open_mcap, scan
 from throwcollect.dataset.shard import rewrite
@@ -53,6 +53,7 @@ class RecordingReport:
         findings: What is wrong.
         has_file: Whether there should be a file: no trial without an episode needs one.
         summary: What the bag's metadata should say of the file; None if it does not have all its episodes.
+        entry: What the manifest should say of the file; None if not all its bytes are right.
         channels: What it records; None if that cannot be read.
         digests: Digest of each episode that it should have and that is whole, by trial.
     """
@@ -60,6 +61,7 @@ class RecordingReport:
     findings: list[Finding] = field(default_factory=list)
     has_file: bool = False
     summary: FileSummary | None = None
+    entry: FileEntry | None = None
     channels: Channels | None = None
     digests: dict[int, str] = field(default_factory=dict)
 
@@ -135,7 +137,8 @@ class _RecordingCheck:
             if place_of_difference is not None:
                 self._add(f"byte {place_of_difference}", "from here on, it is not what is written for its episodes")
             if finished.recording is not None:
-                self.report.summary, _ = finished.recording
+                self.report.summary, entry = finished.recording
+                self.report.entry = entry if place_of_difference is None else None
 
     def _find_problems(self, stored: WholeEpisode, row: Row, channels: Channels) -> Iterator[str]:
         """Find what is wrong with an episode, given the row of its trial, a sentence each."""
