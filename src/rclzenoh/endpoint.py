@@ -64,10 +64,6 @@ class Endpoint:
         """Declare the endpoint's token; called when its Zenoh object works, so that others may use it."""
         self._declared = [self.session.liveliness().declare_token(self.token.key()), declared]
 
-    def count(self, kind: EntityKind) -> int:
-        """Number of endpoints of a kind in the whole graph that have this name and type."""
-        return self.node.context.graph.count(kind, self.name, self.type)
-
     def destroy(self) -> None:
         """Withdraw the token, then the endpoint; does nothing the second time; see `Node.destroy_publisher`."""
         declared, self._declared = self._declared, []

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 
 from xxhash import xxh3_128_intdigest
 
@@ -78,10 +79,13 @@ class Token:
         return ros_type(self.type)
 
 
-def token_keys(domain: int, kind: EntityKind, name: str | None = None) -> str:
-    """Key expression of all tokens of a kind, or of those with one absolute name of a topic or service."""
-    some = f"{PREFIX}/{domain}/*/*/*/{kind.value}"
-    return f"{some}/**" if name is None else f"{some}/*/*/*/{name.replace('/', '%')}/**"
+def token_keys(domain: int, kind: EntityKind, namespace: str | None = None, name: str | None = None) -> str:
+    """Key expression of all tokens of a kind, or of those of nodes in a namespace, or with a name.
+
+    The name is that of a topic or service; ``/sim_0/$*`` stands for all names below ``/sim_0``.
+    """
+    some = f"{PREFIX}/{domain}/*/*/*/{kind.value}/*/{(namespace or '*').replace('/', '%')}/*"
+    return f"{some}/**" if name is None else f"{some}/{name.replace('/', '%')}/**"
 
 
 def parse_token(key: str) -> Token | None:
@@ -120,6 +124,7 @@ def dds_type(name: str) -> str:
     return f"{package}::{kind}::dds_::{short}_"
 
 
+@cache
 def ros_type(name: str) -> str:
     """ROS name of a DDS type, the inverse of `dds_type`; another name is returned as it is."""
     package, _, short = name.partition("::dds_::")

@@ -7,6 +7,7 @@ from typing import Any
 from rclzenoh.context import Context
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces.msg import Clock, Log, ParameterEvent
+from rclzenoh.keys import EntityKind
 from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.node_parameters import NodeParameters, offer_parameters
 from rclzenoh.parameter import Parameter
@@ -41,7 +42,7 @@ class Node(NodeEndpoints, NodeParameters):
         NodeEndpoints.__init__(self, node_name, namespace or "", context)
         NodeParameters.__init__(self, self._publish_parameter_event)
         # This looks at the graph before the token of this node is declared, because then this node would be in it, too.
-        is_taken = (node_name, self._namespace) in self.get_node_names_and_namespaces()
+        is_taken = any(self.context.graph.tokens(EntityKind.NODE, node=(self._namespace, node_name)))
         self._declared_token: Any = self.context.session.liveliness().declare_token(self.token.key())
         if enable_rosout:
             self._rosout = self.create_publisher(Log, "/rosout", qos_profile_rosout)

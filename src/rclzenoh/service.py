@@ -124,11 +124,20 @@ class Client(Endpoint, Receiver):
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=_ENDLESS_S if self.service_name.endswith(_PATIENT_SERVICE) else None,
         )
+        # Zenoh knows whether a querier has a queryable, so the graph need not be asked for services of all nodes.
+        handler = zenoh.handlers.Callback(node.context.graph.note_change, indirect=False)
+        self._querier.declare_matching_listener(handler)
+        self._was_asked = False
         self.announce(self._querier)
 
     def service_is_ready(self) -> bool:
         """Whether somebody offers the service."""
-        return self.count(EntityKind.SERVICE) > 0
+        matching = self._querier is not None and self._querier.matching_status.matching
+        if not (matching or self._was_asked):
+            self._was_asked = True
+            self.node.context.graph.catch_up()
+            return self.service_is_ready()
+        return bool(matching)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until somebody offers the service, for at most ``timeout_sec``; return whether somebody does.

@@ -63,8 +63,8 @@ class Publisher(Endpoint):
                 raise self.invalid(error) from error
 
     def get_subscription_count(self) -> int:
-        """Number of subscriptions to the topic in the whole graph; asking costs a fraction of a microsecond."""
-        return self.count(EntityKind.SUBSCRIPTION)
+        """Number of subscriptions to the topic in the whole graph; asking again costs a microsecond or two."""
+        return self.node.context.graph.count(EntityKind.SUBSCRIPTION, self.name, self.type)
 
     def destroy(self) -> None:
         """Withdraw the publisher; see `Node.destroy_publisher`."""

@@ -46,6 +46,37 @@ def test_a_context_is_sent_only_what_it_has_asked_about(rig):
     assert after == [changes + 1 for changes in before]
 
 
+def test_nodes_of_other_namespaces_are_not_sent_to_a_node_that_counts_in_its_own(rig):
+    node, other = rig.node("a", namespace="/sim_0"), rig.node("a", namespace="/sim_1")
+    assert node.count_subscribers("/sim_0/t") == node.count_subscribers("/t") == 0
+    before = node.context.graph.changes
+    for name in ("/sim_1/t", "/sim_00/t", "/tt", "/sim_0/deep/u", "/sim_0/t"):
+        other.create_subscription(String, name, lambda _: None, 10)
+    rig.node("b", namespace="/sim_2").create_subscription(String, "/t", lambda _: None, 10)
+    assert rig.spin(lambda: node.count_subscribers("/sim_0/t") == node.count_subscribers("/t") == 1)
+    assert node.context.graph.changes == before + 3
+    assert node.count_subscribers("/sim_0/deep/u") == 1
+    assert len(node.get_node_names_and_namespaces()) == 3
+
+
+def test_a_service_from_before_the_first_question_is_known_at_once(rig):
+    rig.node("other").create_service(Trigger, "/s", lambda _request, response: response)
+    node = rig.node("node")
+    assert all(node.create_client(Trigger, "/s").service_is_ready() for _ in range(100))
+
+
+def test_a_client_notices_its_service_and_no_other(rig):
+    node, other = rig.node("node"), rig.node("other")
+    client = node.create_client(Trigger, "/s")
+    before = node.context.graph.changes
+    other.create_service(Trigger, "/other", lambda _request, response: response)
+    service = other.create_service(Trigger, "/s", lambda _request, response: response)
+    assert client.wait_for_service(30)
+    assert rig.spin(lambda: node.context.graph.changes == before + 1)
+    other.destroy_service(service)
+    assert rig.spin(lambda: not client.service_is_ready())
+
+
 def test_a_context_that_asks_about_many_topics_is_sent_all(rig):
     asker, other = rig.node("asker"), rig.node("other")
     other.create_publisher(String, "/t99", 10)
