@@ -29,6 +29,8 @@ _TELL_EVERY_S = 10.0
 """Real time between two lines of progress in the log; it is published on its topic more often."""
 
 _DISCOVERY_PERIOD_S = 0.05
+_REST = 10
+"""Looking for simulations rests for so many times its processor time, which grows with their number."""
 _REPORT_PERIOD_S = 0.2
 _WARNING_PERIOD_S = 10.0
 """Time between two warnings of the same thing."""
@@ -49,6 +51,7 @@ class Coordinator(Node):
         config = collection.writer.plan.config
         self._simulations: dict[str, SimulationClient] = {}
         self._discovered_changes = -1
+        self._rests_until = 0.0
         self._visible: set[str] = set()
         self._unreached: dict[str, float] = {}
         self._left: dict[str, tuple[AbstractSet[bytes], float]] = {}
@@ -75,11 +78,11 @@ class Coordinator(Node):
         return progress
 
     def _discover(self) -> None:
-        changes = graph_changes(self)
-        if changes != self._discovered_changes:
+        changes, now = graph_changes(self), time.monotonic()
+        if changes != self._discovered_changes and now >= self._rests_until:
             self._discovered_changes = changes
             self._find_simulations()
-        now = time.monotonic()
+            now = time.monotonic()
         for namespace, simulation in list(self._simulations.items()):
             if now > simulation.began_s + self._patience_s:
                 self._stop_waiting(namespace, simulation)
@@ -106,7 +109,9 @@ class Coordinator(Node):
 
     def _find_simulations(self) -> None:
         self._visible.clear()
+        began_s = time.thread_time()
         offered = {namespace: (name, publishers) for namespace, name, publishers in self._find_offers()}
+        self._rests_until = time.monotonic() + _REST * (time.thread_time() - began_s)
         for namespace, simulation in list(self._simulations.items()):
             name, publishers = offered.get(namespace, ("", frozenset()))
             if name != simulation.name:
