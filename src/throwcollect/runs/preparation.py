@@ -182,7 +182,7 @@ def prepare_run(
             # What nodes need is imported, and a loop compiled, while this process makes the plan.
             from throwcollect.runtimes.node_process import begin_imports
 
-            begin_imports(*find_modules("engines", config.sim.engine))
+            begin_imports(*find_modules("engines", config.sim.engine), foreseen=config.model_dump_json())
         made = plan(directory) if callable(plan) else plan
         # These imports would take long, but making the plan has made them already.
         from throwcollect.coordinator.prepare import describe_plan

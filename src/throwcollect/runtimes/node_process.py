@@ -23,12 +23,21 @@ from throwcollect.own_process import make_command
 from throwcollect.ros.middleware import VARIABLE
 from throwcollect.side_by_side import launching
 
+FORESEEN = "THROWCOLLECT_FORESEEN"
+"""Environment variable by which `fork_server` gets the configuration of simulations, in JSON."""
 
-def begin_imports(*modules: str) -> None:
-    """Let a process begin to import what nodes need, and `modules`, unless it has begun; it ends with this process."""
+
+def begin_imports(*modules: str, foreseen: str = "") -> None:
+    """Let a process begin to import what nodes need, and `modules`, unless it has begun; it ends with this process.
+
+    What simulations of the configuration `foreseen`, in JSON, begin with is worked out there, once for all of them.
+    """
     forkserver.set_forkserver_preload(["throwcollect.runtimes.fork_server", *modules])
     with launching():
+        # The kernel starts no process with an environment variable of 128 KiB.
+        os.environ[FORESEEN] = foreseen[:100_000]
         forkserver.ensure_running()
+        del os.environ[FORESEEN]
 
 
 def start_process(

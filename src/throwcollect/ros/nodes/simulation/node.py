@@ -100,7 +100,7 @@ class SimulationNode(Node):
         self._leases = LeaseQueue(simulation)
         self._live = [
             (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
-            for topic in Channels(_record_all_topics(config), self._description).recorded.values()
+            for topic in Channels(record_all_topics(config), self._description).recorded.values()
         ]
         self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
         self._manager = ControllerManager(self, simulation)
@@ -368,7 +368,7 @@ class SimulationNode(Node):
                 self._restoring = False
 
 
-def _record_all_topics(config: Config) -> Config:
+def record_all_topics(config: Config) -> Config:
     """Change the configuration so that all topics that have a message for every sample are recorded."""
     record = config.record.model_copy(update={"topics": ["joint_states", "ball/odometry", "tf", "clock"]})
     return config.model_copy(update={"record": record})

@@ -7,12 +7,28 @@ from pathlib import Path
 
 from throwcollect import ros
 from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.config.values import leaves
+from throwcollect.episode.channels import Channels
 from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
+from throwcollect.robots.description import full_description, physics_description
+from throwcollect.ros.nodes import descriptors
 from throwcollect.ros.nodes.sensors.node import SensorProcess
-from throwcollect.ros.nodes.simulation.node import SimulationNode
+from throwcollect.ros.nodes.simulation.node import SimulationNode, record_all_topics
 from throwcollect.ros.serving import begin_to_serve
 from throwcollect.sim.live import LiveSimulator
+from throwcollect.tasks.task import task_of
+
+
+def foresee(configuration: str) -> None:
+    """Fill the caches that simulations of a configuration, in JSON, fill at their start; start no engine, no policy."""
+    config = Config.model_validate_json(configuration)
+    task_of(config)
+    physics_description(config)
+    Channels(record_all_topics(config), full_description(config))
+    for leaf in leaves(config):
+        descriptors.of_key(leaf.name, leaf.value)
 
 
 def run(config: Path, *, name: str, namespace: str | None = None, record: Path | None = None) -> None:
