@@ -1,8 +1,9 @@
-"""Libraries are imported by the modules that the table of `pyproject.toml` names, and by no others."""
+"""Libraries are imported where `pyproject.toml` says; the page of the architecture names every room."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -60,3 +61,13 @@ def test_an_import_in_another_module_is_found() -> None:
         *(f"throwcollect.learning imports {library}" for library in ("mcap", "pybullet")),
         *(f"throwcollect.viewer imports {library}" for library in ("mcap", "onnx", "pybullet")),
     }
+
+
+def test_the_page_and_the_figure_of_the_architecture_name_every_room() -> None:
+    inside = ROOT / "src" / "throwcollect"
+    rooms = {path.stem for path in inside.iterdir() if path.suffix in ("", ".py") and not path.name.startswith("__")}
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    figure = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
+    assert rooms
+    assert {room for room in rooms if f"`{room}`" not in page} == set()
+    assert rooms <= set(re.findall(r"\w+", figure))
