@@ -1,4 +1,4 @@
-"""The example collects, exports, trains a policy of LeRobot, and scores it; `make test-lerobot` runs this."""
+"""The example collects, exports, trains a policy of LeRobot and scores it: `make -f .ci/tests.mk lerobot`."""
 
 import os
 import subprocess

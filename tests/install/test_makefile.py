@@ -17,18 +17,14 @@ def clone(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """A directory with the Makefile, and an environment in which everything is installed."""
     path = tmp_path / str(request.param)
     (path / ".venv" / "bin").mkdir(parents=True)
-    for name in ("Makefile", "pyproject.toml"):
+    for name in ("Makefile", "pyproject.toml", "uv.lock"):
         shutil.copy(ROOT / name, path)
     (path / ".venv" / "bin" / "python").symlink_to(sys.executable)
-    put(path / ".venv" / "bin" / "throwcollect", 'echo "throwcollect $*"')
+    program = path / ".venv" / "bin" / "throwcollect"
+    program.write_text('#!/bin/sh\necho "throwcollect $*"\n')
+    program.chmod(0o755)
     (path / ".venv" / ".ready").touch()
     return path
-
-
-def put(path: Path, lines: str) -> None:
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(f"#!/bin/sh\n{lines}\n")
-    path.chmod(0o755)
 
 
 def make(directory: Path, target: str) -> subprocess.CompletedProcess[str]:
@@ -46,11 +42,3 @@ def test_make_up_works_in_a_clone_at_any_path(clone: Path) -> None:
     collected, hint = done.stdout.splitlines()
     assert collected.startswith("throwcollect up -n 2 configs/quickstart.yaml")
     assert hint == f'so that the shell finds throwcollect: export PATH="{clone}/.venv/bin:$PATH"'
-
-
-def test_make_removes_the_python_of_an_unfinished_environment(clone: Path) -> None:
-    shutil.rmtree(clone / ".venv")
-    unfinished = f'mkdir -p "$1/bin"; ln -s "{sys.executable}" "$1/bin/python"; exit 1'
-    put(clone / "packaging" / "environment.sh", unfinished)
-    assert make(clone, ".venv/bin/python").returncode != 0
-    assert not (clone / ".venv" / "bin" / "python").is_symlink()
