@@ -42,7 +42,10 @@ def test_a_dataset_has_the_files_that_the_readme_draws(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "data").iterdir()} == drawn
 
 
-def test_the_make_targets_of_the_readme_exist() -> None:
+def test_the_make_targets_of_the_readme_and_of_the_workflow_exist() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for target in re.findall(r"^make (\w+)", README, flags=re.MULTILINE):
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^(?:make|.*- run: make) (\w+)", README + workflow, flags=re.MULTILINE))
+    assert {"up", "test", "docs"} <= targets
+    for target in targets:
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
