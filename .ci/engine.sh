@@ -59,7 +59,7 @@ if command -v docker > /dev/null && answers; then
 else
     start_engine
 fi
-if ! docker image inspect "$base" > /dev/null 2>&1; then
+if ! docker image inspect "$base" "$base-build" > /dev/null 2>&1; then
     why=$(install_missing mmdebstrap:mmdebstrap) || unavailable "$why"
     docker/base.sh "$base" > build/base.log 2>&1 || { tail -n 5 build/base.log; unavailable "no base image could be made"; }
     echo "base image: $base"
@@ -70,5 +70,5 @@ why=$(install_missing docker-compose:docker-compose) || echo "no Compose 1.29 fo
 [ -z "${AFTER:-}" ] || tail --pid="$AFTER" -f /dev/null
 "$python" docker/wheelhouse.py --ros docker/wheelhouse
 # tests/docker/test_image.py tests what is built, beside others.
-make image BUILD="--build-arg BASE_IMAGE=$base --build-arg SELFTEST=true" > build/image.log 2>&1 \
+make image BUILD="--build-arg BASE_IMAGE=$base --build-arg BUILD_IMAGE=$base-build --build-arg SELFTEST=true" > build/image.log 2>&1 \
     || { tail -n 25 build/image.log; exit 1; }

@@ -6,13 +6,13 @@ take too much shows at the end of the image's build, when a collection runs with
 
 from __future__ import annotations
 
-import re
+import hashlib
+import os
+import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from fnmatch import fnmatchcase
-from pathlib import Path, PurePosixPath
-
-from elf import is_elf, list_needed, strip
+from pathlib import Path
 
 DROPPED = (
     # For compilers, type checkers and developers.
@@ -49,6 +49,8 @@ DROPPED = (
     "pyarrow/_dataset_parquet_encryption*",
     "pyarrow/_s3fs*",
     "pyarrow/_substrait*",
+    "pyarrow/libarrow_flight*",
+    "pyarrow/libarrow_s3*",
     "pyarrow/src/*",
     # Parts that samplers and exports do not use.
     "scipy/cluster/*",
@@ -102,14 +104,8 @@ KEPT_OF_CMEEL = (
 ENVIRONMENT = "environment.data/data"
 """Directory of the environment, where wheels put what is in their ``*.data/data``."""
 
-COPIED = "ros_*.libs/*"
-"""Libraries that ROS' wheels hold beside their own: the loader searches all these directories, and one copy does."""
-
-LOADED_BY_NAME = ("lib*__rosidl_typesupport_*_c.so", "libllvmlite.so")
-"""What no library says that it needs: of ROS, when a type is first used with Fast DDS, and of llvmlite."""
-
-LIBRARY = re.compile(r"lib[^.]*\.so(\.\d+)*")
-"""File names of libraries; those of modules say for which Python: ``lib.cpython-311-x86_64-linux-gnu.so``."""
+PATCHED = "*.libs/*"
+"""Libraries that `auditwheel` has put into wheels: it moves their parts, and `strip` would break them."""
 
 
 def is_kept(path: str) -> bool:
@@ -125,43 +121,33 @@ def is_kept(path: str) -> bool:
     return not any(fnmatchcase(path, pattern) for pattern in DROPPED)
 
 
-def find_unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
-    """Shared libraries that no extension module loads, be it by way of others.
+def link_copies(libraries: Iterable[Path]) -> list[Path]:
+    """Replace copies of a library by links to the first of them.
 
-    Wheels hold a library up to three times, under the names that elsewhere are links to it; one of them is loaded.
-
-    Args:
-        files: What stays, by path: functions that read the content.
+    Wheels hold a library up to three times, under the names that elsewhere are links to it; and those of ROS each hold
+    the libraries that they share.
 
     Returns:
-        Paths of the libraries.
+        The libraries that are no copies.
     """
-    shared = {path: list_needed(content) for path, read in files.items() if ".so" in path and is_elf(content := read())}
-    libraries = {path for path in shared if LIBRARY.fullmatch(PurePosixPath(path).name)}
-    by_name = {
-        path for path in libraries if any(fnmatchcase(PurePosixPath(path).name, pattern) for pattern in LOADED_BY_NAME)
-    }
-    reached = set(shared) - libraries | by_name
-    fresh = set(reached)
-    while fresh:
-        names = {name for path in fresh for name in shared[path]}
-        fresh = {path for path in libraries - reached if PurePosixPath(path).name in names}
-        reached |= fresh
-    return libraries - reached
+    first: dict[bytes, Path] = {}
+    for path in libraries:
+        original = first.setdefault(hashlib.sha256(path.read_bytes()).digest(), path)
+        if original is not path:
+            path.unlink()
+            path.symlink_to(os.path.relpath(original, path.parent))
+    return list(first.values())
 
 
-def find_repeated(files: Iterable[str]) -> set[str]:
-    """Copies of libraries that ROS' wheels hold more than once, but for the first one of each name.
-
-    Args:
-        files: What stays, by path.
-
-    Returns:
-        Paths of the copies; their names have the hash of their content.
-    """
-    copies = [path for path in sorted(files) if fnmatchcase(path, COPIED)]
-    first = {PurePosixPath(path).name: path for path in reversed(copies)}
-    return set(copies) - set(first.values())
+def strip(library: Path) -> None:
+    """Remove the symbols for linkers and debuggers from a library."""
+    shorter = library.with_name(f"{library.name}.stripped")
+    subprocess.run(["strip", "--strip-unneeded", "-o", shorter, library], check=True)
+    # Whatever is written, be it the same, is in one more layer of the image.
+    if shorter.stat().st_size < library.stat().st_size:
+        shorter.replace(library)
+    else:
+        shorter.unlink()
 
 
 def slim(directory: Path) -> None:
@@ -177,14 +163,15 @@ def slim(directory: Path) -> None:
         files |= {
             f"{ENVIRONMENT}/{path.relative_to(environment).as_posix()}": path for path in beside if path.is_file()
         }
-    staying = {name: path for name, path in files.items() if is_kept(name)}
-    superfluous = find_unreached({name: path.read_bytes for name, path in staying.items()}) | find_repeated(staying)
     for name, path in files.items():
-        if name not in staying or name in superfluous:
+        if not is_kept(name):
             path.unlink()
-        # Whatever is written, be it the same, is in one more layer of the image.
-        elif ".so" in name and is_elf(content := path.read_bytes()) and (stripped := strip(content)) != content:
-            path.write_bytes(stripped)
+    libraries = {
+        path: name for name, path in sorted(files.items()) if ".so" in name and path.is_file() and not path.is_symlink()
+    }
+    for path in link_copies(path for path in libraries if path.read_bytes()[:4] == b"\x7fELF"):
+        if not fnmatchcase(libraries[path], PATCHED):
+            strip(path)
     for path in sorted(directory.rglob("*"), reverse=True):
         if path.is_dir() and not any(path.iterdir()):
             path.rmdir()

@@ -1,6 +1,7 @@
 """Fetches the uv of `uv.lock` with nothing but Python: `fetch_uv.py DIRECTORY` makes `DIRECTORY/bin/uv`.
 
-For machines whose Python has neither pip nor ensurepip, as that of Debian has neither without further packages.
+The Python of Debian has neither pip nor ensurepip without further packages. A wheel that lies beside this script is
+taken instead of that of the index.
 """
 
 import hashlib
@@ -32,11 +33,16 @@ def find_wheel(lock: str, system: str, machine: str, musl: bool):
 
 def main() -> None:
     """Fetches, compares the hash, and unpacks the one program."""
-    lock = Path(__file__).resolve().parents[1].joinpath("uv.lock").read_text(encoding="utf-8")
-    found = find_wheel(lock, platform.system(), platform.machine(), platform.libc_ver()[0] != "glibc")
+    here = Path(__file__).resolve().parent
+    lock = next(place / "uv.lock" for place in (here, *here.parents) if (place / "uv.lock").exists())
+    found = find_wheel(
+        lock.read_text(encoding="utf-8"), platform.system(), platform.machine(), platform.libc_ver()[0] != "glibc"
+    )
     if found is None:
         sys.exit(f"uv.lock has no uv for {platform.system()} on {platform.machine()}")
-    with urllib.request.urlopen(found[0], timeout=TIMEOUT_S) as answer:  # noqa: S310
+    beside = here / found[0].rpartition("/")[2]
+    address = beside.as_uri() if beside.exists() else found[0]
+    with urllib.request.urlopen(address, timeout=TIMEOUT_S) as answer:  # noqa: S310
         wheel = answer.read()
     if hashlib.sha256(wheel).hexdigest() != found[1]:
         sys.exit(f"{found[0]} is not the file that uv.lock pins")

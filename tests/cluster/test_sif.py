@@ -21,7 +21,7 @@ from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster
 ROOT = Path(__file__).parents[2]
-BASE = "throwcollect-base:bookworm"
+BASE = "throwcollect-base:bookworm-build"
 PAGE = read_section("running.md", "Apptainer and Singularity")
 COMMANDS = re.findall(r"^ *(apptainer .*?throwcollect\.sif up [^#\n]*)", PAGE, flags=re.MULTILINE)
 PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/run/user", "/opt")

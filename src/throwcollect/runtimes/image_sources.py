@@ -19,9 +19,9 @@ _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
 
 
 def digest_sources(root: Path = _CLONE) -> str:
-    """SHA-256 over all files of a clone that are installed, in hexadecimal."""
+    """SHA-256 over all files of a clone that decide what is installed, in hexadecimal."""
     digest = hashlib.sha256()
-    for path in [root / "pyproject.toml", *sorted((root / "src").rglob("*"))]:
+    for path in [root / "pyproject.toml", root / "uv.lock", *sorted((root / "src").rglob("*"))]:
         inside = path.relative_to(root)
         if path.is_file() and not any(map(_LEFT_OUT.fullmatch, inside.parts)):
             content = path.read_bytes()
