@@ -117,6 +117,7 @@ class _Grid:
         self._block = np.empty((0, 0))
         # A clock that stands still never gets to the end, so its last position is the position at the origin.
         self._last = curve.state(curve.end_ns if step_ns else origin_ns)[0]
+        self._last.setflags(write=False)
 
     def time_ns(self, index: int) -> int:
         """Compute the time of a point, since the trajectory's start [ns]."""
@@ -124,8 +125,7 @@ class _Grid:
 
     def position(self, index: int) -> NDArray[np.float64]:
         """Compute the position at one point [rad], shape ``(n_joints,)``, read-only."""
-        position: NDArray[np.float64] = self.positions(index, 1)[0]
-        return position
+        return self._last if index >= self.end_index or not self._step_ns else self.positions(index, 1)[0]
 
     def positions(self, first: int, count: int) -> NDArray[np.float64]:
         """Compute positions at successive points [rad], shape ``(count, n_joints)``, read-only; `first` is an index."""

@@ -7,12 +7,16 @@ a quintic. The first segment begins at the start state, which counts as having w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.values import JointState
 from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, Waypoints
+
+_AFTER_END_NS = np.array([1])
+"""Length of the part after the end."""
 
 
 @dataclass(frozen=True)
@@ -27,20 +31,27 @@ class Curve:
             the end.
         durations_ns: Length of each segment [ns], shape ``(n_knots,)``, int64; 1 for the part after the end.
         position: Coefficients [rad].
-        velocity: Coefficients [rad/s].
-        acceleration: Coefficients [rad/s²].
+        end: Velocity [rad/s] and acceleration [rad/s²] that are held after the end, each of shape ``(n_joints,)``.
     """
 
     knots_ns: NDArray[np.int64]
     durations_ns: NDArray[np.int64]
     position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
+    end: tuple[NDArray[np.float64], NDArray[np.float64]]
 
-    @property
+    @cached_property
     def end_ns(self) -> int:
         """Time of the last point since the trajectory's start [ns]."""
         return int(self.knots_ns[-1])
+
+    @cached_property
+    def derivatives(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coefficients of velocities [rad/s] and accelerations [rad/s²], which most trajectories do without."""
+        seconds = (self.durations_ns / 1e9)[:, np.newaxis]
+        velocity = _differentiate(self.position, seconds)
+        acceleration = _differentiate(velocity, seconds)
+        velocity[0, -1], acceleration[0, -1] = self.end
+        return velocity, acceleration
 
     def positions(self, times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Compute positions [rad], shape ``(n, n_joints)``, at times since the trajectory's start [ns], shape ``(n,)``.
@@ -60,23 +71,22 @@ class Curve:
         """
         if time_ns >= self.end_ns:
             # From the end on, all powers but the lowest have coefficients of 0.
-            return self.position[0, -1], self.velocity[0, -1], self.acceleration[0, -1]
+            return self.position[0, -1], *self.end
         times_ns = np.array([time_ns], dtype=np.int64)
         position, velocity, acceleration = (
-            self._evaluate(coefficients, times_ns)[0]
-            for coefficients in (self.position, self.velocity, self.acceleration)
+            self._evaluate(coefficients, times_ns)[0] for coefficients in (self.position, *self.derivatives)
         )
         return position, velocity, acceleration
 
     def _evaluate(self, coefficients: NDArray[np.float64], times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
         segment = np.searchsorted(self.knots_ns, times_ns, side="right") - 1
         share = ((times_ns - self.knots_ns[segment]) / self.durations_ns[segment])[:, np.newaxis]
-        # Horner's scheme works in place, because indexing by an array has made a copy and the coefficients stay as they
-        # are.
-        value: NDArray[np.float64] = coefficients[-1][segment]
-        for coefficient in coefficients[-2::-1]:
+        # Horner's scheme works in place, because `take` has made a copy.
+        chosen = coefficients.take(segment, axis=1)
+        value: NDArray[np.float64] = chosen[-1]
+        for coefficient in chosen[-2::-1]:
             value *= share
-            value += coefficient[segment]
+            value += coefficient
         return value
 
 
@@ -90,11 +100,13 @@ def interpolate(waypoints: Waypoints, start: JointState, start_ns: int) -> Curve
     """
     if start_ns < waypoints.times_ns[0]:
         waypoints = _prepend_start(waypoints, start, start_ns)
-    durations_ns = np.append(np.diff(waypoints.times_ns), 1)
-    if len(durations_ns) > 1:
-        return _make_splines(waypoints, durations_ns)
-    p, v, a = waypoints.positions, waypoints.velocities, waypoints.accelerations
-    return Curve(waypoints.times_ns, durations_ns, p[np.newaxis], v[np.newaxis], a[np.newaxis])
+    times_ns, position, durations_ns = waypoints.times_ns, waypoints.positions[np.newaxis], _AFTER_END_NS
+    if len(times_ns) > 1:
+        durations_ns = np.append(np.diff(times_ns), durations_ns)
+        position = _make_splines(waypoints, durations_ns)
+    # After the end the position is constant, but velocity and acceleration are held at those of the last point, as
+    # upstream does.
+    return Curve(times_ns, durations_ns, position, (waypoints.velocities[-1], waypoints.accelerations[-1]))
 
 
 def quintic(
@@ -137,7 +149,8 @@ def _prepend_start(waypoints: Waypoints, start: JointState, start_ns: int) -> Wa
     )
 
 
-def _make_splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
+def _make_splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Find the coefficients of the positions; see `Curve`."""
     content = np.minimum(waypoints.departure[:-1], waypoints.content[1:])
     seconds = (durations_ns / 1e9)[:, np.newaxis]
     # The highest degree of any segment decides the size of the tables. Lower ones leave their higher coefficients at 0.
@@ -156,12 +169,7 @@ def _make_splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curv
     if len(quintics):
         d, v, w, a, b = step[quintics], v0[quintics], v1[quintics], a0[quintics], a1[quintics]
         position[1:6, quintics] = quintic(d, v, w, a, b)
-    velocity = _differentiate(position, seconds)
-    acceleration = _differentiate(velocity, seconds)
-    # After the end the position is constant, but velocity and acceleration are held at those of the last point, as
-    # upstream does.
-    velocity[0, -1], acceleration[0, -1] = waypoints.velocities[-1], waypoints.accelerations[-1]
-    return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration)
+    return position
 
 
 def _differentiate(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from throwcollect.control.parameters import ControllerParameters
-from throwcollect.control.values import ErrorCode, Trajectory, TrajectoryRefusal, Values
+from throwcollect.control.values import ErrorCode, Rows, Trajectory, TrajectoryRefusal
 
 END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
 """Largest magnitude of a last point's velocity that counts as zero [rad/s] (ros2_controllers)."""
@@ -54,7 +54,7 @@ def _too_few_joints(trajectory: Trajectory, parameters: ControllerParameters) ->
 
 
 def _no_points(trajectory: Trajectory) -> str | None:
-    return None if len(trajectory.points) else "Empty trajectory received. (expected at least 1 point; got 0)"
+    return None if len(trajectory.times_ns) else "Empty trajectory received. (expected at least 1 point; got 0)"
 
 
 def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
@@ -71,13 +71,11 @@ def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters) -> s
 def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
     expected = len(trajectory.joint_names)
     integrates = parameters.allow_integration_in_goal_trajectories
-    for index, point in enumerate(trajectory.points):
-        fields: list[tuple[str, Values]] = [(field, getattr(point, field)) for field in _FIELDS]
-        # `len` is asked for, because fields of a message may be NumPy arrays, which have no truth value.
-        if integrates and not any(len(values) for _, values in fields):
+    all_sizes = [list(map(len, getattr(trajectory, field))) for field in _FIELDS]
+    for index, sizes in enumerate(zip(*all_sizes, strict=True)):
+        if integrates and not any(sizes):
             return f"The given trajectory has no position, velocity, or acceleration points. (point #{index})"
-        for field, values in fields:
-            size = len(values)
+        for field, size in zip(_FIELDS, sizes, strict=True):
             if size != expected and (size or (field == "positions" and not integrates)):
                 return f"Mismatch between joint_names size ({expected}) and {field} ({size}) at point #{index}."
     return None
@@ -85,13 +83,13 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> st
 
 def _not_finite(trajectory: Trajectory) -> str | None:
     for field, word in _FIELDS.items():
-        fields: list[Values] = [getattr(point, field) for point in trajectory.points]
-        present = [(index, values) for index, values in enumerate(fields) if len(values)]
+        rows: Rows = getattr(trajectory, field)
+        present = [index for index, values in enumerate(rows) if len(values)]
         # Their sizes have been checked, so these rows make a table.
-        table = np.array([values for _, values in present], dtype=np.float64)
+        table = np.array(rows if len(present) == len(rows) else [rows[index] for index in present], dtype=np.float64)
         if not np.isfinite(table).all():
             row, column = np.argwhere(~np.isfinite(table))[0]
-            where = f"{word} of joint {trajectory.joint_names[column]} at point #{present[row][0]}"
+            where = f"{word} of joint {trajectory.joint_names[column]} at point #{present[row]}"
             return f"{where} is not finite: {table[row, column]}"
     return None
 
@@ -99,8 +97,7 @@ def _not_finite(trajectory: Trajectory) -> str | None:
 def _moving_end(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
     if parameters.allow_nonzero_velocity_at_trajectory_end:
         return None
-    velocities = trajectory.points[-1].velocities
-    for joint, velocity in zip(trajectory.joint_names, velocities, strict=False):
+    for joint, velocity in zip(trajectory.joint_names, trajectory.velocities[-1], strict=False):
         if abs(velocity) > END_VELOCITY_LIMIT:
             text = f"Velocity of last trajectory point of joint {joint} is not zero: {velocity:.15f}"
             return f"{text} (limit {END_VELOCITY_LIMIT:.3g} rad/s)"
@@ -110,7 +107,7 @@ def _moving_end(trajectory: Trajectory, parameters: ControllerParameters) -> str
 def _over_already(trajectory: Trajectory, now_ns: int) -> str | None:
     if not trajectory.stamp_ns:
         return None
-    end_ns = trajectory.stamp_ns + trajectory.points[-1].time_from_start_ns
+    end_ns = trajectory.stamp_ns + trajectory.times_ns[-1]
     if end_ns >= now_ns:
         return None
     times = f"non-zero start time ({trajectory.stamp_ns / 1e9:f}) that ends in the past ({end_ns / 1e9:f})"
@@ -118,7 +115,7 @@ def _over_already(trajectory: Trajectory, now_ns: int) -> str | None:
 
 
 def _wrong_times(trajectory: Trajectory) -> str | None:
-    times_ns = [point.time_from_start_ns for point in trajectory.points]
+    times_ns = trajectory.times_ns
     if times_ns[0] < 0:
         return f"Time of point 0 is negative, it is {times_ns[0] / 1e9:f} (expected 0 or more)"
     for index in range(1, len(times_ns)):
@@ -129,10 +126,10 @@ def _wrong_times(trajectory: Trajectory) -> str | None:
 
 
 def _effort(trajectory: Trajectory) -> str | None:
-    for index, point in enumerate(trajectory.points):
-        if len(point.effort):
+    for index, values in enumerate(trajectory.effort):
+        if len(values):
             rule = "Trajectories with effort fields are only supported for controllers using the 'effort' command"
-            return f"{rule} interface. (expected none; got {len(point.effort)} values at point #{index})"
+            return f"{rule} interface. (expected none; got {len(values)} values at point #{index})"
     return None
 
 

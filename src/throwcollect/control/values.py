@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Values = Sequence[float] | NDArray[np.float64]
+Rows = Sequence[Values] | NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,20 @@ class Trajectory:
 
     Attributes:
         joint_names: Joints in the order of each point's fields.
-        points: The points.
+        times_ns: Time of each point since the trajectory's start [ns].
+        positions: Those of each point [rad], shape ``(n_points, n_joints)``; empty where a point has none.
+        velocities: The same [rad/s].
+        accelerations: The same [rad/s²].
+        effort: The same [Nm]; no rows for none.
         stamp_ns: Absolute time of the trajectory's start [ns]; None starts with the next update.
     """
 
     joint_names: Sequence[str]
-    points: Sequence[TrajectoryPoint]
+    times_ns: Sequence[int]
+    positions: Rows
+    velocities: Rows
+    accelerations: Rows
+    effort: Rows = ()
     stamp_ns: int | None = None
 
 

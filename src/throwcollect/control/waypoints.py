@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.values import JointState, Trajectory, TrajectoryPoint, Values
+from throwcollect.control.values import JointState, Rows, Trajectory
 
 _LONGEST_BRAKING_S = 60.0
 """Longest time for which a joint brakes: at a speed far above that of any robot, the points would fill all memory."""
@@ -65,21 +65,20 @@ def arrange(
         start: Where the trajectory begins: points without positions are integrated from there.
         start_ns: When, since the trajectory's start [ns]; points before that are over.
     """
-    points = trajectory.points
     columns = [joints.index(name) for name in trajectory.joint_names]
-    times_ns = np.array([point.time_from_start_ns for point in points], dtype=np.int64)
-    positions = np.repeat(command[np.newaxis], len(points), axis=0)
-    placed = [index for index, point in enumerate(points) if len(point.positions)]
-    if placed:
-        positions[np.ix_(placed, columns)] = [points[index].positions for index in placed]
-    velocities, moving = _make_table([point.velocities for point in points], positions.shape, columns)
-    accelerations, accelerating = _make_table([point.accelerations for point in points], positions.shape, columns)
-    content = np.zeros(len(points), np.int64)
-    content[moving] = CUBIC
+    times_ns = np.array(trajectory.times_ns, dtype=np.int64)
+    positions = np.repeat(command[np.newaxis], len(times_ns), axis=0)
+    velocities, accelerations = np.zeros((2, *positions.shape))
+    placed = _place(positions, columns, trajectory.positions)
+    moving = _place(velocities, columns, trajectory.velocities)
+    accelerating = _place(accelerations, columns, trajectory.accelerations)
+    content = np.where(moving, CUBIC, LINE)
     # Accelerations without velocities do not count, as upstream's quintic needs both.
-    content[[index for index in accelerating if content[index] == CUBIC]] = QUINTIC
+    content[moving & accelerating] = QUINTIC
     waypoints = Waypoints(times_ns, positions, velocities, accelerations, content, content)
-    return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start, start_ns)
+    if placed.all():
+        return waypoints
+    return _integrate(waypoints, (placed, moving, accelerating), columns, start, start_ns)
 
 
 def brake(
@@ -120,20 +119,25 @@ def brake(
     )
 
 
-def _make_table(
-    fields: Sequence[Values], shape: tuple[int, ...], columns: list[int]
-) -> tuple[NDArray[np.float64], list[int]]:
-    table = np.zeros(shape)
-    present = [index for index, values in enumerate(fields) if len(values)]
-    if present:
-        table[np.ix_(present, columns)] = [fields[index] for index in present]
-    return table, present
+def _place(table: NDArray[np.float64], columns: list[int], rows: Rows) -> NDArray[np.bool_]:
+    """Write rows that are not empty into these columns of a table; return which these are, shape ``(n_points,)``."""
+    present = np.fromiter(map(len, rows), bool, len(rows))
+    if present.all():
+        table[:, columns] = rows
+    elif present.any():
+        table[np.ix_(present, np.array(columns))] = [values for values in rows if len(values)]
+    return present
 
 
 def _integrate(
-    waypoints: Waypoints, points: Sequence[TrajectoryPoint], columns: list[int], start: JointState, start_ns: int
+    waypoints: Waypoints,
+    present: tuple[NDArray[np.bool_], ...],
+    columns: list[int],
+    start: JointState,
+    start_ns: int,
 ) -> Waypoints:
     """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""
+    placed, moving, accelerating = present
     positions, velocities, content = waypoints.positions.copy(), waypoints.velocities.copy(), waypoints.content.copy()
     departure = content.copy()
     still = np.zeros(positions.shape[1])
@@ -141,17 +145,17 @@ def _integrate(
     time_ns = min(start_ns, int(waypoints.times_ns[0]))
     p = start.positions
     v, a = still if start.velocities is None else start.velocities, still
-    for index, point in enumerate(points):
+    for index in range(len(positions)):
         seconds = (int(waypoints.times_ns[index]) - time_ns) / 1e9
-        if not len(point.positions):
-            if not len(point.velocities):
+        if not placed[index]:
+            if not moving[index]:
                 gained = (a + waypoints.accelerations[index]) / 2 * seconds
                 velocities[index, columns] = (v + gained)[columns]
-            content[index] = QUINTIC if len(point.accelerations) else CUBIC
+            content[index] = QUINTIC if accelerating[index] else CUBIC
             departure[index] = content[index]
             if index:
                 # The velocity of the point before is 0 if it has none; so is its acceleration, if that is needed, too.
-                is_quintic = not len(point.velocities) or len(points[index - 1].accelerations)
+                is_quintic = not moving[index] or accelerating[index - 1]
                 departure[index - 1] = QUINTIC if is_quintic else CUBIC
             positions[index, columns] = (p + (v + velocities[index]) / 2 * seconds)[columns]
         time_ns = int(waypoints.times_ns[index])

@@ -17,7 +17,6 @@ from throwcollect.control import (
     JointState,
     JointTrajectoryController,
     Trajectory,
-    TrajectoryPoint,
     TrajectoryRefusal,
 )
 from throwcollect.episode.record import ControllerSamples
@@ -99,10 +98,9 @@ class LimbController:
             if joint not in self._joints or self._joints.index(joint) in self._own:
                 continue
             held = self._posture[self._joints.index(joint)]
-            for point in trajectory.points:
-                if motion := _describe_motion(point, column, held):
-                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot {motion}"
-                    return self.controller.refuse(TrajectoryRefusal(ErrorCode.INVALID_GOAL, text))
+            if motion := _describe_motion(trajectory, column, held):
+                text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot {motion}"
+                return self.controller.refuse(TrajectoryRefusal(ErrorCode.INVALID_GOAL, text))
         return None
 
     def measure(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
@@ -151,14 +149,19 @@ class LimbController:
         return ControllerSamples(elapsed, table[:, 0], table[:, 1], table[:, 2], table[:, 3])
 
 
-def _describe_motion(point: TrajectoryPoint, column: int, held: float) -> str:
-    """Describe how a point would move a joint away from the angle [rad] at which it is held; empty if it would not."""
-    # A field of the wrong size is not judged here, because the controller refuses it in the next check.
-    if column < len(point.positions):
-        target = point.positions[column]
-        return "" if abs(target - held) <= _LOCKED_TOLERANCE_RAD else f"go to {target:.6g} rad"
+def _describe_motion(trajectory: Trajectory, column: int, held: float) -> str:
+    """Describe how a trajectory would move a joint away from the angle [rad] at which it is held; empty if it does not.
+
+    Fields of the wrong size are not judged here, because the controller refuses them in the next check.
+    """
+    targets = [values[column] for values in trajectory.positions if column < len(values)]
+    if away := [target for target in targets if not abs(target - held) <= _LOCKED_TOLERANCE_RAD]:
+        return f"go to {away[0]:.6g} rad"
+    if len(targets) == len(trajectory.positions):
+        return ""
     # A point without positions is reached by its velocities and accelerations.
-    rates = () if len(point.positions) else (point.velocities, point.accelerations)
+    points = zip(trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
+    rates = [values for positions, *rates in points if not len(positions) for values in rates]
     return "move" if any(values[column] != 0 for values in rates if column < len(values)) else ""
 
 

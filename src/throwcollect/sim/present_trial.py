@@ -15,7 +15,6 @@ from throwcollect.control import (
     GoalStatus,
     Trajectory,
     TrajectoryGoal,
-    TrajectoryPoint,
     TrajectoryRefusal,
 )
 from throwcollect.episode.record import GoalOutcome
@@ -127,8 +126,7 @@ def _make_goal(trajectory: JointTrajectory, joints: tuple[str, ...], posture: Ma
     accelerations = _pick_columns(trajectory.joints, trajectory.accelerations, joints, still)
     # Times are rounded and not cut off, because a product may lie just below the whole number that is meant.
     stamps = np.rint(trajectory.times * 1e9).astype(np.int64).tolist()
-    points = map(TrajectoryPoint, stamps, positions, velocities, accelerations)
-    return TrajectoryGoal(Trajectory(joints, tuple(points)))
+    return TrajectoryGoal(Trajectory(joints, stamps, positions, velocities, accelerations))
 
 
 def _pick_columns(

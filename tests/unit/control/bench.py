@@ -54,12 +54,19 @@ def to(time_s: float, j1: float, degree: int = 1) -> TrajectoryPoint:
     return point(time_s, (j1, *START[1:]), still if degree > 1 else (), still if degree > 3 else ())
 
 
+def through(points: Sequence[TrajectoryPoint], names=JOINTS, stamp_ns: int | None = None) -> Trajectory:
+    """The trajectory through these points."""
+    rows = [(p.time_from_start_ns, p.positions, p.velocities, p.accelerations, p.effort) for p in points]
+    times_ns, positions, velocities, accelerations, effort = zip(*rows, strict=True) if rows else ((),) * 5
+    return Trajectory(names, times_ns, positions, velocities, accelerations, effort, stamp_ns)
+
+
 def goal(*points: TrajectoryPoint, names=JOINTS, stamp_s: float | None = None, **tolerances) -> TrajectoryGoal:
     stamp_ns = None if stamp_s is None else seconds(stamp_s)
     for key in ("path_tolerance", "goal_tolerance"):
         if key in tolerances:
             tolerances[key] = [JointTolerance(*tolerances[key])]
-    return TrajectoryGoal(Trajectory(names, points, stamp_ns), **tolerances)
+    return TrajectoryGoal(through(points, names, stamp_ns), **tolerances)
 
 
 @dataclass

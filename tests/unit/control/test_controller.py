@@ -20,7 +20,7 @@ from throwcollect.control import (
     TrajectoryPoint,
 )
 
-from .bench import JOINTS, PERIOD_NS, TALOS, Bench, Plant, constrain, goal, seconds, to
+from .bench import JOINTS, PERIOD_NS, TALOS, Bench, Plant, constrain, goal, seconds, through, to
 
 UPDATES = 120
 tolerance = st.sampled_from([0.0, 0.0, 0.005, 0.1, 0.4])
@@ -37,7 +37,7 @@ def trajectories(draw: st.DrawFn) -> Trajectory:
         placed = draw(values) if content == 0 or draw(st.integers(0, 4)) else ()
         points.append(TrajectoryPoint(time_ns, placed, velocities, draw(values) if content > 1 else ()))
         time_ns += draw(st.sampled_from([1, PERIOD_NS, 55_555_555, 200_000_000]))
-    return Trajectory(names, points, draw(st.sampled_from([None, None, seconds(1000.3), seconds(1000.9)])))
+    return through(points, names, draw(st.sampled_from([None, None, seconds(1000.3), seconds(1000.9)])))
 
 
 @st.composite
@@ -201,9 +201,9 @@ def test_cancel_returns_whether_the_goal_was_being_executed() -> None:
 
 def test_the_order_of_joints_in_a_goal_does_not_matter() -> None:
     ordered, shuffled = Bench(), Bench()
-    ordered.send(TrajectoryGoal(Trajectory(JOINTS, [TrajectoryPoint(seconds(0.5), (1, 2, 3), (0, 0, 0), (1, 2, 3))])))
+    ordered.send(TrajectoryGoal(through([TrajectoryPoint(seconds(0.5), (1, 2, 3), (0, 0, 0), (1, 2, 3))], JOINTS)))
     names = ("j3", "j1", "j2")
-    shuffled.send(TrajectoryGoal(Trajectory(names, [TrajectoryPoint(seconds(0.5), (3, 1, 2), (0, 0, 0), (3, 1, 2))])))
+    shuffled.send(TrajectoryGoal(through([TrajectoryPoint(seconds(0.5), (3, 1, 2), (0, 0, 0), (3, 1, 2))], names)))
     ordered.step(60)
     shuffled.step(60)
     assert all(np.array_equal(ordered.commands[k], shuffled.commands[k]) for k in range(1, 61))

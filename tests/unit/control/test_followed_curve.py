@@ -7,15 +7,17 @@ import pytest
 
 from throwcollect.control.followed_curve import Motion
 from throwcollect.control.interpolation import interpolate
-from throwcollect.control.values import JointState, Trajectory, TrajectoryPoint
+from throwcollect.control.values import JointState, TrajectoryPoint
 from throwcollect.control.waypoints import arrange
+
+from .bench import through
 
 PERIOD_NS = 10
 
 
 def motion(end_ns: int = 100, first_ns: int = 1000) -> Motion:
     """One joint that goes from 0 at one radian per nanosecond."""
-    trajectory = Trajectory(("j",), [TrajectoryPoint(end_ns, (end_ns,))])
+    trajectory = through([TrajectoryPoint(end_ns, (end_ns,))], ("j",))
     start, start_ns = JointState(np.zeros(1)), first_ns - 1000
     curve = interpolate(arrange(trajectory, ("j",), np.zeros(1), start, start_ns), start, start_ns)
     return Motion(curve, start_ns=1000, first_ns=first_ns, period_ns=PERIOD_NS)

@@ -13,7 +13,7 @@ from throwcollect.control.interpolation import Curve, interpolate
 from throwcollect.control.values import JointState, Trajectory, TrajectoryPoint
 from throwcollect.control.waypoints import Waypoints, arrange
 
-from .bench import seconds
+from .bench import seconds, through
 
 JOINTS = ("a", "b")
 values = st.tuples(st.floats(-5, 5), st.floats(-5, 5))
@@ -28,7 +28,7 @@ def trajectories(draw: st.DrawFn) -> Trajectory:
         fields = [draw(values) if field <= content else () for field in range(3)]
         points.append(TrajectoryPoint(time_ns, *fields))
         time_ns += draw(lengths_ns)
-    return Trajectory(JOINTS, points)
+    return through(points, JOINTS)
 
 
 def curve_of(trajectory: Trajectory, start=(0.5, -0.5), velocity=(0.2, -0.2)) -> Curve:
@@ -40,9 +40,10 @@ def curve_of(trajectory: Trajectory, start=(0.5, -0.5), velocity=(0.2, -0.2)) ->
 @given(trajectory=trajectories())
 def test_a_segment_has_positions_velocities_and_accelerations_of_both_ends(trajectory: Trajectory) -> None:
     curve = curve_of(trajectory)
-    first = trajectory.points[0]
+    rows = trajectory.times_ns, trajectory.positions, trajectory.velocities, trajectory.accelerations
+    first, *later = itertools.starmap(TrajectoryPoint, zip(*rows, strict=True))
     fields = [(0.5, -0.5), (0.2, -0.2) if len(first.velocities) else (), (0, 0) if len(first.accelerations) else ()]
-    points = [TrajectoryPoint(0, *fields), *trajectory.points]
+    points = [TrajectoryPoint(0, *fields), first, *later]
     for before, after in itertools.pairwise(points):
         both = [
             len(before.velocities) and len(after.velocities),
@@ -67,14 +68,9 @@ def test_a_segment_has_positions_velocities_and_accelerations_of_both_ends(traje
 @settings(max_examples=50, deadline=None)
 @given(trajectory=trajectories())
 def test_a_curve_does_not_depend_on_the_order_of_joints_in_the_trajectory(trajectory: Trajectory) -> None:
-    mirrored = Trajectory(
-        ("b", "a"),
-        [
-            TrajectoryPoint(p.time_from_start_ns, p.positions[::-1], p.velocities[::-1], p.accelerations[::-1])
-            for p in trajectory.points
-        ],
-    )
-    times_ns = np.linspace(0, trajectory.points[-1].time_from_start_ns * 1.1, 50).astype(np.int64)
+    fields = trajectory.positions, trajectory.velocities, trajectory.accelerations
+    mirrored = Trajectory(("b", "a"), trajectory.times_ns, *([row[::-1] for row in rows] for rows in fields))
+    times_ns = np.linspace(0, trajectory.times_ns[-1] * 1.1, 50).astype(np.int64)
     one, other = curve_of(trajectory), curve_of(mirrored)
     assert np.array_equal(one.positions(times_ns), other.positions(times_ns))
 
@@ -83,7 +79,7 @@ def test_a_curve_does_not_depend_on_the_order_of_joints_in_the_trajectory(trajec
 @given(trajectory=trajectories())
 def test_a_curve_gives_the_same_positions_for_many_times_and_for_single_times(trajectory: Trajectory) -> None:
     curve = curve_of(trajectory)
-    times_ns = np.linspace(0, trajectory.points[-1].time_from_start_ns * 1.1, 50).astype(np.int64)
+    times_ns = np.linspace(0, trajectory.times_ns[-1] * 1.1, 50).astype(np.int64)
     singly = [curve.state(int(time_ns))[0] for time_ns in times_ns]
     assert np.array_equal(curve.positions(times_ns), singly)
 
@@ -91,7 +87,7 @@ def test_a_curve_gives_the_same_positions_for_many_times_and_for_single_times(tr
 def test_cubic_segments_reproduce_a_cubic() -> None:
     # x³ - 2x has value and slope (0, -2) at 0 and (4, 10) at 2, and the second derivative 12 there.
     points = [TrajectoryPoint(seconds(1), (0, 0), (-2, -2)), TrajectoryPoint(seconds(3), (4, 4), (10, 10))]
-    position, velocity, acceleration = curve_of(Trajectory(JOINTS, points)).state(seconds(3) - 1)
+    position, velocity, acceleration = curve_of(through(points, JOINTS)).state(seconds(3) - 1)
     assert (position[0], velocity[0], acceleration[0]) == pytest.approx((4, 10, 12), abs=1e-6)
 
 
@@ -101,29 +97,29 @@ def test_quintic_segments_reproduce_a_quintic() -> None:
         TrajectoryPoint(seconds(1), (0, 0), (24, 24), (-100, -100)),
         TrajectoryPoint(seconds(3), (0, 0), (4, 4), (0, 0)),
     ]
-    position, velocity, acceleration = curve_of(Trajectory(JOINTS, points)).state(seconds(2))
+    position, velocity, acceleration = curve_of(through(points, JOINTS)).state(seconds(2))
     assert (position[0], velocity[0], acceleration[0]) == pytest.approx((0, -6, 10), abs=1e-6)
 
 
 def test_a_curve_starts_with_the_measured_velocity() -> None:
-    curve = curve_of(Trajectory(JOINTS, [TrajectoryPoint(seconds(0.5), (2.1, 0), (0, 0))]), (1.6, 0), (1, 0))
+    curve = curve_of(through([TrajectoryPoint(seconds(0.5), (2.1, 0), (0, 0))], JOINTS), (1.6, 0), (1, 0))
     assert curve.positions(np.array([seconds(0.01)]))[0, 0] == pytest.approx(1.610196, abs=1e-6)
 
 
 def test_a_curve_keeps_position_and_velocity_of_its_last_point() -> None:
-    curve = curve_of(Trajectory(JOINTS, [TrajectoryPoint(seconds(1), (2, 3), (0.5, 0.25))]))
+    curve = curve_of(through([TrajectoryPoint(seconds(1), (2, 3), (0.5, 0.25))], JOINTS))
     position, velocity, acceleration = curve.state(seconds(5))
     assert (position.tolist(), velocity.tolist(), acceleration.tolist()) == ([2, 3], [0.5, 0.25], [0, 0])
 
 
 def test_accelerations_without_velocities_are_ignored() -> None:
     points = [TrajectoryPoint(seconds(time), (time, 0), (), (9, 9)) for time in (1, 2)]
-    assert curve_of(Trajectory(JOINTS, points)).state(seconds(1.5))[0][0] == pytest.approx(1.5)
+    assert curve_of(through(points, JOINTS)).state(seconds(1.5))[0][0] == pytest.approx(1.5)
 
 
 def test_points_in_the_past_are_not_blended_with_the_measured_state() -> None:
     state, start_ns = JointState(np.array((9.0, 9.0))), seconds(0.5)
-    trajectory = Trajectory(JOINTS, [TrajectoryPoint(0, (1, 1)), TrajectoryPoint(seconds(1), (2, 2))])
+    trajectory = through([TrajectoryPoint(0, (1, 1)), TrajectoryPoint(seconds(1), (2, 2))], JOINTS)
     curve = interpolate(arrange(trajectory, JOINTS, np.zeros(2), state, start_ns), state, start_ns)
     assert curve.positions(np.array([seconds(0.5), seconds(0.75)]))[:, 0] == pytest.approx([1.5, 1.75])
 
@@ -135,7 +131,7 @@ def test_a_curve_of_a_single_point_holds_it_from_the_start() -> None:
 
 
 def test_joints_that_are_left_out_keep_their_command() -> None:
-    trajectory = Trajectory(("b",), [TrajectoryPoint(1, (5,), (6,), (7,)), TrajectoryPoint(2, (8,))])
+    trajectory = through([TrajectoryPoint(1, (5,), (6,), (7,)), TrajectoryPoint(2, (8,))], ("b",))
     waypoints = arrange(trajectory, JOINTS, np.array((0.25, 9.0)), JointState(np.array((0.25, 9.0))), 0)
     assert waypoints.positions.tolist() == [[0.25, 5], [0.25, 8]]
     assert waypoints.velocities.tolist() == [[0, 6], [0, 0]]

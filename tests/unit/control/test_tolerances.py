@@ -9,9 +9,9 @@ import pytest
 
 from throwcollect.control.parameters import Constraints, JointConstraints
 from throwcollect.control.tolerances import default_tolerances, goal_tolerances, violations
-from throwcollect.control.values import JointTolerance, Trajectory, TrajectoryGoal
+from throwcollect.control.values import JointTolerance, TrajectoryGoal
 
-from .bench import JOINTS, seconds
+from .bench import JOINTS, seconds, through
 
 LIMITS = JointConstraints(trajectory=0.1, goal=0.1)
 CONSTRAINTS = Constraints(goal_time=0.1, stopped_velocity_tolerance=0.1, joints=dict.fromkeys(JOINTS, LIMITS))
@@ -19,7 +19,7 @@ LOGGER = logging.getLogger("c")
 
 
 def resolve(path=(), goal=(), late_ns: int = 0) -> tuple[list[float], list[float], int]:
-    asked = TrajectoryGoal(Trajectory((), ()), path, goal, late_ns)
+    asked = TrajectoryGoal(through((), ()), path, goal, late_ns)
     found = goal_tolerances(asked, default_tolerances(CONSTRAINTS, JOINTS), JOINTS, logger=LOGGER)
     return found.path.tolist(), found.goal.tolist(), found.goal_time_ns
 

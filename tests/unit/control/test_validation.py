@@ -2,19 +2,49 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from throwcollect.control import ControllerParameters, Trajectory, validation
 
-from .bench import SHIPPED, goal, point, seconds, to
+from .bench import SHIPPED, goal, point, seconds, through, to
 
 NOW_NS = seconds(1000)
+NAN, SLOW = (np.nan, 0, 0), (0.1, 0, 0)
+EFFORT = (1.0, 1.0, 1.0)
 
 
 def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> str | None:
     reason = validation.refusal(trajectory, parameters, now_ns)
     return None if reason is None else reason.text
+
+
+# Each trajectory breaks the rule of its text, and rules that are checked later.
+ORDER = [
+    ("don't match the controller joints", goal(names=["x"])),
+    ("Empty trajectory received", goal(names=["x", "x", "x"])),
+    ("Incoming joint x doesn't match", goal(point(-1, (1,)), names=["x", "x", "j1"])),
+    ("Joint j1 is named more than once", goal(point(-1, (1,)), names=["j1", "j1", "j2"])),
+    ("positions (1) at point #1", goal(point(1, NAN), point(-1, (1,), (1, 1), (), EFFORT), stamp_s=1)),
+    ("Position of joint j1 at point #0 is not finite", goal(point(-1, NAN, SLOW, (), EFFORT), stamp_s=1)),
+    ("Velocity of last trajectory point", goal(point(-1, (1, 2, 3), SLOW, (), EFFORT), stamp_s=1)),
+    ("ends in the past", goal(point(-1, (1, 2, 3), (), (), EFFORT), stamp_s=1)),
+    ("Time of point 0 is negative", goal(point(-1, (1, 2, 3), (), (), EFFORT), to(-2, 1))),
+    ("is not strictly increasing", goal(point(1, (1, 2, 3), (), (), EFFORT), to(0.5, 1))),
+    ("'effort' command interface", goal(point(1, (1, 2, 3)), point(2, (1, 2, 3), (), (), (1,)))),
+]
+
+
+@pytest.mark.parametrize(("words", "request_"), ORDER, ids=[words for words, _ in ORDER])
+def test_a_refusal_names_the_first_broken_rule(words: str, request_) -> None:
+    assert words in refusal(request_.trajectory, SHIPPED, NOW_NS)
+
+
+def test_empty_joint_names_are_reported_before_missing_points() -> None:
+    partial = dataclasses.replace(SHIPPED, allow_partial_joints_goal=True)
+    assert refusal(through([], []), partial, NOW_NS).startswith("Empty joint names")
 
 
 def test_points_may_lack_velocities_and_accelerations() -> None:

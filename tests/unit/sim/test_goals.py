@@ -21,24 +21,23 @@ def test_each_moving_limb_gets_one_goal_over_all_of_its_joints() -> None:
     assert list(goals) == [ARM, "torso_controller"]
     for controller, goal in goals.items():
         assert tuple(goal.trajectory.joint_names) == TALOS.controllers[controller]
-        assert len(goal.trajectory.points) == len(TRAJECTORY.times)
+        assert len(goal.trajectory.times_ns) == len(TRAJECTORY.times)
 
 
 def test_a_goal_keeps_resting_joints_at_their_posture() -> None:
     arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
     still = arm.joint_names.index("arm_right_3_joint")
-    for point in arm.points:
-        assert point.positions[still] == POSTURE["arm_right_3_joint"]
-        assert (point.velocities[still], point.accelerations[still]) == (0.0, 0.0)
+    for position, velocity, acceleration in zip(arm.positions, arm.velocities, arm.accelerations, strict=True):
+        assert position[still] == POSTURE["arm_right_3_joint"]
+        assert (velocity[still], acceleration[still]) == (0.0, 0.0)
 
 
 def test_a_goal_has_the_trajectory_of_each_moving_joint() -> None:
     arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
     column, own = arm.joint_names.index("arm_right_4_joint"), TRAJECTORY.joints.index("arm_right_4_joint")
-    sent = np.array([[point.positions[column], point.velocities[column]] for point in arm.points])
-    assert np.array_equal(sent, np.stack([TRAJECTORY.positions[:, own], TRAJECTORY.velocities[:, own]], axis=1))
-    stamps = [point.time_from_start_ns / 1e9 for point in arm.points]
-    assert np.allclose(stamps, TRAJECTORY.times, atol=1e-9)
+    assert np.array_equal(np.array(arm.positions)[:, column], TRAJECTORY.positions[:, own])
+    assert np.array_equal(np.array(arm.velocities)[:, column], TRAJECTORY.velocities[:, own])
+    assert np.allclose(np.array(arm.times_ns) / 1e9, TRAJECTORY.times, atol=1e-9)
 
 
 def test_the_digest_of_a_trajectory_covers_all_its_fields() -> None:

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from tests.unit.control.bench import through
 
 from throwcollect.config.schema import Config
 from throwcollect.control import (
     ControllerParameters,
     GoalStatus,
     JointConstraints,
-    Trajectory,
     TrajectoryGoal,
     TrajectoryPoint,
 )
@@ -28,7 +28,7 @@ def simulation(**options: object) -> LiveSimulator:
 def goal(seconds: float, elbow: float = -1.0) -> TrajectoryGoal:
     positions = [POSTURE[joint] for joint in TALOS.controllers[ARM]]
     positions[ELBOW] = elbow
-    return TrajectoryGoal(Trajectory(TALOS.controllers[ARM], [TrajectoryPoint(round(seconds * 1e9), positions)]))
+    return TrajectoryGoal(through([TrajectoryPoint(round(seconds * 1e9), positions)], TALOS.controllers[ARM]))
 
 
 def test_controllers_have_the_names_of_either_ros() -> None:
@@ -148,7 +148,7 @@ def test_a_velocity_that_would_move_a_locked_joint_is_refused_by_name() -> None:
     limb = simulation().limbs[HEAD]
     joints = TALOS.controllers[HEAD]
     still, turning = ([TrajectoryPoint(10**9, velocities=[0.0, speed])] for speed in (0.0, 0.1))
-    assert limb.refuse_locked(Trajectory(joints, still)) is None
-    refusal = limb.refuse_locked(Trajectory(joints, turning))
+    assert limb.refuse_locked(through(still, joints)) is None
+    refusal = limb.refuse_locked(through(turning, joints))
     assert refusal is not None
     assert refusal.text == f"{HEAD}: head_2_joint is locked at 0 rad (robot.locked) and cannot move"

@@ -1,11 +1,13 @@
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.unit.control.bench import through
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.control import GoalStatus, TrajectoryGoal, TrajectoryPoint
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
@@ -24,7 +26,7 @@ def goal(controller: str, duration_s: float = 1.0, **ends: float) -> TrajectoryG
     start = [POSTURE[joint] for joint in joints]
     end = [ends.get(joint, POSTURE[joint]) for joint in joints]
     points = (TrajectoryPoint(0, start, still, still), TrajectoryPoint(round(duration_s * 1e9), end, still, still))
-    return TrajectoryGoal(Trajectory(joints, points))
+    return TrajectoryGoal(through(points, joints))
 
 
 def swing() -> TrajectoryGoal:
@@ -385,8 +387,9 @@ def test_recording_goes_on_while_all_rests_and_ends_when_its_time_is_over(simula
     def move(number: int, duration_s: float) -> None:
         wish = goal(ARM, duration_s, arm_right_4_joint=POSTURE["arm_right_4_joint"] + 0.1 * number)
         # Without its first point, a trajectory begins where the arm is.
-        joints, points = wish.trajectory.joint_names, wish.trajectory.points[1:]
-        assert simulation.submit(ARM, number, TrajectoryGoal(Trajectory(joints, points))) is None
+        names = "times_ns", "positions", "velocities", "accelerations", "effort"
+        later = replace(wish.trajectory, **{name: getattr(wish.trajectory, name)[1:] for name in names})
+        assert simulation.submit(ARM, number, TrajectoryGoal(later)) is None
         run(simulation)
 
     simulation.begin_recording()

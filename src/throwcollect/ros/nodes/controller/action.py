@@ -160,18 +160,14 @@ def nanoseconds(time: Time | Duration) -> int:
 def read_trajectory(message: JointTrajectory) -> Trajectory:
     """Read the contents of a trajectory_msgs/msg/JointTrajectory."""
     stamp_ns = nanoseconds(message.header.stamp)
+    points = message.points
     return Trajectory(
         joint_names=tuple(message.joint_names),
-        points=tuple(
-            TrajectoryPoint(
-                nanoseconds(point.time_from_start),
-                point.positions,
-                point.velocities,
-                point.accelerations,
-                point.effort,
-            )
-            for point in message.points
-        ),
+        times_ns=[nanoseconds(point.time_from_start) for point in points],
+        positions=[point.positions for point in points],
+        velocities=[point.velocities for point in points],
+        accelerations=[point.accelerations for point in points],
+        effort=[point.effort for point in points],
         # A stamp of zero is ROS' way of leaving it out.
         stamp_ns=stamp_ns or None,
     )
