@@ -8,6 +8,7 @@ Frames and units: world with x forward, y left, z up; metres, radians, seconds, 
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -192,6 +193,8 @@ class Steps:
         drag_kgpm: Force of the air on the object over the square of its speed.
         ground_is_solid: Whether the ground stops the object in these steps, even if that of the scene does not.
         held: Number of the last step in which a tool that holds the object still does; 0 if it lets go at once.
+        plane_m: Height at which the observer will likely stop the steps when the object's centre falls through it; an
+            engine that computes further steps need not do so from there.
     """
 
     targets: NDArray[np.float64]
@@ -201,6 +204,7 @@ class Steps:
     drag_kgpm: float = 0.0
     ground_is_solid: bool = False
     held: int = 0
+    plane_m: float = -math.inf
 
 
 class Observer:
@@ -222,6 +226,15 @@ class Observer:
         """
         del step, sample
         return False
+
+    def on_samples(self, steps: range, samples: NDArray[np.float64]) -> int | None:
+        """Take the samples after several steps, shape ``(n_samples, n_numbers)``, as `on_sample` takes one.
+
+        Returns:
+            Index of the sample after which the engine takes no further step; None if it goes on.
+        """
+        over = (self.on_sample(step, tuple(sample)) for step, sample in zip(steps, samples.tolist(), strict=True))
+        return next((number for number, is_over in enumerate(over) if is_over), None)
 
 
 @dataclass(frozen=True)

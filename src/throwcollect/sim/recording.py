@@ -20,7 +20,6 @@ class SampleLog:
     """Keeps samples as packed numbers: to free their Python objects after a trial takes longer than to pack them all.
 
     Attributes:
-        last: The sample that was recorded last.
         forgotten: How many samples have been forgotten.
 
     Args:
@@ -39,8 +38,11 @@ class SampleLog:
 
     def append(self, sample: Sample) -> None:
         """Record a sample."""
-        self.last = sample
         self._packed += self._pack(*sample)
+
+    def extend(self, samples: NDArray[np.float64]) -> None:
+        """Record samples, shape ``(n_samples, n_numbers)``."""
+        self._packed += samples.tobytes()
 
     def forget(self) -> None:
         """Drop all samples but the last one, so that a world can go on for ever; numbers of samples stay."""

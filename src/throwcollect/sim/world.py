@@ -82,7 +82,7 @@ class World(Observer):
     end_reason: EndReason | None
     _ends: EndRule
     touching: frozenset[str]
-    _sampled_target: Sequence[float]
+    _sampled_target: Sequence[float] | NDArray[np.float64]
 
     def __init__(self, config: Config) -> None:
         self._name = config.sim.engine
@@ -143,7 +143,8 @@ class World(Observer):
         self.physics_hz = sim.physics_hz
         self._stride = sim.physics_hz // trial.record.rate_hz
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
-        self._ends = task_of(trial).end_rule()
+        task = task_of(trial)
+        self._ends, self._plane_m = task.end_rule(), task.end_height_m
         self._drag = drag_of(trial)
         self._release_step = round((tool_of(trial).release_s or 0.0) * sim.physics_hz)
         self._motors = self._make_motors(trial)
@@ -172,18 +173,24 @@ class World(Observer):
         first, self._first_step = self.steps, self.steps
         self._stops_at_end = stop_at_end
         # Commands are angles that sensors should show, but motors follow true angles.
-        self._targets, velocities = self._motors.plan(commands + self._offsets)
+        targets, velocities = self._motors.plan(commands + self._offsets)
         steps = Steps(
-            self._targets,
+            targets,
             velocities,
             first_sample=self._stride - first % self._stride,
             stride=self._stride,
             drag_kgpm=self._drag,
             ground_is_solid=not stop_at_end,
             held=max(0, self._release_step - first),
+            plane_m=self._plane_m,
         )
+        # The arm stands still at a sample if its target is that of the sample before.
+        due, recorded = targets[steps.first_sample :: self._stride], self.recorded
+        self._still = iter((due == np.vstack((self._sampled_target, due[:-1]))).all(axis=1).tolist())
         with explain_failure("engines", self._name, "take steps"):
             taken = self.engine.run(steps, self)
+        if sampled := self.recorded - recorded:
+            self._sampled_target = due[sampled - 1]
         self.steps = first + taken
         self._motors.advance(taken)
         return taken
@@ -195,16 +202,28 @@ class World(Observer):
 
     def on_sample(self, step: int, sample: Sample) -> bool:
         """Record a sample after a step of the present `run`, and tell whether the run is over."""
-        self.steps = self._first_step + step
-        # Stamps are computed from numbers of samples, so an engine that skips one would make a false dataset.
-        if self.steps != len(self._log) * self._stride:
-            raise ValueError(
-                f"sample {len(self._log)} should be of step {len(self._log) * self._stride}, not {self.steps}"
-            )
-        before = self._log.last
+        self._check_due(step)
         self._log.append(sample)
-        reason = self._judge(before, sample, self._targets[step].tolist())
-        self.end_reason = self.end_reason or reason
+        return self._is_over(step, sample[-BODY_NUMBERS:])
+
+    def on_samples(self, steps: range, samples: NDArray[np.float64]) -> int | None:
+        """Record samples after steps of the present `run`, and tell with which one it is over."""
+        self._check_due(steps[0])
+        objects = zip(steps, samples[:, -BODY_NUMBERS:].tolist(), strict=True)
+        end = next((number for number, now in enumerate(objects) if self._is_over(*now)), None)
+        self._log.extend(samples if end is None else samples[: end + 1])
+        return end
+
+    def _check_due(self, step: int) -> None:
+        """Refuse the sample after a step if another one is due, as stamps are computed from numbers of samples."""
+        if (got := self._first_step + step) != (due := len(self._log) * self._stride):
+            raise ValueError(f"sample {len(self._log)} should be of step {due}, not {got}")
+
+    def _is_over(self, step: int, now: Sequence[float]) -> bool:
+        """Judge the object in a sample, and tell whether the run is over."""
+        self.steps = self._first_step + step
+        reason = self._judge(now, stands_still=next(self._still))
+        self._sampled_object, self.end_reason = now, self.end_reason or reason
         return self._stops_at_end and self.end_reason is not None
 
     def samples(self, first: int = 0) -> Samples:
@@ -359,20 +378,19 @@ class World(Observer):
 
     def _record_start(self) -> None:
         # The motor torques are taken from the settled state, because engines have none before the first step.
-        self._log = SampleLog((*self._start_joints, *self.engine.state.sample[len(self._start_joints) :]))
+        sample = (*self._start_joints, *self.engine.state.sample[len(self._start_joints) :])
+        self._log, self._sampled_object = SampleLog(sample), sample[-BODY_NUMBERS:]
 
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * NS_PER_S // self.physics_hz
 
-    def _judge(self, before: Sample, now: Sample, target: Sequence[float]) -> EndReason | None:
-        """Find the reason for which the trial ends with a sample, by the one before; None if the trial goes on."""
-        stands_still = target == self._sampled_target
-        self._sampled_target = target
+    def _judge(self, now: Sequence[float], *, stands_still: bool) -> EndReason | None:
+        """Find the reason for which the trial ends with a sample of the object; None if the trial goes on."""
         self._has_moved |= not stands_still
         lies = stands_still and self.touching
         if not (lies and math.hypot(*now[OBJECT_LINEAR_VELOCITY]) < REST_SPEED_MPS):
             self._resting_since = self.steps
-        if (reason := self._ends(before[-BODY_NUMBERS:], now[-BODY_NUMBERS:], self._contacts.bodies)) is not None:
+        if (reason := self._ends(self._sampled_object, now, self._contacts.bodies)) is not None:
             return reason
         if self._has_moved and self.rests and not self.may_rest:
             return "rest"

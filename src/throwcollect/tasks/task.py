@@ -140,6 +140,11 @@ class Task(ABC, Generic[AnyResult]):
             result = replace(result, outcome=failure.outcome, reason=failure.reason)
         return result
 
+    @property
+    def end_height_m(self) -> float:
+        """Height through which the object's centre falls when `end_rule` ends a trial [m]; only speed depends on it."""
+        return self.config.scene.landing_height_m + object_of(self.config).radius_m
+
     def end_rule(self) -> EndRule:
         """Make the rule by which a trial ends as ``landed``; trials also end when all is at rest, or time is over.
 
@@ -147,9 +152,7 @@ class Task(ABC, Generic[AnyResult]):
         of the scene pressed on it: what hits a thin body at speed gets into it for a moment. The
         lowest point is that of the sphere around the object.
         """
-        config = self.config
-        plane_m = config.scene.landing_height_m + object_of(config).radius_m
-        holders = {config.tool.name, *config.bodies}
+        plane_m, holders = self.end_height_m, {self.config.tool.name, *self.config.bodies}
 
         def has_landed(before: Sequence[float], now: Sequence[float], touching: Collection[str]) -> EndReason | None:
             return "landed" if now[HEIGHT] < plane_m <= before[HEIGHT] and holders.isdisjoint(touching) else None

@@ -48,7 +48,7 @@ from throwcollect.reproducible_math import matmul
 _LOOP = make_loop()
 """Made when this module is imported: by the process from which simulations are forked, before they are."""
 
-_AHEAD = 16
+_AHEAD = 64
 """Steps that are taken before the observer gets their samples; if it stops at one, the world goes back to that one."""
 
 
@@ -116,7 +116,7 @@ class MujocoEngine(Engine):
         self._pressing = np.zeros(surfaces, int)
         self._samples = np.zeros((_AHEAD, 3 * count + BODY_NUMBERS * bodies))
         self._states = np.zeros((_AHEAD, model.nq + 4 * model.nv))
-        self._changes = np.zeros((_AHEAD + 1, 1 + surfaces), int)
+        self._changes = np.zeros(1 + (_AHEAD + 1) * (1 + surfaces), int)
         memory = [data.qpos, data.qvel, data.qacc, data.qacc_warmstart, data.qfrc_passive, data.qfrc_constraint]
         memory += [data.qfrc_applied, data.qfrc_inverse, data.sensordata, data.xipos, data.ximat]
         memory += [model.bvh_aabb, model.body_bvhadr, self._motors, self._bounces, np.array(self._order)]
@@ -186,7 +186,8 @@ class MujocoEngine(Engine):
         # These are in the order of steps, whatever NumPy makes of the columns above.
         wanted = np.ravel(self._motors[:, 0] * targets + self._motors[:, 1] * velocities)
         total = len(targets)
-        shared, hz, due, number = _LOOP.share(wanted), float(self._physics.hz), steps.first_sample, 0
+        shared, hz, stride = _LOOP.share(wanted), float(self._physics.hz), steps.stride
+        due, number, width = steps.first_sample, 0, 1 + len(self._surfaces)
         # This equals no state of the surfaces, so the first step is compared with what pressed before.
         self._pressing.fill(-1)
         is_over = False
@@ -194,24 +195,28 @@ class MujocoEngine(Engine):
             if number == steps.held:
                 self._hold(None)
             last = min(number + (1 if self._held else _AHEAD), total)
-            call = (shared, number, last, due, steps.stride, hz, steps.drag_kgpm, self._reach_m)
-            count = _LOOP.take_steps(*self._fixed, *call)
-            samples = self._samples[: max(0, 1 + (last - due) // steps.stride)].tolist()
-            changes = self._changes[:count].tolist()
+            call = (shared, number, last, due, stride, hz, steps.drag_kgpm, self._reach_m, steps.plane_m)
+            last = _LOOP.take_steps(*self._fixed, *call)
+            samples, done = self._samples[: max(0, 1 + (last - due) // stride)], 0
+            changes = self._changes[1 : 1 + self._changes[0] * width].reshape(-1, width).tolist()
             if self._held is not None:
                 self._carry(self._held)
-                changes, samples = [[last, *self._pressing.tolist()]], [self._sample() for _ in samples]
-            for place, sample in enumerate(samples):
-                while changes and changes[0][0] <= due:
-                    self._report_touch(*changes.pop(0), observer=observer)
-                if is_over := observer.on_sample(due, tuple(sample)):
-                    if due < last:
-                        self._go_back(place)
-                    last, changes = due, []
-                    break
-                due += steps.stride
-            for change in changes:
-                self._report_touch(*change, observer=observer)
+                changes, samples[:] = [[last, *self._pressing.tolist()]], self._sample()
+            for step, *presses in (*changes, [last + 1]):
+                # The samples before something else presses on the object.
+                before = max(done, -((due - step) // stride))
+                if before > done:
+                    sampled = range(due + done * stride, due + before * stride, stride)
+                    end = observer.on_samples(sampled, samples[done:before])
+                    if is_over := end is not None:
+                        if sampled[end] < last:
+                            self._go_back(done + end)
+                        last = sampled[end]
+                        break
+                    done = before
+                if presses:
+                    self._report_touch(step, presses, observer)
+            due += done * stride
             number = last
         # Forces that are applied stay until they are replaced, and the next steps may have no drag.
         self._data.qfrc_applied[len(self._order) : len(self._order) + 3] = 0.0
@@ -256,11 +261,11 @@ class MujocoEngine(Engine):
         model, data, count = self._model, self._data, len(self._columns)
         mujoco.mj_step1(model, data)
         data.qfrc_applied[:count] = data.qfrc_bias[:count]
-        _LOOP.take_steps(*self._fixed, self._fixed[8], 0, 0, 0, 0, float(self._physics.hz), 0.0, 0.0)
+        _LOOP.take_steps(*self._fixed, self._fixed[8], 0, 0, 0, 0, float(self._physics.hz), 0.0, 0.0, 0.0)
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
 
-    def _report_touch(self, step: int, *presses: int, observer: Observer) -> None:
+    def _report_touch(self, step: int, presses: Sequence[int], observer: Observer) -> None:
         """Tell the observer which bodies press on the object now, if others did before; one number says so of each."""
         touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
         if touching != self._touching:

@@ -92,6 +92,7 @@ def take_steps(
     hz: float,
     drag_kgpm: float,
     reach_m: float,
+    plane_m: float,
 ) -> int:
     """Take the steps from number `first` to before `last`; without any, only aim the contacts.
 
@@ -105,12 +106,14 @@ def take_steps(
     acceleration in each step, at position and velocity 0; `bounces` the restitution of each shape; `order` the place of
     each joint of a sample. The object may touch the first `watched` bodies, within `reach_m` of its centre; `bodies`
     move, with the object. From step `due` on, `samples` gets samples, and `states` what the world would go on from;
-    `changes` gets what presses on the object after steps in which that is not as in `pressing` any more.
+    `changes` gets how often that changes, and what presses on the object after steps in which it is not as in
+    `pressing` any more. A sample in which the object has fallen through the height `plane_m` is the last one.
 
     Returns:
-        Number of changes.
+        Number of steps up to the last one.
     """
-    count, sample, state = 0, 0, 0
+    count, sample, state, reached = 0, 0, 0, first
+    is_above = qpos[joints + 2] >= plane_m
     if first == last:
         aim_contacts(data_ints, data_words, arena, arena_ints, origin, bounces, hz)
     for step in range(first, last):
@@ -139,8 +142,9 @@ def take_steps(
             for axis in range(joints, joints + 3):
                 qfrc_applied[axis] = factor * qvel[axis]
         mj_step2(model, data)
-        count += note_presses(step + 1, contacts, sensordata, pressing, surfaces, changes, count * (surfaces + 1))
-        if step + 1 == due:
+        count += note_presses(step + 1, contacts, sensordata, pressing, surfaces, changes, 1 + count * (surfaces + 1))
+        reached = step + 1
+        if reached == due:
             due += stride
             sample = write_sample(qpos, qvel, qfrc_applied, order, joints, bodies, samples, sample)
             for number in range(joints + 7 * bodies):
@@ -150,7 +154,11 @@ def take_steps(
                 states[state], states[state + 1] = qvel[number], qacc_warmstart[number]
                 states[state + 2], states[state + 3] = qfrc_constraint[number], qfrc_applied[number]
                 state += 4
-    return count
+            was_above, is_above = is_above, qpos[joints + 2] >= plane_m
+            if was_above and not is_above:
+                break
+    changes[0] = count
+    return reached
 
 
 def note_presses(

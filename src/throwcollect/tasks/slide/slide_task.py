@@ -43,9 +43,14 @@ class SlideTask(Task[SlideResult]):
         super().__init__(config)
         self._task = cast("SlideConfig", config.task)
 
+    @property
+    def end_height_m(self) -> float:
+        """Height of the table's upper face [m]; see `Task.end_height_m`."""
+        return self._task.table.height_m
+
     def end_rule(self) -> EndRule:
         """Make the rule by which a trial ends when the puck has left the table; see `Task.end_rule`."""
-        top_m = self._task.table.height_m
+        top_m = self.end_height_m
 
         def has_fallen(before: Sequence[float], now: Sequence[float], touching: Collection[str]) -> EndReason | None:  # noqa: ARG001
             return "landed" if now[HEIGHT] < top_m else None
