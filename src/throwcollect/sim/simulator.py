@@ -34,8 +34,8 @@ from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.trial.conditions import Settings
 from throwcollect.units import NS_PER_S
 
-STRETCH_S = 0.5
-"""Simulated time that is stepped in one call: about 20 ms of real time."""
+STRETCH_S = 1.0
+"""Simulated time that is stepped in one call: some 10 ms of real time with MuJoCo, and 20 with Bullet."""
 
 
 class Simulator:
