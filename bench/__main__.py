@@ -47,7 +47,7 @@ def main() -> None:
             rounds = []
             for index in range(arguments.rounds):
                 place = Path(scratch) / f"{engine}-{simulations}-{index}"
-                limit = raw.measure(plan, min(simulations, cores), arguments.trials // 4)
+                limit, _ = raw.measure(plan, min(simulations, cores), arguments.trials // 4)
                 versions: list[tuple[str, Callable[[], collection.Collection]]] = [
                     ("now", partial(collection.measure, plan, simulations, place))
                 ]

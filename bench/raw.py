@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.robots.description import physics_description
+from throwcollect.robots.description import physics_description, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.talos import TALOS
 from throwcollect.sim.world import World
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
@@ -44,15 +43,20 @@ def commands_of(config: Config) -> Commands:
     trajectory = task_of(config).trajectory()
     steps = int(config.sim.max_trial_s * config.sim.physics_hz)
     times = np.minimum(np.arange(steps + 1) / config.sim.physics_hz, trajectory.times[-1])
-    positions = sample_quintic(trajectory, times)[0]
-    positions = positions[:, [trajectory.joints.index(joint) for joint in moving]]
-    limits = joint_limits(TALOS).effort * config.robot.effort_scale
-    efforts = limits[[TALOS.joints.index(joint) for joint in moving]]
+    robot, start = robot_of(config), start_posture(config)
+    positions = np.tile([start[joint] for joint in moving], (steps + 1, 1))
+    positions[:, [moving.index(joint) for joint in trajectory.joints]] = sample_quintic(trajectory, times)[0]
+    limits = joint_limits(robot).effort * config.robot.effort_scale
+    efforts = limits[[robot.joints.index(joint) for joint in moving]]
     return Commands(config, positions, np.diff(positions, axis=0) * config.sim.physics_hz, efforts)
 
 
 def _loop(
-    plan: Plan, numbers: list[int], barrier: Barrier, seconds: multiprocessing.Queue[float], core: int | None
+    plan: Plan,
+    numbers: list[int],
+    barrier: Barrier,
+    seconds: multiprocessing.Queue[tuple[float, float]],
+    core: int | None,
 ) -> None:
     if core is not None:
         os.sched_setaffinity(0, {core})
@@ -62,14 +66,14 @@ def _loop(
     prepared = [commands_of(plan.config_of(plan.trials[number])) for number in numbers]
     throw(prepared[0])
     barrier.wait()
-    began = time.perf_counter()
+    began, busy = time.perf_counter(), time.process_time()
     for commands in prepared:
         throw(commands)
-    seconds.put(time.perf_counter() - began)
+    seconds.put((time.perf_counter() - began, time.process_time() - busy))
 
 
-def measure(plan: Plan, processes: int, trials: int) -> float:
-    """Throws per second of bare loops in several processes at once.
+def measure(plan: Plan, processes: int, trials: int) -> tuple[float, float]:
+    """Throws per second of bare loops in several processes at once, and the processor time of a throw [ms].
 
     Args:
         plan: Feasible trials, of which the first ones are run, again and again.
@@ -79,7 +83,7 @@ def measure(plan: Plan, processes: int, trials: int) -> float:
     feasible = [trial.number for trial in plan.trials if trial.refused is None]
     context = multiprocessing.get_context("spawn")
     barrier = context.Barrier(processes)
-    seconds: multiprocessing.Queue[float] = context.Queue()
+    seconds: multiprocessing.Queue[tuple[float, float]] = context.Queue()
     started = []
     # Bound to cores where the collection's simulations are, so that the limit has the same advantage.
     cores = sorted(os.sched_getaffinity(0))
@@ -92,4 +96,5 @@ def measure(plan: Plan, processes: int, trials: int) -> float:
     durations = [seconds.get() for _ in started]
     for each in started:
         each.join()
-    return sum(trials / duration for duration in durations)
+    walls, busy = zip(*durations, strict=True)
+    return sum(trials / wall for wall in walls), sum(busy) / (trials * processes) * 1e3

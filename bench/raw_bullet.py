@@ -18,7 +18,7 @@ def make_throw(world: World) -> Callable[[Commands], int]:
         world: Loaded, with the ball in the tool.
     """
     engine: Any = world.engine
-    robot, joints, ball = engine._scenery.robot, engine._scenery.joints, engine._ball
+    robot, joints, ball = engine._scenery.robot, engine._scenery.joints, engine._object_id
     state = pybullet.saveState()
 
     def throw(commands: Commands) -> int:

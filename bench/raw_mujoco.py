@@ -25,6 +25,8 @@ def make_throw(world: World) -> Callable[[Commands], int]:
     model, data, columns = engine._model, engine._data, engine._columns
     start = engine.state
     joints = len(columns)
+    # Contacts at a distance, to which throwcollect gives targets of its own, would throw the ball out of the tool.
+    model.geom_margin[:] = 0.0
 
     def throw(commands: Commands) -> int:
         config = commands.config
