@@ -3,7 +3,7 @@
 BIN := .venv/bin
 # Bytecode is kept even where the environment forbids it: every node is a process that starts twice as fast with it.
 export PYTHONDONTWRITEBYTECODE :=
-.PHONY: up ros test test-fast check docs bench bench-full image sif sif-without-engine dist clean named
+.PHONY: up ros test test-fast check docs bench bench-peers bench-full image sif sif-without-engine dist clean named
 
 # From Python 3.12 on, there is no pybullet.
 up: .venv/.ready
@@ -36,9 +36,10 @@ docs: .venv/.ready-dev  # build/site/index.html; a broken link fails
 bench: .venv/.ready-dev ros  # `make bench BEFORE=REVISION` measures that commit, too
 	$(BIN)/python -m bench $(if $(BEFORE),--before '$(BEFORE)')
 	.venv-ros/bin/python -m bench.backends
+bench-peers: .venv/.ready-dev  # other packages in environments of their own: 3 GB to download, 7.5 GB on disk
+	$(BIN)/python -m bench.peers --figure docs/pictures/peers.svg
 bench-full: .venv/.ready-dev
-	$(BIN)/python -m bench.full --engine bullet
-	$(BIN)/python -m bench.full --engine mujoco
+	for engine in bullet mujoco; do $(BIN)/python -m bench.full --engine $$engine || exit; done
 
 # docs/running.md: BUILD has further options, SIF another name. gzip would take four times as long for the same size.
 SIF := throwcollect.sif

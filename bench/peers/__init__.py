@@ -1,0 +1,1 @@
+"""Peers: what users pick instead, on the same throws."""
