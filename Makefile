@@ -24,8 +24,7 @@ ros: .venv/.ready-dev  # genuine rclpy: `.venv-ros/bin/python -m pytest tests/ro
 test: .venv/.ready-dev  # `make -f .ci/tests.mk GROUP` runs one of the groups that run at the same time
 	$(MAKE) -f .ci/tests.mk --no-print-directory --output-sync=target -j 5
 # All but what writes, reads, learns from, serves, draws or simulates whole datasets: less than a minute on two cores.
-SLOW := cli coordinator dataset derive engines export learning replay report runs runtimes serve sim slimming \
-    test_simulator.py view wheels
+SLOW := cli collect dataset engines learning publish replay serve sim test_simulator.py wheels
 test-fast: .venv/.ready-dev
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(SLOW:%=--ignore=tests/unit/%)
 check: .venv/.ready-dev

@@ -5,8 +5,8 @@
 # several processes of pytest-xdist would each find and import the tests of all groups.
 PYTEST := .venv/bin/python -m pytest
 ROS_PYTEST := .venv-ros/bin/python -m pytest
-DATA := $(addprefix tests/unit/,coordinator dataset)
-FACES := $(addprefix tests/unit/,cli derive export learning report runs serve view)
+DATA := $(addprefix tests/unit/,collect/coordinator dataset)
+FACES := $(addprefix tests/unit/,cli collect/runs learning publish serve)
 OF_RUNS := $(addprefix tests/docker/,test_component.py test_package_in_image.py test_runtime.py)
 OF_IMAGE := $(addprefix tests/docker/,test_compose.py test_image.py)
 UNITS := data faces nodes
@@ -61,5 +61,5 @@ lerobot:
 	.venv/bin/uv venv --quiet --allow-existing --python 3.12 .venv-lerobot
 	.venv/bin/uv pip install --quiet --python .venv-lerobot -e '.[collect,export]' 'lerobot[dataset]==0.6.1' \
 	    pytest psutil hypothesis
-	HF_HUB_OFFLINE=1 .venv-lerobot/bin/python -m pytest tests/unit/export/test_lerobot.py \
-	    tests/unit/export/test_exporting_page.py tests/e2e/test_policy_lerobot.py
+	HF_HUB_OFFLINE=1 .venv-lerobot/bin/python -m pytest tests/unit/publish/export/test_lerobot.py \
+	    tests/unit/publish/export/test_exporting_page.py tests/e2e/test_policy_lerobot.py

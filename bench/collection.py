@@ -11,21 +11,21 @@ from pathlib import Path
 import psutil
 from docker.client import DockerClient
 
+from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
+from throwcollect.collect.runtimes.local import LocalNodes
+from throwcollect.collect.runtimes.node_collection import roster
+from throwcollect.collect.runtimes.nodes import NodeHost
+from throwcollect.collect.runtimes.run_listener import RunListener
+from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.creation import create
+from throwcollect.plan.plan import Plan, make_trials
+from throwcollect.plan.samplers import draw_points
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.docker_nodes import DockerNodes
-from throwcollect.runtimes.local import LocalNodes
-from throwcollect.runtimes.node_collection import roster
-from throwcollect.runtimes.nodes import NodeHost
-from throwcollect.runtimes.run_listener import RunListener
-from throwcollect.runtimes.runtime import RunContext
-from throwcollect.runtimes.supervisor import Supervisor
-from throwcollect.sweep.plan import Plan, make_trials
-from throwcollect.sweep.samplers import draw_points
 
 ROLES = ("sim", "router", "coordinator")
 _POLL_S = 0.1

@@ -10,8 +10,8 @@ from docker.client import DockerClient
 from docker.errors import DockerException
 
 from bench import collection
-from throwcollect.runtimes.docker.docker_engine import default_tag
-from throwcollect.sweep.plan import Plan
+from throwcollect.collect.runtimes.docker.docker_engine import default_tag
+from throwcollect.plan.plan import Plan
 
 MANY = 8
 _KINDS = {"processes": collection.local_runtime, "containers": collection.docker_runtime}

@@ -19,13 +19,13 @@ import psutil
 
 from bench.intake import sign_episodes
 from throwcollect import ros
+from throwcollect.collect.coordinator_node.simulation_client import EPISODE_QOS, EPISODE_TOPIC
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.reader import Dataset
+from throwcollect.plan.lease import LEASES, leases_from_json
 from throwcollect.ros.msg import UInt8MultiArray
-from throwcollect.ros.nodes.coordinator.simulation_client import EPISODE_QOS, EPISODE_TOPIC
 from throwcollect.ros.router import router
 from throwcollect.run_key import Signer
-from throwcollect.trial.lease import LEASES, leases_from_json
 
 _SENDER = "-m", "bench.feed", "--send"
 

@@ -13,15 +13,15 @@ import tempfile
 import time
 from pathlib import Path
 
-from throwcollect.coordinator.collection import TrialCollection
+from throwcollect.collect.coordinator.collection import TrialCollection
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.episode_message import Episode, pack, unpack
+from throwcollect.plan.conditions import Settings
+from throwcollect.plan.plan import Plan
 from throwcollect.run_key import Signer
-from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of, trajectory_of
-from throwcollect.trial.conditions import Settings
 
 _SECRET = b"key of a run"
 _SIGNER = Signer(_SECRET)

@@ -22,18 +22,18 @@ from typing import TypeVar
 import pyarrow as pa
 
 from bench.collection import draw_unchecked_plan
-from throwcollect.cluster.submit import submit
+from throwcollect.collect.cluster.submit import submit
+from throwcollect.collect.coordinator.reporter import SILENT
+from throwcollect.collect.runs.preparation import prepare
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import MANIFEST, PLAN, THROWS, shard_name
 from throwcollect.dataset.manifest import entry_of, manifest_text, read_manifest
 from throwcollect.dataset.slices import join, slice_directory
-from throwcollect.runs.preparation import prepare
-from throwcollect.sweep.parquet_file import encode_table, read_parquet
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.slice import Slice
+from throwcollect.plan.parquet_file import encode_table, read_parquet
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.slice import Slice
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
 PER_SHARD = 1000
@@ -89,7 +89,7 @@ def _measure(trials: int, one: Path, scratch: Path) -> None:
     frozen, _ = _measure_time(lambda: create(scratch / "data", plan))
     changes = [*_SETTINGS, f"trials={trials}"]
     submitted, _ = _measure_time(
-        lambda: submit(CONFIG, scratch / "dry", tasks, overrides=changes, dry=True, onlooker=SILENT)
+        lambda: submit(CONFIG, scratch / "dry", tasks, overrides=changes, dry=True, reporter=SILENT)
     )
     _make_slices(scratch / "data", plan, one)
     before_mb = _peak_mb()

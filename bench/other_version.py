@@ -20,7 +20,7 @@ from throwcollect.config.loader import load
 try:
     from bench.collection import draw_unchecked_plan
 except ImportError:  # in commits whose benchmarks have no such function
-    from throwcollect.sweep.plan import make_plan as draw_unchecked_plan
+    from throwcollect.plan.plan import make_plan as draw_unchecked_plan
 
 config, overrides, simulations, directory = json.loads(sys.argv[1])
 plan = draw_unchecked_plan(load(Path(config), overrides))

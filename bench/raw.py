@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.plan.plan import Plan
 from throwcollect.robots.description import physics_description, robot_of, start_posture
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.sim.world import World
-from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
 
 

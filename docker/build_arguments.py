@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
 
-from throwcollect.runtimes.image_sources import UNKNOWN, digest_sources  # noqa: E402 - from this clone
+from throwcollect.collect.runtimes.image_sources import UNKNOWN, digest_sources  # noqa: E402 - from this clone
 from throwcollect.version import __version__  # noqa: E402
 
 

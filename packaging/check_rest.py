@@ -18,8 +18,8 @@ from typing import Any
 
 import uvicorn
 
+from throwcollect.collect.runs.records import Records
 from throwcollect.errors import WorkerError
-from throwcollect.runs.records import Records
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app

@@ -15,7 +15,7 @@ from pathlib import Path
 from PIL import Image
 
 import throwcollect
-from throwcollect.view.animation import render
+from throwcollect.publish.view.animation import render
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs" / "pictures"

@@ -58,7 +58,7 @@ _DECIDES_IMPORTS = ("PYTHON", "LD_", "THROWCOLLECT_ROS", "RMW_", "ROS_", "OPENBL
 _READ_LATER = ("ROS_DOMAIN_ID",)
 """Exceptions of these prefixes: each context reads these variables when it is made."""
 _IMPORTED = ("pinocchio", "pybullet", "pyarrow.parquet")
-_RUN_WHEN_IMPORTED = ("throwcollect.__main__", "throwcollect.runtimes.fork_server")
+_RUN_WHEN_IMPORTED = ("throwcollect.__main__", "throwcollect.collect.runtimes.fork_server")
 
 
 def command(*arguments: str | Path) -> list[str]:

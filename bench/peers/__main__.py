@@ -19,7 +19,7 @@ import numpy as np
 from bench import collection, raw
 from throwcollect import Simulator
 from throwcollect.config.loader import load
-from throwcollect.sweep.plan import Plan
+from throwcollect.plan.plan import Plan
 
 CONFIG = Path(__file__).parents[2] / "configs" / "panda.yaml"
 BUILD = Path("build/peers")

@@ -16,7 +16,7 @@ import zenoh
 
 from rclzenoh.exceptions import NoRouterError, NotInitializedException
 from rclzenoh.graph import Graph
-from rclzenoh.session_config import domain_of_environment, environment_config, in_words
+from rclzenoh.session_config import describe, domain_of_environment, environment_config
 
 _T = TypeVar("_T")
 
@@ -128,7 +128,7 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
         except zenoh.ZError as error:
             waited = time.monotonic() - begin
             if waited > _PATIENCE_S:
-                raise NoRouterError(config.get_json("connect/endpoints"), round(waited, 1), in_words(error)) from error
+                raise NoRouterError(config.get_json("connect/endpoints"), round(waited, 1), describe(error)) from error
             time.sleep(_RETRY_S)
 
 

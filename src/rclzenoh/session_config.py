@@ -72,7 +72,7 @@ def environment_config() -> zenoh.Config:
             config = zenoh.Config.from_file(path)
         except zenoh.ZError as error:
             raise ConfigurationError(
-                f"{CONFIG_FILE_VARIABLE}: {path} is no Zenoh configuration: {in_words(error)}"
+                f"{CONFIG_FILE_VARIABLE}: {path} is no Zenoh configuration: {describe(error)}"
             ) from error
     else:
         config = zenoh.Config()
@@ -121,7 +121,7 @@ def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
     return config
 
 
-def in_words(error: zenoh.ZError) -> str:
+def describe(error: zenoh.ZError) -> str:
     """Message of an error of Zenoh, without the names and lines of its source files."""
     return re.sub(r'^\w+\([^"]*"', "", re.split(r' at /| \(os error|", location: |"\)', str(error))[0])
 
@@ -173,7 +173,7 @@ def _insert(config: zenoh.Config, key: str, value: str, where: str) -> None:
     try:
         config.insert_json5(key, value)
     except zenoh.ZError as error:
-        raise ConfigurationError(f"{where}: {key} cannot be {value}: {in_words(error)}") from error
+        raise ConfigurationError(f"{where}: {key} cannot be {value}: {describe(error)}") from error
 
 
 def domain_of_environment() -> int:

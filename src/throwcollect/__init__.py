@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING
 from throwcollect.version import __version__
 
 if TYPE_CHECKING:
-    from throwcollect import gym, runs
+    from throwcollect import gym
+    from throwcollect.collect import runs
     from throwcollect.config.loader import load as load_config
     from throwcollect.config.schema import Config
+    from throwcollect.dataset.derive.derivation import filter_trials as filter_dataset
+    from throwcollect.dataset.derive.derivation import merge as merge_datasets
+    from throwcollect.dataset.derive.derivation import sample as sample_dataset
+    from throwcollect.dataset.derive.split import split as split_dataset
+    from throwcollect.dataset.derive.statistics import statistics as compute_statistics
     from throwcollect.dataset.reader import Dataset, UnfinishedDatasetWarning, load
     from throwcollect.dataset.throw import Throw
-    from throwcollect.derive.derivation import filter_trials as filter_dataset
-    from throwcollect.derive.derivation import merge as merge_datasets
-    from throwcollect.derive.derivation import sample as sample_dataset
-    from throwcollect.derive.split import split as split_dataset
-    from throwcollect.derive.statistics import statistics as compute_statistics
     from throwcollect.errors import (
         ConfigError,
         ConflictError,
@@ -28,14 +29,14 @@ if TYPE_CHECKING:
         ThrowcollectError,
         WorkerError,
     )
-    from throwcollect.export.export import export as export_dataset
-    from throwcollect.export.frame_dataset import FrameDataset
     from throwcollect.extras import MissingExtraError
     from throwcollect.learning.aiming import Aim
     from throwcollect.learning.fitting import fit
     from throwcollect.learning.model import Model, load_model
     from throwcollect.learning.score import Score
-    from throwcollect.replay.audit import verify_dataset
+    from throwcollect.publish.export.export import export as export_dataset
+    from throwcollect.publish.export.frame_dataset import FrameDataset
+    from throwcollect.replay import verify_dataset
     from throwcollect.simulator import Simulator
 
 __all__ = [
@@ -79,7 +80,7 @@ _PLACES = {
     "ConflictError": "errors:ConflictError",
     "Dataset": "dataset.reader:Dataset",
     "DatasetError": "errors:DatasetError",
-    "FrameDataset": "export.frame_dataset:FrameDataset",
+    "FrameDataset": "publish.export.frame_dataset:FrameDataset",
     "MissingExtraError": "extras:MissingExtraError",
     "Model": "learning.model:Model",
     "NotFoundError": "errors:NotFoundError",
@@ -90,19 +91,19 @@ _PLACES = {
     "ThrowcollectError": "errors:ThrowcollectError",
     "UnfinishedDatasetWarning": "dataset.reader:UnfinishedDatasetWarning",
     "WorkerError": "errors:WorkerError",
-    "compute_statistics": "derive.statistics:statistics",
-    "export_dataset": "export.export:export",
-    "filter_dataset": "derive.derivation:filter_trials",
+    "compute_statistics": "dataset.derive.statistics:statistics",
+    "export_dataset": "publish.export.export:export",
+    "filter_dataset": "dataset.derive.derivation:filter_trials",
     "fit": "learning.fitting:fit",
     "gym": "gym",
     "load": "dataset.reader:load",
     "load_config": "config.loader:load",
     "load_model": "learning.model:load_model",
-    "merge_datasets": "derive.derivation:merge",
-    "runs": "runs",
-    "sample_dataset": "derive.derivation:sample",
-    "split_dataset": "derive.split:split",
-    "verify_dataset": "replay.audit:verify_dataset",
+    "merge_datasets": "dataset.derive.derivation:merge",
+    "runs": "collect.runs",
+    "sample_dataset": "dataset.derive.derivation:sample",
+    "split_dataset": "dataset.derive.split:split",
+    "verify_dataset": "replay:verify_dataset",
 }
 """Module and attribute of each name, or a module alone, for `__getattr__`; type checkers need the imports above."""
 

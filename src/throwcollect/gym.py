@@ -14,20 +14,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.collect.coordinator.prepare import feasibility_check
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import explain_missing
 from throwcollect.files import StrPath
 from throwcollect.members import names_of
+from throwcollect.publish.view.throw_pictures import Still
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.surroundings import object_of
 from throwcollect.sim.policy import Observation, PolicyLoop, shape_observation, shape_pictures
 from throwcollect.sim.simulator import Simulator
 from throwcollect.simulator import find_refusal, with_policy
-from throwcollect.view.throw_pictures import Still
 
 with explain_missing():
     import gymnasium

@@ -37,9 +37,9 @@ _OWN = MappingProxyType(
             "tiago": "throwcollect.robots.example_robots:TIAGO",
         },
         "tools": {
-            "spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig",
-            "claw": "throwcollect.tools.claw.claw_config:ClawConfig",
-            "paddle": "throwcollect.tools.paddle.paddle_config:PaddleConfig",
+            "spoon": "throwcollect.robots.tools.spoon.spoon_config:SpoonConfig",
+            "claw": "throwcollect.robots.tools.claw.claw_config:ClawConfig",
+            "paddle": "throwcollect.robots.tools.paddle.paddle_config:PaddleConfig",
         },
         "engines": {
             "bullet": "throwcollect.engines.bullet.bullet_engine:BulletEngine",
@@ -52,16 +52,16 @@ _OWN = MappingProxyType(
             "slide": "throwcollect.tasks.slide.slide_config:SlideConfig",
         },
         "runtimes": {
-            "local": "throwcollect.runtimes.local:LocalRuntime",
-            "docker": "throwcollect.runtimes.docker.docker_runtime:DockerRuntime",
-            "inprocess": "throwcollect.runtimes.in_process:InProcessRuntime",
+            "local": "throwcollect.collect.runtimes.local:LocalRuntime",
+            "docker": "throwcollect.collect.runtimes.docker.docker_runtime:DockerRuntime",
+            "inprocess": "throwcollect.collect.runtimes.in_process:InProcessRuntime",
         },
         "exporters": {
-            "parquet": "throwcollect.export.parquet:PARQUET",
-            "npz": "throwcollect.export.npz:NPZ",
-            "lerobot": "throwcollect.export.lerobot:LEROBOT",
-            "hdf5": "throwcollect.export.hdf5:HDF5",
-            "mat": "throwcollect.export.mat:MAT",
+            "parquet": "throwcollect.publish.export.parquet:PARQUET",
+            "npz": "throwcollect.publish.export.npz:NPZ",
+            "lerobot": "throwcollect.publish.export.lerobot:LEROBOT",
+            "hdf5": "throwcollect.publish.export.hdf5:HDF5",
+            "mat": "throwcollect.publish.export.mat:MAT",
         },
         "policies": {},
     }
@@ -73,8 +73,8 @@ _KINDS = MappingProxyType(
         "tools": "throwcollect.config.tool_config:ToolConfig",
         "engines": "throwcollect.engines.engine:Engine",
         "tasks": "throwcollect.config.task_config:TaskConfig",
-        "runtimes": "throwcollect.runtimes.runtime:Runtime",
-        "exporters": "throwcollect.export.exporter:Exporter",
+        "runtimes": "throwcollect.collect.runtimes.runtime:Runtime",
+        "exporters": "throwcollect.publish.export.exporter:Exporter",
         "policies": "collections.abc:Callable",
     }
 )

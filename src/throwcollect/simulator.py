@@ -10,13 +10,13 @@ from threading import RLock
 import numpy as np
 
 from throwcollect.arguments import check_bounds, refuse_argument
+from throwcollect.collect.coordinator.prepare import feasibility_check
 from throwcollect.config.loader import load
 from throwcollect.config.policy import PolicyConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.config.values import reason_not_sweepable, with_values
-from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
@@ -24,13 +24,13 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
+from throwcollect.plan.chosen_motions import complete_point
+from throwcollect.plan.plan import Check, make_trials, refusal
+from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Trial
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
 from throwcollect.sim.policy import Policy, check_observation
-from throwcollect.sweep.chosen_motions import complete_point
-from throwcollect.sweep.plan import Check, make_trials, refusal
-from throwcollect.sweep.points import Points
-from throwcollect.sweep.trials import Trial
 
 # If the extra is missing, importing `Simulator` fails with the hint on it, and not only the first throw.
 require("pinocchio")

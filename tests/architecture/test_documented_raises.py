@@ -20,7 +20,14 @@ import throwcollect
 
 ROOT = Path(__file__).parents[2]
 MODULES = {path: path.read_text(encoding="utf-8") for path in sorted((ROOT / "src").rglob("*.py"))}
-FAMILIES = ("engines.engine", "tasks.task", "tools.tool", "robots.robot", "runtimes.runtime", "export.exporter")
+FAMILIES = (
+    "engines.engine",
+    "tasks.task",
+    "robots.tools.tool",
+    "robots.robot",
+    "collect.runtimes.runtime",
+    "publish.export.exporter",
+)
 """Modules of what other packages implement."""
 
 

@@ -61,12 +61,12 @@ def test_modules_of_tests_are_not_too_long() -> None:
 
 
 UNITS = ROOT / "tests" / "unit"
-OUTSIDE_SOURCE = {"wheels"}
+OUTSIDE_SOURCE = {"replay", "wheels"}
 """Folders of unit tests of scripts, which lie in `docker` and `packaging`."""
 
 
 def is_named_after_a_module(test: Path) -> bool:
-    """Whether a test such as ``tests/unit/sweep/test_plan.py`` has the place and the name of a module or a package."""
+    """Whether a test such as ``tests/unit/plan/test_plan.py`` has the place and the name of a module or a package."""
     place = SOURCE / test.relative_to(UNITS).parent / test.stem.removeprefix("test_")
     return place.with_suffix(".py").exists() or (place / "__init__.py").exists()
 
@@ -106,7 +106,7 @@ def test_package_faces_hold_only_re_exports() -> None:
             assert plain or lazy or table, path
 
 
-PURE_ROOMS = ("sweep", "tasks", "episode", "robots", "control", "engines", "sim")
+PURE_ROOMS = ("plan", "tasks", "episode", "robots", "control", "engines", "sim")
 """Rooms whose numbers end up in the bytes of a dataset."""
 OF_THE_PROCESSOR = re.compile(
     r"np\.(exp|exp2|expm1|log|log2|log10|log1p|power|float_power|cbrt|sin|cos|tan|arcsin|arccos|arctan|arctan2|sinh|"

@@ -11,7 +11,7 @@ from docker.client import DockerClient
 
 from tests.cluster.slurm import Slurm
 from tests.docker.conftest import client
-from throwcollect.runtimes.docker import docker_engine as image
+from throwcollect.collect.runtimes.docker import docker_engine as image
 
 BUILD = Path(__file__).parents[2] / "build"
 UNAVAILABLE = BUILD / "cluster-unavailable"

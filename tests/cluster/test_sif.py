@@ -16,7 +16,7 @@ from tests.cluster.conftest import SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from tests.pages import read_section
 from throwcollect import runs
-from throwcollect.cluster.submit import check_sif
+from throwcollect.collect.cluster.submit import check_sif
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster

@@ -18,7 +18,7 @@ from tests.cluster.conftest import USER
 from tests.cluster.slurm import Slurm
 from tests.e2e.collection import CONFIG, FAST, call_here, fingerprints, write_config
 from throwcollect import runs
-from throwcollect.cluster.submission import read_submission
+from throwcollect.collect.cluster.submission import read_submission
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster

@@ -14,18 +14,18 @@ from docker.errors import APIError
 from docker.models.containers import Container
 
 from tests.e2e.collection import FAST, write_config
+from throwcollect.collect.coordinator.prepare import prepare
+from throwcollect.collect.runtimes.docker.containers import remove
+from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
+from throwcollect.collect.runtimes.node_collection import roster
+from throwcollect.collect.runtimes.nodes import NodeExit
+from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.containers import remove
-from throwcollect.runtimes.docker.docker_nodes import DockerNodes
-from throwcollect.runtimes.node_collection import roster
-from throwcollect.runtimes.nodes import NodeExit
-from throwcollect.runtimes.runtime import RunContext
-from throwcollect.runtimes.supervisor import Supervisor
 
 TRIALS = 20
 

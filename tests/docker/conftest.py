@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from docker.client import DockerClient
 
+from throwcollect.collect.runtimes.docker.docker_engine import connect, default_tag, find_image
+from throwcollect.collect.runtimes.image_sources import SOURCES_LABEL, are_others
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.docker_engine import connect, default_tag, find_image
-from throwcollect.runtimes.image_sources import SOURCES_LABEL, are_others
 
 UNAVAILABLE = Path(__file__).parents[2] / "build" / "engine-unavailable"
 

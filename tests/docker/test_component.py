@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from docker.client import DockerClient
 
+from throwcollect.collect.runs import control
+from throwcollect.collect.runs.background import begin_container, begin_run
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import Origin
+from throwcollect.collect.runtimes.docker.container_options import RUN_LABEL
+from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
-from throwcollect.runs import control
-from throwcollect.runs.background import begin_container, begin_run
-from throwcollect.runs.run import Run
-from throwcollect.runs.run_record import Origin
-from throwcollect.runtimes.docker.container_options import RUN_LABEL
-from throwcollect.runtimes.docker.docker_engine import default_tag
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.docker

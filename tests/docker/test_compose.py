@@ -14,7 +14,7 @@ import pytest
 
 from tests.e2e.collection import FAST, collect_here, fingerprints, write_config
 from tests.pages import read_section
-from throwcollect.runtimes.docker.docker_engine import connect
+from throwcollect.collect.runtimes.docker.docker_engine import connect
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 ROOT = Path(__file__).parents[2]

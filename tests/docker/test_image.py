@@ -13,7 +13,7 @@ from docker.client import DockerClient
 from docker.errors import ContainerError
 
 import throwcollect
-from throwcollect.runtimes.docker.docker_engine import default_tag
+from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = pytest.mark.docker
 

@@ -13,7 +13,7 @@ from docker.client import DockerClient
 from tests.e2e.collection import call_here, fingerprints
 from tests.e2e.plugins import PLUGINS, process_with_plugins
 from tests.pages import find_blocks, read_section
-from throwcollect.runtimes.docker.docker_engine import default_tag
+from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = pytest.mark.docker
 ARM = """\

@@ -27,13 +27,13 @@ from tests.docker.collection import (
     place_of,
 )
 from tests.e2e.collection import collect_here
-from throwcollect.coordinator.prepare import prepare
+from throwcollect.collect.coordinator.prepare import prepare
+from throwcollect.collect.runtimes.docker.containers import remove
+from throwcollect.collect.runtimes.docker.docker_engine import connect
+from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
+from throwcollect.collect.runtimes.nodes import COORDINATOR, ROUTER, NodeRole, NodeSpec
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.containers import remove
-from throwcollect.runtimes.docker.docker_engine import connect
-from throwcollect.runtimes.docker.docker_nodes import DockerNodes
-from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeRole, NodeSpec
 
 pytestmark = pytest.mark.docker
 
@@ -253,7 +253,7 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.containers.SILENCE_S", 3.0)
+    monkeypatch.setattr("throwcollect.collect.runtimes.docker.containers.SILENCE_S", 3.0)
     runtime = bare(through=connect(timeout_s=10.0))
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.logs.tail(ROUTER) != "")

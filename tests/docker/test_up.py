@@ -15,8 +15,8 @@ import pytest
 
 from tests.docker.collection import pause
 from tests.e2e.collection import FAST, SEEING, Running, call, call_here, collect_here, fingerprints, start, write_config
-from throwcollect.runtimes.docker.container_options import DIRECTORY_LABEL
-from throwcollect.runtimes.docker.docker_engine import default_tag
+from throwcollect.collect.runtimes.docker.container_options import DIRECTORY_LABEL
+from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 

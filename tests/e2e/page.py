@@ -13,7 +13,7 @@ from typing import Any
 
 from tests.commands import start_command
 from tests.e2e.chromium import Tab
-from throwcollect.runs.records import Records
+from throwcollect.collect.runs.records import Records
 
 CHANGED = "ERR_NETWORK_CHANGED"
 """The error of a browser for requests that it breaks off when networks of containers come and go."""

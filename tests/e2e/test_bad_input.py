@@ -12,7 +12,7 @@ import pytest
 from tests.commands import start_command
 from tests.e2e.collection import FAST, INPROCESS, call, call_here, collect_here, write_config
 from tests.restrictions import Restrictions
-from throwcollect.runs.records import Records
+from throwcollect.collect.runs.records import Records
 
 pytestmark = pytest.mark.e2e
 

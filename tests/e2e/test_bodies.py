@@ -13,7 +13,7 @@ import throwcollect
 from tests.e2e.collection import collect_here
 from throwcollect.config.loader import load
 from throwcollect.dataset.verify import verify
-from throwcollect.export.export import export
+from throwcollect.publish.export.export import export
 
 pytestmark = pytest.mark.e2e
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.commands import Command, start_command
 from tests.e2e.collection import FAST, call, write_config
-from tests.unit.sweep.own_plan import make_plan
+from tests.unit.plan.own_plan import make_plan
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.dataset.reader import Dataset

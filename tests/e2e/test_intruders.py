@@ -21,11 +21,11 @@ import pytest
 
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
 from tests.e2e.collection import FAST, Running, call, journal, start, write_config
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.dataset.directory import CARD
 from throwcollect.errors import UnreachableError
 from throwcollect.run_key import RunKey
-from throwcollect.runs.records import Records
-from throwcollect.runs.run_record import RunRecord
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = [
@@ -77,7 +77,7 @@ POSE = f"""
 import json, os, sys
 import concurrent.futures.process, concurrent.futures.thread, email.parser, mmap, multiprocessing.pool
 import pinocchio, pyarrow.parquet, scipy.stats
-import throwcollect.ros.nodes.coordinator.node, throwcollect.coordinator.resume, throwcollect.dataset.reader
+import throwcollect.collect.coordinator_node.node, throwcollect.collect.coordinator.resume, throwcollect.dataset.reader
 import throwcollect.cli.node_commands, throwcollect.engines.bullet.bullet_engine
 import throwcollect.ros.nodes.simulation.process
 from throwcollect.cli.main import main

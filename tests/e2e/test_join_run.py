@@ -150,7 +150,7 @@ def move_endpoint(token: str, address: str, port: int) -> str:
     """The token with another way to the router."""
     from dataclasses import replace
 
-    from throwcollect.runs.joining import JoinToken
+    from throwcollect.collect.runs.joining import JoinToken
 
     return replace(JoinToken.decode(token), endpoint=f"tls/{address}:{port}").encode()
 

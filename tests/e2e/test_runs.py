@@ -23,7 +23,7 @@ from tests.e2e.collection import (
     start,
     write_config,
 )
-from throwcollect.runs.records import Records
+from throwcollect.collect.runs.records import Records
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e

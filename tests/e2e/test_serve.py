@@ -28,9 +28,9 @@ from tests.commands import start_command
 from tests.e2e.collection import FAST, call_here, collect_here, fingerprints, write_config
 from tests.e2e.page import wait_for
 from throwcollect import ros
+from throwcollect.collect.runs.records import Records
 from throwcollect.ros.srv import GetParameters
 from throwcollect.run_key import RunKey
-from throwcollect.runs.records import Records
 from throwcollect.serve.finding import find_server, make_page_address
 from throwcollect.serve.rosbridge.codec import LONGEST_FRAME
 from throwcollect.state_directory import STATE_VARIABLE

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from throwcollect.runtimes.image_sources import digest_sources
+from throwcollect.collect.runtimes.image_sources import digest_sources
 from throwcollect.version import __version__
 
 ROOT = Path(__file__).parents[2]

@@ -93,7 +93,7 @@ class Forker:
 
     PROGRAM = """
 import json, os, sys, warnings
-import throwcollect.cli.main, throwcollect.coordinator.prepare, throwcollect.dataset.reader, pyarrow.parquet
+import throwcollect.cli.main, throwcollect.collect.coordinator.prepare, throwcollect.dataset.reader, pyarrow.parquet
 from throwcollect.__main__ import main
 
 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
@@ -202,7 +202,7 @@ try:
 except ImportError as error:
     print(type(error).__name__, error.extra)
 try:
-    throwcollect.runs.find("first")
+    throwcollect.collect.runs.find("first")
 except throwcollect.MissingExtraError as error:
     print(type(error).__name__, error.extra)
 """

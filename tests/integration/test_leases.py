@@ -9,9 +9,9 @@ import pytest
 
 from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, TORSO, Robot, goal, signer, swing, trajectory
 from throwcollect.episode.episode_message import Episode, unpack
+from throwcollect.plan.lease import Lease, leases_to_json
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.run_key import Signer
-from throwcollect.trial.lease import Lease, leases_to_json
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """The profile of ros2_controllers; DDS connects only equally durable endpoints."""

@@ -16,17 +16,17 @@ import pytest
 import throwcollect
 from tests.e2e.collection import CONFIG, FAST, SENSORS, fingerprints, write_config
 from throwcollect import runs
+from throwcollect.collect.coordinator.prepare import prepare
+from throwcollect.collect.runs.slices import collect_slice
 from throwcollect.config.loader import load
-from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.slices import SLICES, find_attempts, find_finished, join, make_attempt, publish
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError
 from throwcollect.files import unwritable
-from throwcollect.runs.slices import collect_slice
+from throwcollect.plan.slice import Slice
 from throwcollect.sim.simulator import Simulator
-from throwcollect.sweep.slice import Slice
 
 INPROCESS = ["run.runtime=inprocess"]
 TEXT = CONFIG + "record: {{trials_per_shard: 2}}\n"
@@ -64,7 +64,7 @@ for change in range(1, 1000):
 """Joins copies of a dataset: each is killed one change of the file system later, until one is finished."""
 
 
-class Listener(runs.Onlooker):
+class Listener(runs.Reporter):
     """Keeps the messages that it gets."""
 
     def __init__(self) -> None:
@@ -115,9 +115,9 @@ def interrupt_after(directory: Path, text: str, size: int) -> Path:
 
 def count_kept(directory: Path, slice: Slice) -> int:
     """Collect a slice, and return how many episodes of an earlier attempt are kept."""
-    onlooker = Listener()
-    collect_slice(directory, slice, overrides=INPROCESS, onlooker=onlooker)
-    (kept,) = [line for line in onlooker.lines if "of an earlier collection" in line]
+    reporter = Listener()
+    collect_slice(directory, slice, overrides=INPROCESS, reporter=reporter)
+    (kept,) = [line for line in reporter.lines if "of an earlier collection" in line]
     return int(kept.split()[1])
 
 
@@ -238,9 +238,9 @@ def test_a_full_disk_ends_the_attempt_and_a_later_one_goes_on_with_its_episodes(
         collect_slice(frozen, Slice(0, 2), overrides=INPROCESS)
     assert not find_finished(frozen)
     full = False
-    onlooker = Listener()
-    collect_slice(frozen, Slice(0, 2), overrides=INPROCESS, onlooker=onlooker)
-    assert any("keeps 1 episode of an earlier collection" in line for line in onlooker.lines)
+    reporter = Listener()
+    collect_slice(frozen, Slice(0, 2), overrides=INPROCESS, reporter=reporter)
+    assert any("keeps 1 episode of an earlier collection" in line for line in reporter.lines)
     collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
@@ -287,9 +287,9 @@ def test_a_slice_is_collected_on_a_disk_of_the_node_and_handed_over(
         collect_slice(frozen, Slice(0, 2), overrides=on_scratch, interruptions=interruptions)
     assert seen
     assert not list(scratch.iterdir())
-    onlooker = Listener()
-    collect_slice(frozen, Slice(0, 2), overrides=on_scratch, onlooker=onlooker)
-    assert any("of an earlier collection" in line for line in onlooker.lines)
+    reporter = Listener()
+    collect_slice(frozen, Slice(0, 2), overrides=on_scratch, reporter=reporter)
+    assert any("of an earlier collection" in line for line in reporter.lines)
     collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)

@@ -11,10 +11,10 @@ from throwcollect.episode.record import EpisodeHeader
 from throwcollect.robots.description import joint_model, start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.robots.tool_motion import ToolMotion
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sim.world import World
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
-from throwcollect.tools.tool import tool_of
 
 START = Config().task.start
 

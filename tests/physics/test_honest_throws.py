@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from throwcollect.collect.coordinator.prepare import draw_plan
 from throwcollect.config.schema import Config
-from throwcollect.coordinator.prepare import draw_plan
 from throwcollect.dataset.verify_recording import find_flight_problems
 from throwcollect.sim.simulator import Simulator
 

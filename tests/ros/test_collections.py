@@ -26,8 +26,8 @@ from tests.e2e.collection import (
     words_of,
     write_config,
 )
+from throwcollect.collect.runs.records import Records
 from throwcollect.errors import WorkerError
-from throwcollect.runs.records import Records
 from throwcollect.state_directory import STATE_VARIABLE
 
 TRIALS = 8

@@ -13,7 +13,7 @@ import pytest
 from tests.docker.conftest import client
 from tests.docker.test_up import containers_of, engine
 from tests.e2e.collection import FAST, collect_here, fingerprints, start, write_config
-from throwcollect.runtimes.docker.docker_engine import RMW_LABEL, default_tag
+from throwcollect.collect.runtimes.docker.docker_engine import RMW_LABEL, default_tag
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 __all__ = ["client", "engine"]

@@ -17,7 +17,7 @@ from throwcollect.members import explain_failure, load_member, names_of
 
 Say = Callable[..., subprocess.CompletedProcess[str]]
 BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
-SPOON = "throwcollect.tools.spoon.spoon_config:SpoonConfig"
+SPOON = "throwcollect.robots.tools.spoon.spoon_config:SpoonConfig"
 ARM = """\
 robot: {name: planar_arm}
 task:

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from throwcollect import Simulator
-from throwcollect.native_reading import reading_natively
+from throwcollect.engines.native_reading import reading_natively
 
 
 def read_in_c(text: bytes) -> float:

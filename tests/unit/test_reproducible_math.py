@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests import processors
-from tests.unit.sweep.own_plan import make_plan
+from tests.unit.plan.own_plan import make_plan
 
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame

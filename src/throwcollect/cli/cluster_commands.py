@@ -35,12 +35,12 @@ def submit(
         dry_run: Print the batch script, and do nothing else.
         wait: Follow it until the dataset is finished.
     """
-    from throwcollect.cluster.submit import submit as submit_dataset
+    from throwcollect.collect.cluster.submit import submit as submit_dataset
 
     changes = overrides(settings, trials=trials)
-    onlooker = display(quiet=json, bar=False)
+    reporter = display(quiet=json, bar=False)
     live = mode == "live"
-    done = submit_dataset(config, output, tasks, overrides=changes, live=live, dry=dry_run, onlooker=onlooker)
+    done = submit_dataset(config, output, tasks, overrides=changes, live=live, dry=dry_run, reporter=reporter)
     if done.job is None:
         typer.echo(done.script, nl=False)
         if mode == "array":

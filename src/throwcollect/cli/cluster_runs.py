@@ -16,11 +16,11 @@ from throwcollect.cli.dataset.info import print_collected
 from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
-from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesState, follow
+from throwcollect.collect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesState, follow
+from throwcollect.collect.runtimes.node_logs import Tail
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.interruption import count_interruptions
-from throwcollect.runtimes.node_logs import Tail
 from throwcollect.wording import command, format_count
 
 

@@ -33,7 +33,7 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    from throwcollect.runs.run import Run
+    from throwcollect.collect.runs.run import Run
 
 LockOption = Annotated[int, typer.Option("--lock", help="Descriptor of the run's locked file.")]
 
@@ -74,8 +74,8 @@ def up(
             raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
         _collect_slice(output, slice, changes, json=json)
         return
-    from throwcollect.runs.preparation import prepare
-    from throwcollect.runs.preparation import resume as go_on
+    from throwcollect.collect.runs.preparation import prepare
+    from throwcollect.collect.runs.preparation import resume as go_on
 
     prepare_run: Callable[..., Run | None]
     if resume is None:
@@ -91,7 +91,7 @@ def up(
 
 def _refuse_submitted(directory: Path) -> None:
     """Refuse a dataset whose slices tasks of a cluster collect."""
-    from throwcollect.cluster.submission import is_submitted, read_submission
+    from throwcollect.collect.cluster.submission import is_submitted, read_submission
 
     # A submission that is one run on several nodes goes on by the same command.
     if is_submitted(directory) and not read_submission(directory).live:
@@ -117,7 +117,7 @@ def resume(
     Options:
         simulate (--simulate/--no-simulate): Run missing trials, or finish without them: they are lost.
     """
-    from throwcollect.cluster.submission import is_submitted
+    from throwcollect.collect.cluster.submission import is_submitted
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
     if is_submitted(directory):
@@ -129,7 +129,7 @@ def resume(
     if not simulate:
         _finish(directory, changes, json=json)
         return
-    from throwcollect.runs.preparation import resume as go_on
+    from throwcollect.collect.runs.preparation import resume as go_on
 
     prepare_run = partial(go_on, directory, overrides=changes, processes=count_cores())
     _collect(prepare_run, directory=directory, detach=detach, json=json)
@@ -138,21 +138,21 @@ def resume(
 def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
     """Finish a dataset with what is whole; `runs` would need the libraries of the nodes."""
     from throwcollect.cli.dataset.info import print_collected
-    from throwcollect.coordinator.resume import finish_without_simulating
+    from throwcollect.collect.coordinator.resume import finish_without_simulating
     from throwcollect.dataset.configuration import reading_config
     from throwcollect.dataset.inspect import info
 
     with reading_config(directory, overrides=changes) as config:
         shown = display(quiet=json, bar=False)
-        finish_without_simulating(config, directory, sweep_directory=directory, onlooker=shown)
+        finish_without_simulating(config, directory, sweep_directory=directory, reporter=shown)
     again = command("resume", directory)
     print_collected(info(directory), directory, as_json=json, hint=f"{again} runs them again")
 
 
 def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
-    from throwcollect.cluster.submit import submit_missing
+    from throwcollect.collect.cluster.submit import submit_missing
 
-    submitted = submit_missing(directory, overrides=changes, onlooker=display(quiet=json, bar=False))
+    submitted = submit_missing(directory, overrides=changes, reporter=display(quiet=json, bar=False))
     job = submitted.job if submitted is not None else None
     numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
     show({"directory": directory.absolute(), **numbers}, json=json)
@@ -177,8 +177,8 @@ def cover(
         output (--output -o DIR): Directory of the datasets, one for each round.
         rounds (K 2..99): Number of rounds.
     """
+    from throwcollect.collect.runs.covering import cover as cover_cells
     from throwcollect.config.loader import load
-    from throwcollect.runs.covering import cover as cover_cells
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
     directory = output or Path("datasets", load(config, changes).name)
@@ -189,7 +189,7 @@ def cover(
             rounds=rounds,
             overrides=changes,
             processes=count_cores(),
-            onlooker=shown,
+            reporter=shown,
             interruptions=interruptions,
         )
     show(found, f"{directory}: {format_count(len(found), 'dataset')}", json=json)
@@ -199,21 +199,21 @@ def cover(
 
 def begin(run: str, lock: LockOption) -> None:
     """Launch a run that another process has prepared, or prepare it as well, if there is an order on standard input."""
-    from throwcollect.runs.background import carry_out
+    from throwcollect.collect.runs.background import carry_out
 
     order = sys.stdin.buffer.read()
     with display(quiet=True) as shown, count_interruptions() as interruptions:
-        carry_out(run, lock, order, onlooker=shown, interruptions=interruptions)
+        carry_out(run, lock, order, reporter=shown, interruptions=interruptions)
 
 
 def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool) -> None:
+    from throwcollect.collect.runs.slices import collect_slice
     from throwcollect.dataset.slices import slice_directory
-    from throwcollect.runs.slices import collect_slice
-    from throwcollect.sweep.slice import Slice
+    from throwcollect.plan.slice import Slice
 
     slice = Slice.parse(text)
     with display(quiet=json) as shown, count_interruptions() as interruptions:
-        collect_slice(directory, slice, overrides=changes, onlooker=shown, interruptions=interruptions)
+        collect_slice(directory, slice, overrides=changes, reporter=shown, interruptions=interruptions)
     place = slice_directory(directory, slice)
     show({"slice": str(slice), "directory": place}, f"{place}: finished", json=json, indent=None)
 
@@ -225,12 +225,12 @@ def join_run(token: str, *, simulations: int | None = None) -> None:
         token (TOKEN): The word that `up --listen` prints; - reads it from standard input, where no other user sees it.
         simulations (-n N 1..256): Number of simulations; one a core by default.
     """
-    from throwcollect.runs.joining import join_run as join
+    from throwcollect.collect.runs.joining import join_run as join
 
     # Interruptions are counted only afterwards, because a signal that is only counted would not end the wait for input.
     word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
     with display(quiet=False) as shown, count_interruptions() as interruptions:
-        join(word, simulations or count_cores(), onlooker=shown, interruptions=interruptions)
+        join(word, simulations or count_cores(), reporter=shown, interruptions=interruptions)
 
 
 def join(directory: DatasetArgument, json: JsonOption = False) -> None:
@@ -258,7 +258,7 @@ def _collect(
     """
     shown = display(quiet=json, bar=not detach)
     with ExitStack() as held:
-        if (run := prepare_run(onlooker=shown)) is not None:
+        if (run := prepare_run(reporter=shown)) is not None:
             held.enter_context(run)
             _announce(run, token_file, view=view)
             if not detach:

@@ -142,8 +142,8 @@ def throw(
     Options:
         points (--list FILE): CSV or Parquet file: a throw for each row.
     """
+    from throwcollect.plan.point_file import read_points
     from throwcollect.simulator import Simulator
-    from throwcollect.sweep.point_file import read_points
 
     with Simulator(path, overrides=overrides(settings)) as simulator:
         rows: Sequence[tuple[dict[str, float], dict[str, float]]] = [({}, {})]

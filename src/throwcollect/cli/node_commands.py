@@ -39,8 +39,8 @@ def sim(
     """
     from socket import gethostname
 
+    from throwcollect.collect.runtimes.nodes import simulation_name_of
     from throwcollect.ros.nodes.simulation.process import run
-    from throwcollect.runtimes.nodes import simulation_name_of
 
     run(config, name=name or simulation_name_of(gethostname()), namespace=namespace, record=record)
 
@@ -64,14 +64,14 @@ def coordinator(directory: DatasetArgument, *, config: Path | None = None) -> No
     Options:
         config (CONFIG): Make the plan of this YAML file first.
     """
-    from throwcollect.ros.nodes.coordinator.node import run
+    from throwcollect.collect.coordinator_node.node import run
 
     if config is None:
         run(directory)
         return
     from throwcollect.cli.dataset.info import describe
-    from throwcollect.coordinator.prepare import count_trials
-    from throwcollect.coordinator.resume import prepare_or_resume
+    from throwcollect.collect.coordinator.prepare import count_trials
+    from throwcollect.collect.coordinator.resume import prepare_or_resume
     from throwcollect.dataset.inspect import info
 
     plan = prepare_or_resume(config, directory)

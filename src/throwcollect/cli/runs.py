@@ -19,9 +19,9 @@ from throwcollect.interruption import count_interruptions
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    from throwcollect.cluster.cluster_run import ClusterRun
-    from throwcollect.runs.run import Run
-    from throwcollect.runs.run_record import RunRecord
+    from throwcollect.collect.cluster.cluster_run import ClusterRun
+    from throwcollect.collect.runs.run import Run
+    from throwcollect.collect.runs.run_record import RunRecord
 
 _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
@@ -33,8 +33,8 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
     Options:
         everything (-a --all): Runs that have ended, too.
     """
-    from throwcollect.cluster.submission import find_queued
-    from throwcollect.runs.records import Records
+    from throwcollect.collect.cluster.submission import find_queued
+    from throwcollect.collect.runs.records import Records
     from throwcollect.serve.finding import SERVER, find_living
 
     records = Records()
@@ -78,8 +78,8 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
         follow_to_the_end(submitted.directory, as_json=json)
         return
     from throwcollect.cli.dataset.info import print_summary
-    from throwcollect.runs.following import follow
-    from throwcollect.runs.run_selection import describe_death, find_run_to_watch
+    from throwcollect.collect.runs.following import follow
+    from throwcollect.collect.runs.run_selection import describe_death, find_run_to_watch
 
     found = find_run_to_watch(run)
     with display(quiet=json) as shown, count_interruptions() as interruptions:
@@ -113,8 +113,8 @@ def logs(nodes: list[str] | None = None, *, follow: bool = False, run: RunOption
 
         print_logs(submitted, nodes or [], until_end=follow)
         return
-    from throwcollect.runs.following import read_logs
-    from throwcollect.runs.run_selection import find_run_to_watch
+    from throwcollect.collect.runs.following import read_logs
+    from throwcollect.collect.runs.run_selection import find_run_to_watch
 
     for name, line, width in read_logs(find_run_to_watch(run), nodes or (), follow=follow, keep_on=has_reader):
         typer.echo(f"{name:{width}} | {line}")
@@ -127,8 +127,8 @@ def events(run: RunOption = None, json: JsonOption = False) -> None:
 
         print_events(submitted, as_json=json)
         return
-    from throwcollect.runs.following import read_events
-    from throwcollect.runs.run_selection import find_run_to_watch
+    from throwcollect.collect.runs.following import read_events
+    from throwcollect.collect.runs.run_selection import find_run_to_watch
 
     for event, line in read_events(find_run_to_watch(run), keep_on=has_reader):
         typer.echo(line if json else f"{event.time}  {event}")
@@ -140,8 +140,8 @@ def scale(simulations: int, *, run: RunOption = None) -> None:
     Options:
         simulations (N 0..256): Number of simulations.
     """
-    from throwcollect.runs import control
-    from throwcollect.runs.run_selection import find_run_to_change
+    from throwcollect.collect.runs import control
+    from throwcollect.collect.runs.run_selection import find_run_to_change
 
     found = find_run_to_change(run)
     control.scale(found, simulations)
@@ -152,8 +152,8 @@ def stop(run: RunOption = None) -> None:
     """Finish the running trials of a run, close its files and end it; if no run lives, end the server."""
     if _end_elsewhere(run):
         return
-    from throwcollect.runs import control
-    from throwcollect.runs.run_selection import describe_death, find_run_to_change, require_living
+    from throwcollect.collect.runs import control
+    from throwcollect.collect.runs.run_selection import describe_death, find_run_to_change, require_living
 
     found = find_run_to_change(run)
     require_living(found)
@@ -178,8 +178,8 @@ def down(*, run: RunOption = None) -> None:
     """End everything of a run, by force if need be, and forget it; never removes a directory with a dataset."""
     if _end_elsewhere(run):
         return
-    from throwcollect.runs import control
-    from throwcollect.runs.run_selection import find_run_to_change
+    from throwcollect.collect.runs import control
+    from throwcollect.collect.runs.run_selection import find_run_to_change
 
     # A run without a record may be another user's, so it is removed only if it is named.
     found = find_run_to_change(None, died=True) if run is None else run
@@ -202,7 +202,7 @@ def _end_elsewhere(named: str | None) -> bool:
 
         end(submitted)
         return True
-    from throwcollect.runs.records import Records
+    from throwcollect.collect.runs.records import Records
     from throwcollect.serve.finding import SERVER, end_server
 
     if named is None:
@@ -217,22 +217,22 @@ def _end_elsewhere(named: str | None) -> bool:
 
 def _find_submitted(run: str | None) -> ClusterRun | None:
     """Find the submitted dataset that a command means; None if it means a run of this machine."""
-    from throwcollect.runs.records import Records
+    from throwcollect.collect.runs.records import Records
 
     # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
     if run is None and any(each.status == "running" for each in Records().all()):
         return None
-    from throwcollect.cluster.submission import find_submitted
+    from throwcollect.collect.cluster.submission import find_submitted
 
     if (directory := find_submitted(run)) is None:
         return None
-    from throwcollect.cluster.cluster_run import ClusterRun
+    from throwcollect.collect.cluster.cluster_run import ClusterRun
 
     return ClusterRun.open(directory)
 
 
 def _make_document(run: Run) -> dict[str, Any]:
-    from throwcollect.runs.run_selection import has_complete_dataset
+    from throwcollect.collect.runs.run_selection import has_complete_dataset
 
     error = run.record.error if run.record.failure else None
     complete = has_complete_dataset(run)
@@ -255,15 +255,15 @@ def _describe_status(run: Run, record: RunRecord) -> str:
         return f"planning for {_format_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
     if run.lives:
         return f"running for {_format_age(record.started)}"
-    from throwcollect.runs.run_selection import has_complete_dataset
+    from throwcollect.collect.runs.run_selection import has_complete_dataset
 
     return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
 
 
 def _list_node_lines(run: Run) -> list[tuple[str, ...]]:
     """Format the nodes that can still run, as the launcher last wrote them."""
-    from throwcollect.runtimes.registry import find_runtime
-    from throwcollect.runtimes.runtime import Runtime
+    from throwcollect.collect.runtimes.registry import find_runtime
+    from throwcollect.collect.runtimes.runtime import Runtime
 
     handle = (find_runtime(run.record.runtime) or Runtime).handle
     lines: list[tuple[str, ...]] = []

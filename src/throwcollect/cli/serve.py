@@ -88,7 +88,7 @@ def serve(
 
 def view(run: RunOption = None, json: JsonOption = False) -> None:
     """Print the address of a page on which runs are seen, and open it where there is a screen."""
-    from throwcollect.runs.run_selection import find_run_to_watch
+    from throwcollect.collect.runs.run_selection import find_run_to_watch
     from throwcollect.serve.finding import ensure_server, make_page_address
 
     watched = find_run_to_watch(run).id if run is not None else None

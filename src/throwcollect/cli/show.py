@@ -18,7 +18,7 @@ from throwcollect.wording import command
 
 if TYPE_CHECKING:
     from throwcollect.config.robot_config import RobotConfig
-    from throwcollect.sweep.plan import Plan
+    from throwcollect.plan.plan import Plan
     from throwcollect.tasks.starter import Beginning
 
 
@@ -112,17 +112,17 @@ def plan(
         output (--output -o DIR): Freeze the plan in DIR, for `up --slice`, instead of printing it.
         sensors (DIR): Write the first frame of each sensor as PNG file in DIR.
     """
+    from throwcollect.collect.coordinator.prepare import count_trials, draw_plan, prepare
     from throwcollect.config.loader import load_locating_errors
-    from throwcollect.coordinator.prepare import count_trials, draw_plan, prepare
 
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
         if sensors is not None and not config.sensors:
             raise ConfigError(f"--sensors {sensors}: the configuration has no sensors")
-        onlooker = display(quiet=json, bar=False)
+        reporter = display(quiet=json, bar=False)
         if output is None:
-            found = draw_plan(config, directory=path.parent, processes=count_cores(), onlooker=onlooker)
+            found = draw_plan(config, directory=path.parent, processes=count_cores(), reporter=reporter)
         else:
-            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=onlooker)
+            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), reporter=reporter)
     _load_world(found, sensors, quiet=json)
     if json:
         facts = ("seed", "digest", "refused")
@@ -152,7 +152,7 @@ def _load_world(plan: Plan, pictures: Path | None, *, quiet: bool) -> None:
 
     If there are sensors, it prints what they cost, and writes what they see first into a directory that is given.
     """
-    from throwcollect.coordinator.sensor_cost import measure_sensors
+    from throwcollect.collect.coordinator.sensor_cost import measure_sensors
     from throwcollect.extras import MissingExtraError
     from throwcollect.sim.world import World
 
@@ -169,14 +169,14 @@ def _load_world(plan: Plan, pictures: Path | None, *, quiet: bool) -> None:
     if not quiet:
         tell(cost.words)
     if pictures is not None:
-        from throwcollect.view.sensor_pictures import write_frames
+        from throwcollect.publish.view.sensor_pictures import write_frames
 
         write_frames([(name, frames, 0) for name, frames in cost.first.items()], pictures)
 
 
 def doctor(*, json: JsonOption = False) -> None:
     """Check what this machine can do."""
-    from throwcollect.runs.doctor import examine
+    from throwcollect.collect.runs.doctor import examine
 
     checks = examine(Path.cwd())
     width = max(len(check.name) for check in checks)

@@ -7,10 +7,10 @@ import time
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
-from throwcollect.coordinator.onlooker import Onlooker
+from throwcollect.collect.coordinator.reporter import Reporter
 
 if TYPE_CHECKING:
-    from throwcollect.coordinator.progress import Progress
+    from throwcollect.collect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
 """Least time between two lines."""
@@ -26,7 +26,7 @@ def display(*, quiet: bool, bar: bool = True) -> _Lines | _Bar:
     return _Lines(quiet=quiet)
 
 
-class _Lines(Onlooker, AbstractContextManager["_Lines"]):
+class _Lines(Reporter, AbstractContextManager["_Lines"]):
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
         self._next = 0.0
@@ -53,7 +53,7 @@ class _Lines(Onlooker, AbstractContextManager["_Lines"]):
         print(line, file=sys.stderr, flush=True)
 
 
-class _Bar(Onlooker):
+class _Bar(Reporter):
     def __init__(self) -> None:
         from rich import progress
         from rich.console import Console

@@ -16,10 +16,10 @@ from throwcollect.config.scene import FileBodyConfig
 from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.directory import CONFIG, ROBOT
 from throwcollect.files import write_file
+from throwcollect.plan.parquet_file import encode_table
 from throwcollect.robots.body_files import files_of
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.imported import SRDF, URDF, list_files
-from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.tasks.motions import motions_of
 
 

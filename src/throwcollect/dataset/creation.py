@@ -14,9 +14,9 @@ from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.point_file import encode_points
-from throwcollect.sweep.points import Points
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.point_file import encode_points
+from throwcollect.plan.points import Points
 from throwcollect.wording import command
 
 

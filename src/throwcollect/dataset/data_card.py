@@ -15,8 +15,8 @@ from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.provenance import Provenance
 from throwcollect.dataset.throws_table import count_outcomes
+from throwcollect.plan.arrow_column import find_range
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import find_range
 from throwcollect.units import unit_of_name
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from throwcollect.files import check_regular, suggest_path
 
 if TYPE_CHECKING:
-    from throwcollect.sweep.plan import Plan
+    from throwcollect.plan.plan import Plan
 
 DIRECTORY_VARIABLE = "THROWCOLLECT_DIRECTORY"
 """Directory of the dataset as its user knows it, for processes that see it elsewhere; empty if there is none."""

@@ -16,8 +16,8 @@ from throwcollect.dataset.summary import Info
 from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.errors import DatasetError
+from throwcollect.plan.arrow_column import nan_where_null
 from throwcollect.progress_log import log_progress
-from throwcollect.sweep.arrow_column import nan_where_null
 from throwcollect.wording import command, join_names
 
 _MOST_NAMED = 5

@@ -32,7 +32,7 @@ from throwcollect.dataset.directory import (
 )
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, read_text, unreadable
-from throwcollect.sweep.digest import is_digest
+from throwcollect.plan.digest import is_digest
 from throwcollect.wording import command
 
 _PROFILE = "data-package"

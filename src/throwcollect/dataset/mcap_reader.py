@@ -32,7 +32,7 @@ from throwcollect.episode.message_table import MessageTable, check_frames
 from throwcollect.episode.topics import Rows
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
-from throwcollect.sweep.digest import is_digest
+from throwcollect.plan.digest import is_digest
 
 _RECORD_PREFIX = struct.Struct("<BQ")
 _EFFORT = 64

@@ -14,7 +14,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.summary import MissSummary
-from throwcollect.sweep.arrow_column import nan_where_null
+from throwcollect.plan.arrow_column import nan_where_null
 from throwcollect.units import unit_of_name
 
 

@@ -27,11 +27,11 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath
+from throwcollect.plan.arrow_column import find_trial
+from throwcollect.plan.plan import Plan
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
-from throwcollect.sweep.arrow_column import find_trial
-from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:

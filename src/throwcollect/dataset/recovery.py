@@ -34,8 +34,8 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import remove, unwritable
+from throwcollect.plan.plan import Plan
 from throwcollect.side_by_side import work_side_by_side
-from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
 
 Judge = Callable[[Config, Episode], Result]

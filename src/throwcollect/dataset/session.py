@@ -37,10 +37,10 @@ from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import remove, unwritable
+from throwcollect.plan.plan import Plan, make_trials
+from throwcollect.plan.points import Points
 from throwcollect.robots.description import full_description
 from throwcollect.sensing.recorder import SensorRecorder
-from throwcollect.sweep.plan import Plan, make_trials
-from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 

@@ -25,7 +25,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
-from throwcollect.sweep.plan import Plan
+from throwcollect.plan.plan import Plan
 
 Recording = tuple[FileSummary, FileEntry]
 """What bag's metadata and manifest say of an MCAP file."""

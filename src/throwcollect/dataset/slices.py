@@ -40,9 +40,9 @@ from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import open_regular, unreadable, unwritable
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.slice import Slice
 from throwcollect.progress_log import log_progress
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.slice import Slice
 from throwcollect.wording import command, format_count
 
 SLICES = "slices"

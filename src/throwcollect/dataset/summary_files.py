@@ -18,7 +18,7 @@ from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.shard import Recording
 from throwcollect.episode.channels import Channels
 from throwcollect.files import write_file
-from throwcollect.sweep.parquet_file import write_table
+from throwcollect.plan.parquet_file import write_table
 
 
 def write_description(

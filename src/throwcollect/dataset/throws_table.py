@@ -19,10 +19,10 @@ from throwcollect.dataset.misses import Misses
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.members import explain_failure
-from throwcollect.sweep.arrow_column import find_trial, make_table, read_validity
-from throwcollect.sweep.parquet_file import read_parquet
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.trials import Trial
+from throwcollect.plan.arrow_column import find_trial, make_table, read_validity
+from throwcollect.plan.parquet_file import read_parquet
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.trials import Trial
 from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import REFUSED, Result
 from throwcollect.tasks.result_columns import BodyColumns

@@ -39,15 +39,15 @@ from throwcollect.dataset.throws_table import ThrowsTable, read_throws
 from throwcollect.dataset.verify_recording import RecordingReport, check_recording
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import read_text
+from throwcollect.plan.digest import trial_digests
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.point_file import read_points
+from throwcollect.plan.points import Points
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.body_files import files_of
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.robots.description import robot_of
 from throwcollect.side_by_side import working_side_by_side
-from throwcollect.sweep.digest import trial_digests
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.point_file import read_points
-from throwcollect.sweep.points import Points
 from throwcollect.tasks.motions import motions_of
 
 _MANY_EPISODES = 1000

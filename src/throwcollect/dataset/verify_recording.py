@@ -27,8 +27,8 @@ from throwcollect.episode.chunk import count_indexed
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, find_infinite_columns
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.trials import Trial
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.trials import Trial
 from throwcollect.tasks.free_flight import ballistic_steps
 from throwcollect.tasks.task import task_of
 from throwcollect.units import NS_PER_S

@@ -32,8 +32,8 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import remove, write_file
+from throwcollect.plan.plan import Plan
 from throwcollect.robots.description import full_description
-from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 from throwcollect.wording import format_count

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError
-from throwcollect.pinocchio_library import pinocchio
 
 Triangles = NDArray[np.float32]
 """Corners of triangles, shape ``(n_triangles, 3, 3)``, in the units of the file."""

@@ -27,8 +27,8 @@ from throwcollect.learning.learned_map import (
     scale_values,
 )
 from throwcollect.learning.polynomial import Array
-from throwcollect.sweep.points import Points
-from throwcollect.sweep.samplers import spread
+from throwcollect.plan.points import Points
+from throwcollect.plan.samplers import spread
 
 Cells = NDArray[np.int64]
 

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from throwcollect.config.robot_config import RobotConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.pinocchio_library import pinocchio
+from throwcollect.plan.trials import Trial
 from throwcollect.robots.derived import Postures
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.sim.simulator import Simulator
-from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.starter import Beginning
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.wording import blank_numbers, format_count

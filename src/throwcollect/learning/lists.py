@@ -12,7 +12,7 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.learning.aiming import Aim
-from throwcollect.sweep.point_file import problem_of_row, read_numbers, read_table
+from throwcollect.plan.point_file import problem_of_row, read_numbers, read_table
 from throwcollect.wording import join_names
 
 

@@ -25,7 +25,7 @@ from throwcollect.learning.model_card import ModelCard
 from throwcollect.learning.polynomial import Array, ModelEntry
 from throwcollect.learning.score import Score
 from throwcollect.learning.scoring import Simulates, score_model
-from throwcollect.sweep.parquet_file import encode_table, read_parquet
+from throwcollect.plan.parquet_file import encode_table, read_parquet
 from throwcollect.version import __version__
 from throwcollect.wording import command, format_count
 

@@ -18,8 +18,8 @@ from throwcollect.config.scene import BodyConfig, FileBodyConfig, MeshConfig
 from throwcollect.engines.body import HERE, BodyLink, BodyModel, LinkInertia, LinkShape, to_text
 from throwcollect.engines.engine import BodyState, SceneBody
 from throwcollect.engines.mesh import Mesh
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError
-from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.imported import find_mesh
 from throwcollect.robots.joint_model import check_moments, describe_inertia, placement_of, pose_of
 from throwcollect.robots.urdf import parse_xml, read_urdf, read_xml

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from throwcollect.engines.body import LinkShape
 from throwcollect.engines.engine import SceneBody
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError
-from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.joint_model import joint_model, mount_of, pose_of
 from throwcollect.robots.robot import Robot
-from throwcollect.tools.tool import Tool
+from throwcollect.robots.tools.tool import Tool
 
 MARGIN_M = 0.002
 """Least distance between links. On a path between two checked postures, which are 0.02 rad apart, the spoon, 1 m from

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.engines.body import to_text
-from throwcollect.pinocchio_library import pinocchio
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import read_shapes
 from throwcollect.robots.imported import HOME, make_error
 from throwcollect.robots.joint_model import joint_model, pose_of

@@ -18,13 +18,13 @@ from throwcollect.engines.body import (
     LinkShape,
     to_text,
 )
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError, MemberError, Problem
 from throwcollect.extras import MissingExtraError, is_installed
-from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.described import find_robot
 from throwcollect.robots.joint_model import describe_inertia, joint_model, lock_joints, mount_of, placement_of, pose_of
 from throwcollect.robots.robot import Robot
-from throwcollect.tools.tool import Tool, tool_of
+from throwcollect.robots.tools.tool import Tool, tool_of
 
 _written: dict[tuple[Robot, str], str] = {}
 """The latest full descriptions, by robot and configuration of the tool. They are kept, because everything that looks at

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.pinocchio_library import pinocchio
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.robots.joint_model import lock_joints, mount_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import object_of, starts_in_tool
-from throwcollect.tools.tool import Tool
+from throwcollect.robots.tools.tool import Tool
 
 
 class Dynamics:

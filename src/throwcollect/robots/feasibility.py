@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.engines.body import Placement
 from throwcollect.engines.engine import SceneBody
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError
-from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance, find_overlap
 from throwcollect.robots.description import (
     check_names,
@@ -29,8 +29,8 @@ from throwcollect.robots.joint_model import joint_model, mount_of
 from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.surroundings import bodies_of, object_of, starts_in_tool
+from throwcollect.robots.tools.tool import Tool, tool_of
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tools.tool import Tool, tool_of
 
 _CHECKED_HZ = 100
 _CHECKED_LEAST = 100

@@ -9,11 +9,11 @@ from functools import lru_cache
 import numpy as np
 
 from throwcollect.engines.body import HERE, INERTIA, BodyJoint, LinkInertia, Placement
+from throwcollect.engines.native_reading import reading_natively
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError
-from throwcollect.native_reading import reading_natively
-from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.robot import Robot
-from throwcollect.tools.tool import Tool
+from throwcollect.robots.tools.tool import Tool
 
 _ROUNDING = 1e-6
 """Share by which the largest moment of inertia may exceed the sum of the others, as numbers in files are rounded."""

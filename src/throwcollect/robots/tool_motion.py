@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.pinocchio_library import pinocchio
+from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.robots.description import joint_offsets, robot_of
 from throwcollect.robots.joint_model import joint_model, mount_of
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import object_of
-from throwcollect.tools.tool import tool_of
+from throwcollect.robots.tools.tool import tool_of
 
 
 class ToolMotion:

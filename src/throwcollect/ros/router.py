@@ -24,7 +24,7 @@ from typing import IO
 
 import zenoh
 
-from rclzenoh.session_config import OPEN, PROTECTED, in_words, router_config
+from rclzenoh.session_config import OPEN, PROTECTED, describe, router_config
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import die_with_parent, stop_signals
@@ -77,7 +77,7 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
             # Another process may have taken the free port meanwhile, so this tries again.
             if not attempts_left:
                 raise ConfigError(
-                    f"the router cannot listen on {endpoint}: {in_words(error).rpartition(': ')[2]}",
+                    f"the router cannot listen on {endpoint}: {describe(error).rpartition(': ')[2]}",
                     expected="an address of this machine with a free port, such as tcp/127.0.0.1:0, which takes any",
                     hint="if another router listens there, use that one",
                 ) from error

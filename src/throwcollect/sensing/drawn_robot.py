@@ -21,8 +21,8 @@ from throwcollect.episode.topics import rotate
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.robots.surroundings import looks_of, moving_bodies_of, object_of
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.robots.urdf import PACKAGE, parse_xml, read_visual
-from throwcollect.tools.tool import tool_of
 
 Rgba = tuple[float, float, float, float]
 

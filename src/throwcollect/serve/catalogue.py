@@ -10,6 +10,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
+from throwcollect.collect.runs.run_record import Kind
 from throwcollect.config.containers import ContainerSpec, Mount, NodeContainerConfig
 from throwcollect.config.document import Document
 from throwcollect.config.kinds import ContradictionError
@@ -17,7 +18,6 @@ from throwcollect.config.loader import load
 from throwcollect.config.section import Section
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.robots.appearance import read_urdf_text
-from throwcollect.runs.run_record import Kind
 from throwcollect.wording import suggest
 
 LONGEST_NAME = 63

@@ -14,12 +14,12 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse, StreamingResponse
 from starlette.background import BackgroundTask
 
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
 from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE
 from throwcollect.dataset.manifest import FileEntry, read_manifest, size_of_file
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe
 
@@ -88,7 +88,7 @@ def _find_file(directory: Path, path: str) -> Path:
 
 def _report(directory: Path, name: str) -> FileResponse:
     """Write the report on a dataset into a file that vanishes when it was sent."""
-    from throwcollect.report.sections import write_report
+    from throwcollect.publish.report.sections import write_report
 
     scratch = tempfile.TemporaryDirectory(prefix="throwcollect-report-")
     page = Path(scratch.name) / f"{name}.html"

@@ -13,14 +13,14 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, StrictInt
 
+from throwcollect.collect.runs.events import EVENTS, parse
+from throwcollect.collect.runs.run_record import Origin
+from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.config.loader import load
 from throwcollect.config.shape import shape_of
 from throwcollect.config.values import leaves
 from throwcollect.errors import NotFoundError
 from throwcollect.files import open_log
-from throwcollect.runs.events import EVENTS, parse
-from throwcollect.runs.run_record import Origin
-from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.catalogue import LONGEST_NAME, Catalogue
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, describe

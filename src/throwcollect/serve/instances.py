@@ -13,6 +13,12 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
+from throwcollect.collect.runs import control
+from throwcollect.collect.runs.background import begin_container, begin_run
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import Origin
+from throwcollect.collect.runs.run_selection import require_living, require_simulations
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
 from throwcollect.config.values import list_operator_keys
@@ -20,12 +26,6 @@ from throwcollect.dataset.creation import refuse_taken
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance
-from throwcollect.runs import control
-from throwcollect.runs.background import begin_container, begin_run
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
-from throwcollect.runs.run_record import Origin
-from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
 from throwcollect.serve.robot_files import description_of

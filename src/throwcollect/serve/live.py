@@ -14,13 +14,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from throwcollect.collect.runs.control import set_parameter
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, DatasetError, NotFoundError, ThrowcollectError, WorkerError
-from throwcollect.runs.control import set_parameter
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
 from throwcollect.serve.state import simulations_of
 
 _PARAMETER = "sim.real_time_factor"

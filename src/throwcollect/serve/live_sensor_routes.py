@@ -9,6 +9,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body
 
+from throwcollect.collect.runs.control import set_parameter
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_selection import require_living
+from throwcollect.collect.runtimes.run_listener import take_part
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_sensors
@@ -18,10 +22,6 @@ from throwcollect.errors import ConflictError, NotFoundError, WorkerError
 from throwcollect.ros import Future
 from throwcollect.ros.msg import String
 from throwcollect.ros.nodes.sensors.node import LATCHED, NAME
-from throwcollect.runs.control import set_parameter
-from throwcollect.runs.run import Run
-from throwcollect.runs.run_selection import require_living
-from throwcollect.runtimes.run_listener import take_part
 from throwcollect.sensing.sensor import check_sensors
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import name_node

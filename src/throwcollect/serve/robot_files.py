@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
+from throwcollect.collect.runs.component_container import DESCRIPTION
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
 from throwcollect.config.loader import load
 from throwcollect.dataset.carried_robot import list_carried
 from throwcollect.dataset.directory import config_path
@@ -19,9 +22,6 @@ from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.surroundings import BodyLook, looks_of
-from throwcollect.runs.component_container import DESCRIPTION
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
 
 _MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
 """URL of a mesh in a description: its package, and its path in that package."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from fastapi import APIRouter, WebSocket
 
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
 from throwcollect.errors import ConflictError, NotFoundError, UnreachableError
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
 from throwcollect.serve.throws import ThrowWatch

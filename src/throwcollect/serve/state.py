@@ -12,14 +12,14 @@ from typing import Literal
 from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.resume import is_complete
+from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.coordinator.resume import is_complete
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import Kind, Planning
+from throwcollect.collect.runtimes.nodes import is_simulation
+from throwcollect.collect.runtimes.runtime import NodeState
 from throwcollect.dataset.directory import CONFIG, METADATA
 from throwcollect.dataset.summary import Info
-from throwcollect.runs.run import Run
-from throwcollect.runs.run_record import Kind, Planning
-from throwcollect.runtimes.nodes import is_simulation
-from throwcollect.runtimes.runtime import NodeState
 
 Status = Literal["planning", "starting", "running", "ended", "died"]
 

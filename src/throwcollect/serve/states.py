@@ -9,9 +9,9 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 from dataclasses import replace
 
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
 from throwcollect.serve.catalogue import Catalogue
 from throwcollect.serve.state import ComponentState, InstanceState, WholeState, describe
 

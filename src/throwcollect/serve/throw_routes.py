@@ -18,11 +18,11 @@ from throwcollect.dataset.mcap_reader import EpisodePlace, scan_file
 from throwcollect.dataset.throws_table import find_row
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import NotFoundError
+from throwcollect.plan.parquet_file import read_parquet
+from throwcollect.plan.plan import Plan
 from throwcollect.serve.dataset_routes import get_collection, is_finished
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.throws import describe_trial, encode_throw, read_plan
-from throwcollect.sweep.parquet_file import read_parquet
-from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
 
 _MOST_THROWS = 20_000

@@ -13,18 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
+from throwcollect.collect.coordinator_node.preview import make_shown_topic
+from throwcollect.collect.runs.run import Run
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import PLAN, config_path
 from throwcollect.episode.episode_message import Episode, unpack
 from throwcollect.errors import ThrowcollectError
+from throwcollect.plan.plan import Plan
 from throwcollect.robots.surroundings import BodyLook, looks_of
-from throwcollect.ros.nodes.coordinator.showing import make_shown_topic
 from throwcollect.run_key import Signer
-from throwcollect.runs.run import Run
 from throwcollect.serve.rosbridge import Bridge
 from throwcollect.serve.rosbridge.feed import Sample
 from throwcollect.serve.state import simulations_of
-from throwcollect.sweep.plan import Plan
 from throwcollect.units import NS_PER_S
 
 _LOOK_S = 0.5

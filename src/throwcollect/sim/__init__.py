@@ -1,1 +1,4 @@
-"""The simulation: the rules of a trial on any physics engine, its controllers, and the ROS 2 node around them."""
+"""One trial: a world of an engine, the controllers of its limbs and its clock; `Simulator.run(trial)` gives an episode.
+
+Nodes, replays, scores and environments are loops over it. This room knows neither ROS nor files.
+"""

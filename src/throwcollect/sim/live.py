@@ -15,6 +15,7 @@ from throwcollect.engines.engine import BodyState, SceneBody
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import RequestError
+from throwcollect.plan.trials import NO_TARGET, Values
 from throwcollect.sim.pace import (
     WATCHED_STRETCH_S,
     Pace,
@@ -24,7 +25,6 @@ from throwcollect.sim.pace import (
 )
 from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.sim.simulator import STRETCH_S, Simulator
-from throwcollect.sweep.trials import NO_TARGET, Values
 from throwcollect.units import NS_PER_S
 
 

@@ -29,7 +29,7 @@ from throwcollect.wording import join_names, suggest
 
 Array = NDArray[np.float64]
 Observation = Mapping[str, NDArray[Any]]
-"""Arrays by name, with the names, units and frames of an export (`throwcollect.export`): of all joints in the order of
+"""Arrays by name, with the names, units and frames of an export (`publish.export`): of all joints in the order of
 `Robot.joints`, of each body that moves in world, the keys that belong to a target, the target, the last command, and
 the pictures of cameras that `task.policy.observation` names."""
 

@@ -11,7 +11,7 @@ from throwcollect.engines.engine import Physics, Scene, ToolLink
 from throwcollect.robots.description import Description, robot_of
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.surroundings import bodies_of, object_of, starts_in_tool
-from throwcollect.tools.tool import tool_of
+from throwcollect.robots.tools.tool import tool_of
 
 _OPENING = (1.0, 0.0, 0.0)
 """Direction in which every tool is open, in the frame of its link."""

@@ -22,6 +22,8 @@ from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples, find_infinite_columns
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
+from throwcollect.plan.conditions import Settings
+from throwcollect.plan.trials import NO_TARGET, Trial, Values
 from throwcollect.robots.description import full_description, robot_of, start_posture
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sensing.recorder import SensorRecorder
@@ -29,9 +31,7 @@ from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.policy import Policy, PolicyLoop, make_policy
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup, trial_goals
 from throwcollect.sim.world import World
-from throwcollect.sweep.trials import NO_TARGET, Trial, Values
 from throwcollect.tasks.task import task_of, trajectory_of
-from throwcollect.trial.conditions import Settings
 from throwcollect.units import NS_PER_S
 
 STRETCH_S = 1.0

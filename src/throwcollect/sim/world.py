@@ -39,11 +39,11 @@ from throwcollect.robots.description import (
     robot_of,
     start_posture,
 )
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sim.motors import Motors
 from throwcollect.sim.recording import OBJECT_LINEAR_VELOCITY, ContactLog, SampleLog, to_samples
 from throwcollect.sim.scene import drag_of, physics_of, scene_of, seat_of
 from throwcollect.tasks.task import EndRule, task_of
-from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
 
 

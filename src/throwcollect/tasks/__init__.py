@@ -1,1 +1,5 @@
-"""Tasks: from the parameters of a throw to a joint trajectory, and from an episode to its outcome."""
+"""What a trial is for: from parameters, a file or a policy to joint motions, and from an episode to its outcome.
+
+A task plans the motion, says when a trial ends, judges the episode, and declares the columns of its results. This room
+never sends a command and never steps a world.
+"""

@@ -7,9 +7,9 @@ from pathlib import Path
 import pyarrow as pa
 from pyarrow.csv import write_csv
 
-from throwcollect.export.exporter import Exporter
-from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import ExportSource
+from throwcollect.publish.export.exporter import Exporter
+from throwcollect.publish.export.readme import Layout, tabulate_signals
+from throwcollect.publish.export.throw_source import ExportSource
 
 
 def describe(source: ExportSource) -> Layout:

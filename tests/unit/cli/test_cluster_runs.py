@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from throwcollect.cli import cluster_runs
-from throwcollect.cluster.cluster_run import SlicesState
-from throwcollect.cluster.slurm import ArrayTask
+from throwcollect.collect.cluster.cluster_run import SlicesState
+from throwcollect.collect.cluster.slurm import ArrayTask
 from throwcollect.errors import ConfigError
 
 

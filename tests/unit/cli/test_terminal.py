@@ -1,7 +1,7 @@
 import pytest
 
 from throwcollect.cli.terminal import display
-from throwcollect.coordinator.progress import Progress
+from throwcollect.collect.coordinator.progress import Progress
 
 
 def progress(ended: int, **outcomes: int) -> Progress:

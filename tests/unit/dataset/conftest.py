@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.unit.sweep.own_plan import make_plan
+from tests.unit.plan.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.creation import create
@@ -20,11 +20,11 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.points import Points
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
-from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.points import Points
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_result import ThrowResult

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from hypothesis import strategies as st
 
+from throwcollect.collect.coordinator.resume import finish_without_simulating
 from throwcollect.config.loader import load
-from throwcollect.coordinator.resume import finish_without_simulating
 from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tests.unit.dataset.conftest import Change, Collection, create_and_open
 
-from throwcollect.coordinator.prepare import make_self_contained
-from throwcollect.sweep.point_file import read_points
+from throwcollect.collect.coordinator.prepare import make_self_contained
+from throwcollect.plan.point_file import read_points
 
 LIST = """\
 task.duration_s,target_y_m,target_x_m

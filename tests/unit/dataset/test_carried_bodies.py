@@ -14,10 +14,10 @@ from throwcollect import verify_dataset
 from throwcollect.config.loader import load
 from throwcollect.config.scene import FileBodyConfig, MeshConfig
 from throwcollect.config.values import with_sensors
+from throwcollect.dataset.derive.derivation import filter_trials, merge, render_sensors
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import filter_trials, merge, render_sensors
-from throwcollect.export.export import export
+from throwcollect.publish.export.export import export
 from throwcollect.robots.body_files import files_of
 
 SHAPES = """\

@@ -14,10 +14,10 @@ from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, write
 
 from throwcollect import verify_dataset
 from throwcollect.config.loader import load
+from throwcollect.dataset.derive.derivation import filter_trials, merge
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import filter_trials, merge
-from throwcollect.export.export import export
+from throwcollect.publish.export.export import export
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.motions import motions_of
 

@@ -13,13 +13,13 @@ from tests.e2e.collection import write_config as write_user_config
 from throwcollect import Simulator, fit, load_model, verify_dataset
 from throwcollect.config.loader import load
 from throwcollect.dataset.carried_robot import carry_robot, pack_robot, unpack_robot
+from throwcollect.dataset.derive.derivation import filter_trials, merge
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import filter_trials, merge
-from throwcollect.export.export import export
+from throwcollect.publish.export.export import export
+from throwcollect.publish.view.animation import render
+from throwcollect.publish.view.viewer_directory import view
 from throwcollect.robots.imported import hash_files
 from throwcollect.state_directory import STATE_VARIABLE
-from throwcollect.view.animation import render
-from throwcollect.view.viewer_directory import view
 
 PANDA = """\
 name: small

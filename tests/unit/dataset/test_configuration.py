@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 import throwcollect
+from throwcollect.collect.coordinator.resume import resume
+from throwcollect.collect.runs.preparation import resume as prepare_to_resume
 from throwcollect.config.loader import load
-from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
-from throwcollect.runs.preparation import resume as prepare_to_resume
 
 
 def lose(path: Path) -> None:

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.damage import SHARD, find_stored, flip
 
+from throwcollect.dataset.derive.derivation import merge
+from throwcollect.dataset.derive.statistics import statistics
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import merge
-from throwcollect.derive.statistics import statistics
 from throwcollect.errors import DatasetError
-from throwcollect.export.export import export
-from throwcollect.replay.audit import replay_throws
-from throwcollect.report.sections import report_dataset
-from throwcollect.view.animation import render
-from throwcollect.view.viewer_directory import view
+from throwcollect.publish.export.export import export
+from throwcollect.publish.report.sections import report_dataset
+from throwcollect.publish.view.animation import render
+from throwcollect.publish.view.viewer_directory import view
+from throwcollect.replay import replay_throws
 
 READERS: dict[str, Callable[[Path], object]] = {
     "statistics": statistics,

@@ -13,10 +13,10 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, finish
 
-from throwcollect.coordinator.resume import resume
+from throwcollect.collect.coordinator.resume import resume
+from throwcollect.dataset.derive.derivation import filter_trials
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.derivation import filter_trials
 from throwcollect.errors import ThrowcollectError
 
 BEGUN = "quick_00001.mcap.part"

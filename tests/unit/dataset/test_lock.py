@@ -12,7 +12,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import SETTINGS, finish
 
-from throwcollect.coordinator.resume import resume
+from throwcollect.collect.coordinator.resume import resume
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.lock import hold_lock, is_locked
 from throwcollect.dataset.writer import DatasetWriter

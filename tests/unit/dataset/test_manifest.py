@@ -16,10 +16,10 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.damage import records_of
 from tests.unit.dataset.mutations import SETTINGS, finish
 
+from throwcollect.dataset.derive.derivation import filter_trials
 from throwcollect.dataset.manifest import entry_of_file, find_changed_files, list_promised_names, read_manifest
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.verify import find_damage, verify
-from throwcollect.derive.derivation import filter_trials
 from throwcollect.errors import DatasetError
 
 MANIFEST = "datapackage.json"

@@ -27,7 +27,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.episode.chunk import Chunk
 from throwcollect.errors import ThrowcollectError
-from throwcollect.sweep.plan import Plan
+from throwcollect.plan.plan import Plan
 
 RECORDING = "quick_00000.mcap"
 FILES = ("config.yaml", "metadata.yaml", "plan.parquet", "throws.parquet", RECORDING)

@@ -17,11 +17,11 @@ from rosbags.typesys import Stores, get_typestore
 import throwcollect
 from throwcollect import runs
 from throwcollect.config.loader import load
+from throwcollect.dataset.derive.derivation import filter_trials, merge, render_sensors
 from throwcollect.dataset.sensors import SensorFrames
 from throwcollect.dataset.verify import verify
-from throwcollect.derive.derivation import filter_trials, merge, render_sensors
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.replay.audit import verify_dataset
+from throwcollect.replay import verify_dataset
 from throwcollect.sensing.camera import Frame
 from throwcollect.sensing.noise import Noise
 from throwcollect.sensing.scene import PlacedScene

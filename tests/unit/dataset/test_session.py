@@ -11,11 +11,11 @@ import throwcollect
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
+from throwcollect.dataset.derive.derivation import merge
 from throwcollect.dataset.session import SessionDataset
 from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.derivation import merge
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of

@@ -19,16 +19,16 @@ from tests.unit.dataset.targeted import LIST, WITHOUT_TARGETS, collect_targeted,
 from throwcollect.cli.dataset.info import describe
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TargetColumn
+from throwcollect.dataset.derive.derivation import filter_trials, merge
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.misses import Misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.derive.derivation import filter_trials, merge
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.export.throw_source import ExportSource
-from throwcollect.sweep.parquet_file import encode_table
+from throwcollect.plan.parquet_file import encode_table
+from throwcollect.publish.export.throw_source import ExportSource
 from throwcollect.tasks.throw.throw_config import ThrowConfig
 
 

@@ -15,8 +15,8 @@ from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import physics_description, start_posture
 from throwcollect.robots.surroundings import object_of
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sim.scene import physics_of, scene_of
-from throwcollect.tools.tool import tool_of
 
 CONFIG = Config.model_validate({"scene": {"landing_height_m": 0.5}})
 DESCRIPTION = physics_description(CONFIG)

@@ -25,9 +25,9 @@ from throwcollect.engines.mujoco import loop, mujoco_engine, stepping
 from throwcollect.engines.mujoco.loop import Loop, make_loop
 from throwcollect.engines.mujoco.mujoco_engine import MujocoEngine
 from throwcollect.errors import ConfigError
+from throwcollect.plan.plan import Plan, make_trials
+from throwcollect.plan.samplers import draw_points
 from throwcollect.sim.simulator import Simulator
-from throwcollect.sweep.plan import Plan, make_trials
-from throwcollect.sweep.samplers import draw_points
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 BLOCK = """

@@ -9,7 +9,7 @@ import pytest
 
 from throwcollect import progress_log
 from throwcollect.dataset.reader import Dataset
-from throwcollect.replay.audit import Deviation, Distribution, distributions, simulate_with
+from throwcollect.replay import Deviation, Distribution, distributions, simulate_with
 from throwcollect.simulator import Simulator
 
 

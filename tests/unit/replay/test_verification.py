@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.replay.audit import verify_dataset
+from throwcollect.replay import verify_dataset
 
 
 def test_throws_that_come_out_differently_are_found(make_collection: type[Collection], tmp_path: Path) -> None:
@@ -27,7 +27,7 @@ def test_a_few_throws_are_simulated_again_where_libraries_are_those_of_the_colle
 ) -> None:
     # No simulation has made these throws.
     directory = make_collection({"sim": {"engine": "ballistic"}}).collect(tmp_path / "data")
-    monkeypatch.setattr("throwcollect.replay.audit.SAMPLE", 2)
+    monkeypatch.setattr("throwcollect.replay.SAMPLE", 2)
     assert sum("comes out differently" in each.problem for each in verify_dataset(directory)) == 2
-    monkeypatch.setattr("throwcollect.replay.audit.find_versions", lambda: {"numpy": "1.0"})
+    monkeypatch.setattr("throwcollect.replay.find_versions", lambda: {"numpy": "1.0"})
     assert verify_dataset(directory) == verify_dataset(directory, replay=0)

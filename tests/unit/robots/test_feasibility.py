@@ -12,8 +12,8 @@ from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.tasks.task import task_of
-from throwcollect.tools.tool import tool_of
 
 JOINTS = TALOS.joints
 TASK = Config().task

@@ -20,8 +20,8 @@ from throwcollect.robots.description import physics_description
 from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sim.scene import scene_of
-from throwcollect.tools.tool import tool_of
 
 ROBOTS = TALOS.urdf_path.parents[2]
 CONFIG = Config.model_validate({"robot": {"locked": "none"}})

@@ -15,7 +15,7 @@ from throwcollect.robots.described import find_robot
 from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
-from throwcollect.tools.tool import tool_of
+from throwcollect.robots.tools.tool import tool_of
 
 sys.path.append(str(Path(__file__).parents[2] / "plugins"))
 

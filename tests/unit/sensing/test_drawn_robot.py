@@ -10,8 +10,8 @@ from tests.unit.sensing.scenes import make_scene
 
 from throwcollect.episode.frames import read_frames
 from throwcollect.episode.sensor_topics import label_names
+from throwcollect.publish.view.markers import shape_markers
 from throwcollect.sensing.drawn_robot import DrawnRobot, read_drawn_robot
-from throwcollect.view.markers import shape_markers
 
 URDF = """\
 <robot name="snowman">

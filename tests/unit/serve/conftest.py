@@ -12,9 +12,9 @@ import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
 from tests.e2e.collection import FAST, collect_here, write_config
 
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
-from throwcollect.runs.run_record import RunRecord
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app

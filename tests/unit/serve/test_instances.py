@@ -10,11 +10,11 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served, make_end_fields
 
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import Origin, RunFailure
+from throwcollect.collect.runtimes.runtime import NodeState
 from throwcollect.config.containers import ContainerSpec
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
-from throwcollect.runs.run_record import Origin, RunFailure
-from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.catalogue import Catalogue
 

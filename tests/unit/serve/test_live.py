@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from tests.unit.serve.conftest import CONFIG, Remember, make_end_fields
 
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runtimes.runtime import NodeState
 from throwcollect.errors import NotFoundError, WorkerError
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
-from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import live
 from throwcollect.serve.live import restore_abandoned, slow_down
 

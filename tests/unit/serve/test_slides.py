@@ -9,9 +9,9 @@ from starlette.testclient import TestClient
 from tests.e2e.collection import collect_here
 
 import throwcollect
+from throwcollect.plan.trials import Trial
 from throwcollect.serve.throws import encode_throw
 from throwcollect.sim.simulator import Simulator
-from throwcollect.sweep.trials import Trial
 
 pytest.importorskip("mujoco")
 CONFIG = Path(__file__).parents[3] / "configs" / "slide.yaml"

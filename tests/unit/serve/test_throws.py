@@ -14,6 +14,8 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.serve.conftest import Remember
 
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runtimes.runtime import NodeState
 from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.channels import Channels
@@ -21,8 +23,6 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import looks_of
-from throwcollect.runs.records import Records
-from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.rosbridge.feed import Listener
 from throwcollect.serve.throws import ThrowWatch, describe_trial, encode_throw
 

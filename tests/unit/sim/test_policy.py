@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from throwcollect import ConfigError, Simulator, Throw
 from throwcollect.errors import MemberError
-from throwcollect.export.throw_source import list_signals
+from throwcollect.publish.export.throw_source import list_signals
 from throwcollect.robots.description import start_posture
 from throwcollect.sim.policy import Observation, shape_observation
 from throwcollect.sim.world import World

@@ -12,13 +12,13 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError
 from throwcollect.extras import ENGINE_PACKAGES
+from throwcollect.plan.trials import Trial
 from throwcollect.robots.body_files import place_spawned, read_spawned
 from throwcollect.ros.msg import Result, SimulatorFeatures
 from throwcollect.ros.nodes.simulation.control import SimulationControl
 from throwcollect.ros.nodes.simulation.spawning import SpawningServices
 from throwcollect.sim.live import LiveSimulator, StateCode
 from throwcollect.sim.simulator import Simulator
-from throwcollect.sweep.trials import Trial
 
 CUBE = """
 <robot name="cube"><link name="cube">

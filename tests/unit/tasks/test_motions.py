@@ -15,8 +15,8 @@ from mcap.writer import Writer
 
 from rclzenoh.interfaces import get_message, serialize
 from throwcollect import Simulator
+from throwcollect.collect.coordinator.prepare import draw_plan
 from throwcollect.config.loader import load
-from throwcollect.coordinator.prepare import draw_plan
 from throwcollect.errors import ConfigError
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.motions import Motions, motions_of

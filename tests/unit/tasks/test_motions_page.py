@@ -11,8 +11,8 @@ import pytest
 from tests.e2e.collection import call_here
 from tests.pages import find_blocks, read_section
 
+from throwcollect.collect.coordinator.prepare import draw_plan
 from throwcollect.config.loader import load
-from throwcollect.coordinator.prepare import draw_plan
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import trajectory_of
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.unit.sweep.own_plan import make_plan
+from tests.unit.plan.own_plan import make_plan
 
 from throwcollect.cli.show import init
 from throwcollect.config.default_path import DEFAULT_CONFIG

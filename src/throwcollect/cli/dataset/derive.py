@@ -11,8 +11,8 @@ from throwcollect.cli.printing import align, format_number, show
 from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
-    from throwcollect.derive.derivation import Derived
-    from throwcollect.derive.statistics import Statistics
+    from throwcollect.dataset.derive.derivation import Derived
+    from throwcollect.dataset.derive.statistics import Statistics
 
 _COLUMNS = ("count", "nulls", "min", "q05", "q50", "q95", "max", "mean", "std")
 _MOMENTS = ("min", "max", "mean", "std")
@@ -24,7 +24,7 @@ def merge(directories: list[Path], output: OutputArgument, *, json: JsonOption =
     Options:
         directories (DIR): Directories of the datasets.
     """
-    from throwcollect.derive.derivation import merge as merge_datasets
+    from throwcollect.dataset.derive.derivation import merge as merge_datasets
 
     _show(output, merge_datasets(directories, output), json=json)
 
@@ -35,7 +35,7 @@ def filter_(directory: DatasetArgument, output: OutputArgument, *, where: str, j
     Options:
         where (CONDITION): Such as: landing_x_m > 1.5
     """
-    from throwcollect.derive.derivation import filter_trials
+    from throwcollect.dataset.derive.derivation import filter_trials
 
     _show(output, filter_trials(directory, output, where=where), json=json)
 
@@ -49,7 +49,7 @@ def sample(
         count (K): Number of trials.
         seed (S 0..): Seed of the choice.
     """
-    from throwcollect.derive.derivation import sample as sample_trials
+    from throwcollect.dataset.derive.derivation import sample as sample_trials
 
     _show(output, sample_trials(directory, output, count=count, seed=seed), json=json)
 
@@ -70,8 +70,8 @@ def split(
         cells (EXPRESSION=WIDTH): Axis of the cells that stay whole; may be repeated.
         seed (S 0..): Seed of the choice.
     """
-    from throwcollect.derive.split import SQUARES
-    from throwcollect.derive.split import split as split_dataset
+    from throwcollect.dataset.derive.split import SQUARES
+    from throwcollect.dataset.derive.split import split as split_dataset
 
     found = split_dataset(directory, output, fractions=fractions, cells=cells or SQUARES, seed=seed)
     # Each trial with an episode is in one part, so shares are shares of these.
@@ -102,7 +102,7 @@ def render_sensors(
         where (CONDITION): Take only trials that fulfil it, such as: landing_x_m > 1.5
     """
     from throwcollect.config.loader import load_sensors
-    from throwcollect.derive.derivation import render_sensors as render
+    from throwcollect.dataset.derive.derivation import render_sensors as render
 
     with load_sensors(sensors) as sections:
         derived = render(directory, output, sections, where=where)
@@ -111,7 +111,7 @@ def render_sensors(
 
 def stats(directory: DatasetArgument, *, json: JsonOption = False) -> None:
     """Print statistics of the table of throws and of all trajectories."""
-    from throwcollect.derive.statistics import statistics
+    from throwcollect.dataset.derive.statistics import statistics
 
     found = statistics(directory)
     show(found, *_make_tables(found), json=json)

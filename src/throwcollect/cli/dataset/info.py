@@ -55,7 +55,7 @@ def verify(
     """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.verify import find_unchecked
-    from throwcollect.replay.audit import verify_dataset
+    from throwcollect.replay import verify_dataset
 
     findings = verify_dataset(directory, replay=replay, render=render, processes=count_cores())
     if findings:
@@ -71,7 +71,7 @@ def verify(
 def _describe_replay(dataset: Dataset, replay: int | None) -> str:
     """Say how many throws were simulated again in a dataset in which nothing is wrong, and how to simulate more."""
     from throwcollect.config.policy import SESSION
-    from throwcollect.replay.audit import count_replayed
+    from throwcollect.replay import count_replayed
 
     if (policy := dataset.config.task.policy) is not None and policy.use == SESSION:
         return "replayed: none, as clients of a session commanded the joints, which cannot be simulated again"
@@ -106,7 +106,7 @@ def replay(
         engine (NAME): Simulate them with another engine: how much differs?
     """
     from throwcollect.dataset.reader import Dataset
-    from throwcollect.replay.audit import replay_throws, select_trials
+    from throwcollect.replay import replay_throws, select_trials
 
     if bool(trials) == everything:
         raise ConfigError("which throws?", expected="either --trial K, which may be repeated, or --all")
@@ -136,7 +136,7 @@ def replay(
 
 def _compare_engines(directory: Path, engine: str, trials: Sequence[int], *, json: bool) -> None:
     """Simulate throws with another engine, and print by how much the results differ."""
-    from throwcollect.replay.audit import distributions, simulate_with
+    from throwcollect.replay import distributions, simulate_with
 
     deviations = list(simulate_with(directory, engine, trials))
     found = distributions(deviations)

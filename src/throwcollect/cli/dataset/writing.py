@@ -28,7 +28,7 @@ def export(
         rate (HZ): Samples per second; as recorded, or as sensors have frames, if not given.
         images (WAY): How to store what sensors saw: av1, h264, png or depth (lerobot), arrays (hdf5, npz), or none.
     """
-    from throwcollect.export.export import export as export_dataset
+    from throwcollect.publish.export.export import export as export_dataset
 
     exported = export_dataset(directory, output, to=to, rate_hz=rate, images=images)
     text = (
@@ -48,7 +48,7 @@ def report(
         output (--output -o FILE): HTML file to write; DIR.html beside the dataset if not given.
         model (MODEL): Also show a model of the dataset, and how it hits.
     """
-    from throwcollect.report.sections import write_report
+    from throwcollect.publish.report.sections import write_report
 
     resolved = directory.resolve()
     page = output or resolved.with_name(f"{resolved.name}.html")
@@ -65,7 +65,7 @@ def view(
     Options:
         trials (3,5,7-9): Trials to show; all if not given.
     """
-    from throwcollect.view.viewer_directory import view as write_view
+    from throwcollect.publish.view.viewer_directory import view as write_view
 
     written = write_view(directory, output, None if trials is None else read_trials(trials))
     text = (
@@ -111,7 +111,7 @@ def render(
         slow (FACTOR 0.5..20): How many times slower than it was.
         strip (COUNT 1..50): Pictures of a throw in a .png, from its start to its end.
     """
-    from throwcollect.view.animation import render as render_throws
+    from throwcollect.publish.view.animation import render as render_throws
 
     pixels = None
     if size is not None:
@@ -138,7 +138,7 @@ def images(
         sensor (NAME): Name of the sensor.
         trials (3,5,7-9): Trials to write; all if not given.
     """
-    from throwcollect.view.sensor_pictures import write_images
+    from throwcollect.publish.view.sensor_pictures import write_images
 
     count = write_images(directory, output, sensor=sensor, trials=None if trials is None else read_trials(trials))
     show({"directory": output, "pictures": count}, f"{output}: {format_count(count, 'picture')}", json=json)

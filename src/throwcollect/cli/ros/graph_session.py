@@ -15,8 +15,8 @@ from throwcollect.ros.graph_names import make_own_name
 from throwcollect.wording import suggest
 
 if TYPE_CHECKING:
+    from throwcollect.collect.runs.run import Run
     from throwcollect.ros.connection import Connection
-    from throwcollect.runs.run import Run
 
 _WAIT_S = 0.2
 """Longest single wait: rclpy handles signals only between two waits."""
@@ -39,7 +39,7 @@ class GraphSession:
         while not done():
             self._executor.spin_once(timeout_sec=_WAIT_S)
 
-    def look_around(self) -> None:
+    def wait_for_discovery(self) -> None:
         """Wait until other nodes are discovered, and nothing new follows for a moment.
 
         DDS reports each node and topic as it finds it, and never that it has found all of them.
@@ -72,8 +72,8 @@ class GraphSession:
 def find_run_and_connection(run: str | None) -> tuple[Run, Connection]:
     """Find a run, or the only one that lives, and the connection by which our own processes join it."""
     # These load Zenoh, and every command of throwcollect loads this module.
+    from throwcollect.collect.runs.run_selection import find_run_to_change, require_living
     from throwcollect.ros.connection import Connection
-    from throwcollect.runs.run_selection import find_run_to_change, require_living
 
     found = find_run_to_change(run)
     record = require_living(found)
@@ -122,7 +122,7 @@ def join_graph(run: str | None) -> Iterator[GraphSession]:
         session = GraphSession()
         try:
             if Middleware.of_process().is_fast_dds:
-                session.look_around()
+                session.wait_for_discovery()
             yield session
         finally:
             session.close()

@@ -28,8 +28,8 @@ from throwcollect.engines.engine import (
     body_of,
 )
 from throwcollect.engines.grip import ANY_INERTIA, HELD_LINK, add_held_link
+from throwcollect.engines.native_reading import reading_natively
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.native_reading import reading_natively
 
 Surface = tuple[int, int]
 """Body and link number in Bullet."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from throwcollect.collect.coordinator_node.simulation_client import EPISODE_TOPIC
 from throwcollect.errors import ConfigError
+from throwcollect.plan.lease import LEASES
 from throwcollect.ros.graph_names import absolute_name
-from throwcollect.ros.nodes.coordinator.simulation_client import EPISODE_TOPIC
-from throwcollect.trial.lease import LEASES
 
 _GUARDED = {
     EPISODE_TOPIC: "nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up",

@@ -37,7 +37,7 @@ class SlideTask(Task[SlideResult]):
     outcomes = SlideOutcome
     results = SlideResult
     reasons = "Why the puck did not simply come to rest; null if it did."
-    report = "throwcollect.report.slide.slide_sections:report_slides"
+    report = "throwcollect.publish.report.slide.slide_sections:report_slides"
 
     def __init__(self, config: Config) -> None:
         super().__init__(config)

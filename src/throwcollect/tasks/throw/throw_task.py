@@ -16,6 +16,7 @@ from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.reproducible_math import add_up
 from throwcollect.robots.surroundings import object_of
 from throwcollect.robots.tool_motion import ToolMotion
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import Outcome
 from throwcollect.tasks.task import Failure, Task
@@ -29,7 +30,6 @@ from throwcollect.tasks.throw.flight import (
 )
 from throwcollect.tasks.throw.throw_config import SwingConfig
 from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
-from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
 
 _LEAST_SHARE = 0.25
@@ -69,7 +69,7 @@ class ThrowTask(Task[ThrowResult]):
     outcomes: ClassVar[type[Outcome]] = ThrowOutcome
     results = ThrowResult
     reasons = "Why the throw did not simply land; null if it did."
-    report = "throwcollect.report.throw.throw_sections:report_throws"
+    report = "throwcollect.publish.report.throw.throw_sections:report_throws"
 
     def assess(
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader

@@ -36,14 +36,14 @@ from rclzenoh.api import (
 from rclzenoh.interfaces import get_action, get_message
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.cli.main import main
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.runs.records import Records
-from throwcollect.runs.run import Run
-from throwcollect.runs.run_record import RunRecord
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")

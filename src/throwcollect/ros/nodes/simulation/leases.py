@@ -7,8 +7,8 @@ from collections.abc import Iterable
 
 from throwcollect.episode.episode_message import Episode, TrialRefusal
 from throwcollect.errors import ThrowcollectError
+from throwcollect.plan.lease import Lease
 from throwcollect.sim.live import LiveSimulator
-from throwcollect.trial.lease import Lease
 
 _REMEMBERED = 1000
 """Number of ended leases that are remembered, because a list sent earlier may still name them; no list is as long."""

@@ -16,6 +16,7 @@ from throwcollect.episode.episode_message import pack
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Topic
 from throwcollect.errors import ConfigError, DatasetError, MemberError
+from throwcollect.plan.lease import LEASES, Lease, leases_from_json
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.ros import (
     DurabilityPolicy,
@@ -40,7 +41,6 @@ from throwcollect.ros.nodes.simulation.stepping import Stepping
 from throwcollect.run_key import Signer
 from throwcollect.sim.live import LiveSimulator, StateCode
 from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
-from throwcollect.trial.lease import LEASES, Lease, leases_from_json
 from throwcollect.units import NS_PER_S
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.body_files import place_spawned, read_spawned
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import bodies_of
+from throwcollect.robots.tools.tool import tool_of
 from throwcollect.ros import Node
 from throwcollect.ros.msg import EntityState, Spawnable
 from throwcollect.ros.nodes.simulation.control import offer, read_state
 from throwcollect.ros.srv import DeleteEntity, GetSpawnables, SpawnEntity
 from throwcollect.sim.live import LiveSimulator
-from throwcollect.tools.tool import tool_of
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from throwcollect.episode.episode_message import TrialRefusal
 from throwcollect.errors import ThrowcollectError
+from throwcollect.plan.lease import Lease
 from throwcollect.ros.nodes.simulation.leases import LeaseQueue
 from throwcollect.run_key import Signer
-from throwcollect.trial.lease import Lease
 
 A, B, C = (Lease.make("/sim_0", trial, {}, Signer(b"")) for trial in range(3))
 BAD = Lease.make("/sim_0", 99, {}, Signer(b""))

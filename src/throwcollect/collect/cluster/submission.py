@@ -1,0 +1,115 @@
+"""The record of what was submitted for a dataset; any machine that sees the dataset's directory can go on with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.collect.cluster import slurm
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.files import write_file
+from throwcollect.plan.slice import Slice
+
+CLUSTER = "cluster"
+"""Name of the directory of scripts and logs, inside the directory of a dataset."""
+
+_FILE = "submission.json"
+
+
+@dataclass(frozen=True)
+class Job:
+    """An array that was submitted, and the job that joins the slices after it.
+
+    Attributes:
+        array: Number of the array; empty if the slices were only to be joined.
+        join: Number of the joining job; empty for one run on several nodes.
+        slices: Indexes of the slices that the array collects.
+        submitted: Time of the submission.
+    """
+
+    array: str
+    join: str
+    slices: tuple[int, ...]
+    submitted: datetime
+
+
+@dataclass(frozen=True)
+class Submission:
+    """Everything that was submitted for a dataset.
+
+    Attributes:
+        name: Name of the collection.
+        tasks: Number of slices; of nodes, if it is one run.
+        program: Words that start ``throwcollect`` outside of an image.
+        image: Image that tasks run in; None for none.
+        jobs: The jobs, in the order in which they were submitted.
+        live: Whether it is one run on several nodes, and not an array.
+    """
+
+    name: str
+    tasks: int
+    program: tuple[str, ...]
+    image: str | None
+    jobs: tuple[Job, ...] = ()
+    live: bool = False
+
+    @property
+    def slices(self) -> tuple[Slice, ...]:
+        """All slices; none if it is one run."""
+        return () if self.live else Slice.all_of(self.tasks)
+
+
+_JSON = TypeAdapter(Submission)
+
+
+def is_submitted(directory: Path) -> bool:
+    """Whether something was submitted for a dataset."""
+    return (directory / CLUSTER / _FILE).is_file()
+
+
+def read_submission(directory: Path) -> Submission:
+    """Read the record of a dataset."""
+    path = directory / CLUSTER / _FILE
+    try:
+        return _JSON.validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise ConfigError(f"{path}: does not say what was submitted: {error}") from error
+
+
+def write_submission(directory: Path, submission: Submission) -> None:
+    """Write the record of a dataset, whole or not at all."""
+    write_file(directory / CLUSTER / _FILE, _JSON.dump_json(submission, indent=1) + b"\n")
+
+
+def format_indexes(indexes: tuple[int, ...]) -> str:
+    """Write indexes, which ascend, as ``sbatch --array`` takes them, such as ``0-4,7``."""
+    ranges: list[list[int]] = []
+    for index in indexes:
+        if ranges and index == ranges[-1][1] + 1:
+            ranges[-1][1] = index
+        else:
+            ranges.append([index, index])
+    return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in ranges)
+
+
+def find_queued() -> list[Path]:
+    """Find the directories of this user's submitted datasets that have jobs in the queue; none without Slurm."""
+    try:
+        return [path for path in map(Path, slurm.find_directories()) if is_submitted(path)]
+    except (ConfigError, WorkerError):
+        return []
+
+
+def find_submitted(named: str | None) -> Path | None:
+    """Find the submitted dataset that a command names by its directory; None if it names something else.
+
+    Without a name, the command means the only dataset in the queue that lies below the current directory.
+    """
+    if named is not None:
+        # An empty name would be the path of the current directory.
+        return Path(named).absolute() if named and is_submitted(Path(named)) else None
+    here = [each for each in find_queued() if each.is_relative_to(Path.cwd())]
+    return here[0] if len(here) == 1 else None

@@ -1,0 +1,28 @@
+"""The interface by which a run tells a program or a terminal what goes on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    # A command makes its reporter before it imports what takes long.
+    from throwcollect.collect.coordinator.progress import Progress
+
+
+class Reporter:
+    """Receives reports on a run that this process prepares or launches; this class itself ignores all of them."""
+
+    def update(self, progress: Progress) -> None:
+        """Take in a progress report of the coordinator."""
+
+    def update_plan(self, checked: int, trials: int) -> None:
+        """Take in how many of a plan's trials have been checked; an error that is raised here ends the planning."""
+
+    def say(self, line: str) -> None:
+        """Take in a line of information."""
+
+    def warn(self, line: str) -> None:
+        """Take in a warning."""
+
+
+SILENT = Reporter()

@@ -1,0 +1,56 @@
+"""Runs: the command line and Python programs prepare, launch, follow, scale and end them with these functions.
+
+A name is imported when it is used for the first time; see ``docs/running.md``.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from throwcollect.collect.coordinator.reporter import Reporter as Reporter
+    from throwcollect.collect.runs.control import down as down
+    from throwcollect.collect.runs.control import scale as scale
+    from throwcollect.collect.runs.control import stop as stop
+    from throwcollect.collect.runs.following import RunUpdate as RunUpdate
+    from throwcollect.collect.runs.following import follow as follow
+    from throwcollect.collect.runs.following import wait as wait
+    from throwcollect.collect.runs.preparation import prepare as prepare
+    from throwcollect.collect.runs.preparation import resume as resume
+    from throwcollect.collect.runs.run import Run as Run
+    from throwcollect.collect.runs.run_record import Summary as Summary
+    from throwcollect.collect.runs.run_selection import find as find
+else:
+    _PLACES = {
+        "Reporter": "collect.coordinator.reporter:Reporter",
+        "Run": "collect.runs.run:Run",
+        "RunUpdate": "collect.runs.following:RunUpdate",
+        "Summary": "collect.runs.run_record:Summary",
+        "down": "collect.runs.control:down",
+        "find": "collect.runs.run_selection:find",
+        "follow": "collect.runs.following:follow",
+        "prepare": "collect.runs.preparation:prepare",
+        "resume": "collect.runs.preparation:resume",
+        "scale": "collect.runs.control:scale",
+        "stop": "collect.runs.control:stop",
+        "wait": "collect.runs.following:wait",
+    }
+    __all__ = list(_PLACES)
+
+    def __getattr__(name: str) -> object:
+        """Import the object with a public name.
+
+        Raises:
+            AttributeError: If there is no such name.
+            MissingExtraError: If the object needs an extra that is not installed.
+        """
+        from importlib import import_module
+
+        from throwcollect.extras import explain_missing
+
+        if name not in _PLACES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        module, name = _PLACES[name].split(":")
+        with explain_missing():
+            return getattr(import_module(f"throwcollect.{module}"), name)
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})

@@ -1,0 +1,273 @@
+"""Begins runs in processes of their own, which also make the plan, so that a client does not have to wait for it.
+
+Such a run has a record from its first moment. If its preparation fails, the error is written into that record, too.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from functools import partial
+from pathlib import Path
+from typing import IO, Literal, cast
+
+from pydantic import TypeAdapter
+
+from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.coordinator.reporter import Reporter
+from throwcollect.collect.runs.component_container import DESCRIPTION, check_request, launch_container
+from throwcollect.collect.runs.launcher import launch
+from throwcollect.collect.runs.preparation import MANY_TRIALS, prepare, resume
+from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import Origin, Planning, RunFailure, RunRecord
+from throwcollect.collect.runtimes.node_logs import NodeLogs
+from throwcollect.collect.runtimes.nodes import LAUNCHER
+from throwcollect.collect.runtimes.registry import choose, get_runtime
+from throwcollect.config.containers import ContainerSpec
+from throwcollect.config.loader import load, load_locating_errors
+from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
+from throwcollect.dataset.carried_robot import write_config
+from throwcollect.dataset.directory import config_path
+from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
+from throwcollect.files import open_log
+from throwcollect.interruption import stop_signals
+from throwcollect.ros.router_endpoint import reserve_port
+from throwcollect.side_by_side import count_cores
+
+_WRITE_PLANNING_S = 1.0
+
+
+@dataclass(frozen=True)
+class Order:
+    """What `begin_run` sends to the new process: its arguments, with absolute paths."""
+
+    config: Path
+    overrides: tuple[str, ...]
+    output: Path
+    resumed: bool = False
+
+
+_ORDERS = TypeAdapter(Order)
+_SPECS = TypeAdapter(ContainerSpec)
+
+
+def begin_run(
+    config: Path,
+    *,
+    overrides: Sequence[str],
+    output: Path,
+    run: str | None = None,
+    origin: Origin | None = None,
+    kind: Literal["collection", "session"] = "collection",
+    resumed: bool = False,
+) -> Run:
+    """Begin a run in a process of its own, which outlives this one; return as soon as the run has a record.
+
+    Args:
+        config: The configuration's file.
+        overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
+        output: Directory of the dataset, new or empty unless it is resumed; a session makes it when clients record.
+        run: Id of the run; None makes a new one.
+        origin: The request of a client; None if no client asks.
+        kind: Kind of the run.
+        resumed: Whether the run continues the dataset that the directory holds.
+    """
+    read = load(config, overrides)
+    if kind == "session":
+        _check_session(read)
+    made = Records().new(read.name, run=run)
+    directory = made.files / "data" if kind == "session" else output
+    record = replace(
+        # The directory of the dataset has to be empty until the plan is made, so logs cannot lie there yet.
+        RunRecord.begin(made.id, read.name, directory, logs=made.files / "logs", kind=kind, origin=origin),
+        domain_id=read.run.domain_id,
+        simulations=read.run.simulations,
+    )
+    order = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
+    return _begin(made, record, _ORDERS.dump_json(order))
+
+
+def begin_container(spec: ContainerSpec, *, run: str, origin: Origin, urdf: Path | None) -> Run:
+    """Begin a run that is a container of the catalogue, in a process of its own, as `begin_run` does.
+
+    `urdf` is a file with a description of the robot for viewers; None if the component has none.
+    """
+    check_request(spec, origin)
+    made = Records().new(origin.component, run=run)
+    directory, logs = made.files / "data", made.files / "logs"
+
+    def lay_out() -> None:
+        directory.mkdir()
+        if urdf is not None:
+            shutil.copyfile(urdf, directory / DESCRIPTION)
+
+    record = RunRecord.begin(
+        made.id, origin.component, directory, logs=logs, runtime="docker", kind="container", origin=origin
+    )
+    return _begin(made, record, _SPECS.dump_json(spec), lay_out)
+
+
+def _begin(run: Run, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
+    """Start the process of a run, write the record with its id, send it the order; `lay_out` makes further files."""
+    process: subprocess.Popen[bytes] | None = None
+    try:
+        logs = Path(record.logs)
+        logs.mkdir(exist_ok=True)
+        lay_out()
+        # The process needs a second until it can handle signals; a request to stop stays blocked until then.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
+        try:
+            process = run.start_process(logs, stdin=subprocess.PIPE)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        run.write(replace(record, launcher=process.pid))
+        # The process waits for the order before it changes the record, so the record has to be written first.
+        with cast(IO[bytes], process.stdin) as pipe:
+            pipe.write(order)
+    except BaseException as error:
+        if process is not None:
+            process.kill()
+            process.wait()
+        run.forget()
+        if isinstance(error, OSError):
+            raise WorkerError(f"run {run.id} cannot be begun: {error}") from error
+        raise
+    run.close()
+    return run.now()
+
+
+def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interruptions: Callable[[], int]) -> None:
+    """Launch a run in the process that `Run.start_process` has started, and prepare it before, if there is an order.
+
+    This process has inherited the locked file. Signals that ask it to stop may be blocked until it calls this function;
+    from now on, `interruptions` counts them.
+    """
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
+    run = Records().inherit(id, lock)
+    if not order:
+        launch(run, interruptions, config=load(config_path(run.context.directory)), reporter=reporter)
+        return
+    if run.record.kind == "container":
+        launch_container(run, _SPECS.validate_json(order), reporter=reporter, interruptions=interruptions)
+        return
+    log = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
+    # If anything fails before the launch, the error is written into the record, and then the files of the run are
+    # removed.
+    with ExitStack() as made:
+        try:
+            planner = _Planner(run, reporter, interruptions)
+            if _prepare(run, _ORDERS.validate_json(order), planner) is None:
+                run.update(ended=datetime.now(timezone.utc), exit_code=0)
+                run.close()
+                return
+            made.enter_context(run)
+            _move_log(log, NodeLogs(Path(run.record.logs)).path(LAUNCHER))
+            # The last steps of the preparation do not check for a request to stop, and may have taken long.
+            planner.end_if_asked()
+        except ThrowcollectError as error:
+            end = datetime.now(timezone.utc)
+            run.update(ended=end, exit_code=error.exit_code, failure=RunFailure.of(error), planning=None)
+            raise
+        run.collect(interruptions=interruptions)
+
+
+class _Planner(Reporter):
+    """Writes the progress of the plan into the record, ends the planning if somebody asks to stop, passes all else on.
+
+    It is the reporter of the preparation, and passes on to the reporter of the run.
+    """
+
+    def __init__(self, run: Run, reporter: Reporter, interruptions: Callable[[], int]) -> None:
+        self._onlooker = reporter
+        self._run = run
+        self._interruptions = interruptions
+        self._write_at = 0.0
+
+    def update(self, progress: Progress) -> None:
+        self._onlooker.update(progress)
+
+    def say(self, line: str) -> None:
+        self._onlooker.say(line)
+
+    def warn(self, line: str) -> None:
+        self._onlooker.warn(line)
+
+    def update_plan(self, checked: int, trials: int) -> None:
+        """Take in how many of a plan's trials have been checked."""
+        self.end_if_asked()
+        if trials >= MANY_TRIALS and time.monotonic() >= self._write_at:
+            self._write_at = time.monotonic() + _WRITE_PLANNING_S
+            # If the record cannot be written, planning goes on; the first write after the plan reports the error.
+            with suppress(ConfigError):
+                self._run.update(planning=Planning(checked, trials))
+
+    def end_if_asked(self) -> None:
+        """End the preparation if somebody has asked to stop."""
+        if self._interruptions():
+            raise Interrupted("stopped before any node was started")
+
+
+def _move_log(before: Path, after: Path) -> None:
+    """Move the launcher's log to the logs of the nodes, whose directory exists by now, and print into it."""
+    try:
+        # If this process prints somewhere else, such as into a terminal, there is no log to move.
+        if before == after or not os.path.samestat(os.fstat(1), before.stat()):
+            return
+        after.parent.mkdir(exist_ok=True)
+        with open(open_log(after), "ab") as log:
+            log.write(before.read_bytes())
+            log.flush()
+            for output in (1, 2):
+                os.dup2(log.fileno(), output)
+        before.unlink()
+    except OSError as error:
+        raise WorkerError(f"{after}: the launcher cannot write there: {error.strerror}") from error
+
+
+def _prepare(run: Run, order: Order, reporter: Reporter) -> Run | None:
+    """Prepare a run; None if nothing is left to do."""
+    if run.record.kind == "session":
+        return _prepare_session(run, order, reporter)
+    cores = count_cores()
+    if order.resumed:
+        return resume(order.output, overrides=order.overrides, processes=cores, reporter=reporter, run=run)
+    return prepare(
+        order.config, overrides=order.overrides, output=order.output, processes=cores, reporter=reporter, run=run
+    )
+
+
+def _prepare_session(run: Run, order: Order, reporter: Reporter) -> Run:
+    with load_locating_errors(order.config, order.overrides) as read:
+        _check_session(read)
+        # Clients of a session act in real time. The file has the factor, as nodes and watchers take it from there.
+        config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
+        directory = run.context.directory
+        directory.mkdir(exist_ok=True)
+        write_config(directory, config)
+        reserve_port(config.run).close()
+        choice = choose(config, say=reporter.say, warn=reporter.warn)
+        simulations = choice.runtime.simulations(config)
+        # Containers do not see the directory.
+        recordings = str(order.output) if choice.name == "local" else None
+        run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations, recordings=recordings)
+        # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
+        choice.runtime.host(run.context, config, warn=reporter.warn).close()
+        launching = partial(launch, config=config, reporter=reporter)
+        return run.prepared(config, directory, launching, held=ExitStack(), undo=ExitStack())
+
+
+def _check_session(config: Config) -> None:
+    """Check that a session has nodes to which its clients can talk."""
+    if config.run.runtime != "auto" and not get_runtime(config.run.runtime).can_be_scaled:
+        raise ConfigError(
+            [Problem(f"should have nodes for clients to talk to, got {config.run.runtime}", key="run.runtime")]
+        )

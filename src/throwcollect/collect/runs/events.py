@@ -1,0 +1,114 @@
+"""The events of a run: one JSON document a line in ``events.jsonl`` beside the logs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, Literal
+
+from throwcollect.collect.runtimes.runtime import NodeState, RunEvent
+from throwcollect.files import open_log
+from throwcollect.wording import format_count
+
+EVENTS = "events.jsonl"
+
+NodeEvent = Literal["started", "ready", "lost", "restarting", "given up", "frozen", "continued", "removed"]
+
+_ALARMING = ("lost", "given up", "frozen")
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event of a run, or of one of its nodes.
+
+    Attributes:
+        time: Time of the event, in the form of RFC 3339.
+        event: Kind of the event: a `RunEvent`, or a `NodeEvent` if there is a node.
+        handle: Process or container id of a node that was started.
+        reason: Why a node or the run ended, in words.
+        simulations: Number of simulations that the run is to have from now on.
+        exit_code: Exit code of a run that has ended.
+    """
+
+    time: str
+    run: str
+    event: str
+    node: str | None = None
+    handle: str | None = None
+    reason: str | None = None
+    simulations: int | None = None
+    exit_code: int | None = None
+
+    @property
+    def alarming(self) -> bool:
+        """Whether a terminal that follows the run should show the event: a node was lost or is frozen."""
+        return self.node is not None and self.event in _ALARMING
+
+    def __str__(self) -> str:
+        """The event in words, for people."""
+        details = [self.reason.partition("\n")[0] if self.reason else None]
+        details += [format_count(self.simulations, "simulation") if self.simulations is not None else None]
+        details += [f"exit code {self.exit_code}" if self.exit_code else None, self.handle and self.handle[:12]]
+        text = ", ".join(filter(None, details))
+        return f"{self.node or self.run} {self.event}" + (f": {text}" if text else "")
+
+
+class EventLog:
+    """Appends the events of one run to a file in its directory of logs, which is made if need be."""
+
+    def __init__(self, logs: Path, run: str) -> None:
+        self._path = logs / EVENTS
+        self._run = run
+
+    def run_event(self, event: RunEvent, **details: Any) -> None:
+        """Append an event of the run, with fields of `Event` as details."""
+        self._append([Event(_now(), self._run, event, **details)])
+
+    def node_events(self, before: Sequence[NodeState], after: Sequence[NodeState]) -> None:
+        """Append an event for each difference between two lists of states of the nodes."""
+        now = _now()
+        known = {state.name: state for state in before}
+        happened = [
+            (state.name, *change) for state in after for change in _find_changes(known.pop(state.name, None), state)
+        ]
+        happened += [(name, "removed", None, None) for name in known]
+        self._append(Event(now, self._run, event, name, handle, reason) for name, event, handle, reason in happened)
+
+    def _append(self, events: Iterable[Event]) -> None:
+        lines = [
+            json.dumps({key: value for key, value in asdict(event).items() if value is not None}) for event in events
+        ]
+        if lines:
+            with open(open_log(self._path), "a", encoding="utf-8") as file:
+                file.write("\n".join([*lines, ""]))
+
+
+def parse(line: str) -> Event | None:
+    """Read an event from a line; None if the line is incomplete."""
+    try:
+        return Event(**json.loads(line))
+    except (ValueError, TypeError):
+        return None
+
+
+def _find_changes(old: NodeState | None, new: NodeState) -> Iterator[tuple[NodeEvent, str | None, str | None]]:
+    """Compare two states of a node: event, handle and reason of each change."""
+    old = old or NodeState(new.name, "starting", 0, None, None)
+    # A node may have ended and started again between two looks, so ends are seen by the number of restarts.
+    if new.restarts > old.restarts or (new.status == "lost" and old.status != "lost"):
+        yield "lost", None, new.last_end
+        yield "given up" if new.status == "lost" else "restarting", None, None
+    if new.handle is not None and new.handle != old.handle:
+        yield "started", new.handle, None
+    if new.status == "frozen" and old.status != "frozen":
+        yield "frozen", None, None
+    # Router and coordinator count as running as soon as they have a handle, so that they have no event `ready`.
+    if new.status == "running" and new.handle == old.handle and old.status in ("starting", "frozen"):
+        yield "ready" if old.status == "starting" else "continued", None, None
+
+
+def _now() -> str:
+    return datetime.now(timezone.utc).isoformat(timespec="milliseconds")

@@ -1,0 +1,139 @@
+"""Follows a run while it lives: its progress, the logs of its nodes, and its events."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.runs.events import EVENTS, Event, parse
+from throwcollect.collect.runs.run import Run
+from throwcollect.collect.runs.run_record import Summary
+from throwcollect.collect.runs.run_selection import describe_death
+from throwcollect.collect.runtimes.node_logs import NodeLogs, Tail
+from throwcollect.errors import ConfigError
+from throwcollect.wording import suggest
+
+_POLL_S = 0.05
+_READ_S = 0.2
+
+
+@dataclass(frozen=True)
+class RunUpdate:
+    """A run as it was at one moment, and what has happened since the update before.
+
+    Attributes:
+        progress: The latest report of the coordinator since the last update; None if there was none.
+        events: Events since the last update.
+    """
+
+    run: Run
+    progress: Progress | None = None
+    events: tuple[Event, ...] = ()
+
+
+def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[RunUpdate]:
+    """Look at a run several times a second until it ends, or `keep_on` returns false.
+
+    A program may follow several runs at once.
+
+    Yields:
+        An update; the last one shows a run that has ended or died, unless `keep_on` returned false.
+    """
+    run.record.middleware.joining.settle()
+    from throwcollect.collect.runtimes.run_listener import RunListener
+
+    events = Tail(_locate_events(run))
+    events.skip()
+    reports: list[Progress] = []
+    with RunListener(reports.append) as listener:
+        yield RunUpdate(run)
+        while run.status == "running" and keep_on():
+            reports.clear()
+            listener.spin(run.connection, _POLL_S)
+            # The launcher writes events before the record, so the last record is read before the last events.
+            run = run.now()
+            happened = tuple(event for event, _ in _read_new_events(events, run))
+            yield RunUpdate(run, reports[-1] if reports else None, happened)
+
+
+def wait(run: Run) -> Summary:
+    """Wait until a run has ended.
+
+    Returns:
+        The summary of the dataset; its outcomes tell whether trials are lost.
+    """
+    while run.status == "running":
+        time.sleep(_READ_S)
+        run = run.now()
+    if run.status == "died":
+        raise describe_death(run)
+    if run.record.summary is None:
+        raise run.record.error or describe_death(run)
+    return run.record.summary
+
+
+def read_logs(
+    run: Run, nodes: Collection[str], *, follow: bool, keep_on: Callable[[], bool] = lambda: True
+) -> Iterator[tuple[str, str, int]]:
+    """Read the logs of these nodes of a run; of all nodes if none is named.
+
+    With `follow`, this function goes on with new lines until the run ends, or `keep_on` returns false.
+
+    Yields:
+        The name of a node, a line that it printed, and the length of the longest name so far.
+    """
+    files = NodeLogs(Path(run.record.logs)).files()
+    known = {*files, *(state.name for state in run.record.nodes)}
+    if unknown := [node for node in nodes if node not in known]:
+        raise ConfigError(f"run {run.id}: no node {unknown[0]!r} has printed anything{suggest(unknown[0], files)}")
+    tails: dict[str, Tail] = {}
+    for now, last in _read_repeatedly(run, follow=follow, keep_on=keep_on):
+        files = NodeLogs(Path(now.record.logs)).files()
+        width = max(map(len, files), default=0)
+        for name, path in files.items():
+            if not nodes or name in nodes:
+                tail = tails.setdefault(name, Tail(path))
+                tail.path = path
+                for line in tail.lines(torn=last):
+                    yield name, line, width
+
+
+def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[tuple[Event, str]]:
+    """Read the events of a run, from its start until it ends or `keep_on` returns false.
+
+    Yields:
+        An event, and the line of JSON in which it is written.
+    """
+    tail = Tail(_locate_events(run))
+    for now, _ in _read_repeatedly(run, follow=True, keep_on=keep_on):
+        yield from _read_new_events(tail, now)
+
+
+def _read_new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
+    """The events of a run that were written since the last call, and the line of each."""
+    # A run that is begun in the background moves its events and logs to another directory once its plan is made.
+    tail.path = _locate_events(run)
+    for line in tail.lines():
+        # If the run resumes a dataset, the file has the events of earlier runs, too.
+        if (event := parse(line)) is not None and event.run == run.id:
+            yield event, line
+
+
+def _locate_events(run: Run) -> Path:
+    return Path(run.record.logs) / EVENTS
+
+
+def _read_repeatedly(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
+    """Look at a run several times a second while it lives (if it is to be followed), and once at the end.
+
+    Yields:
+        The run as it is now, and whether this is the last look.
+    """
+    while follow and keep_on() and (run := run.now()).status == "running":
+        yield run, False
+        time.sleep(_READ_S)
+    # The logs are read once more after the end, because nodes may have printed since the last look.
+    yield run, True

@@ -1,0 +1,209 @@
+"""Adds simulations of this machine to a run of another machine, by its token; they may leave it again at any time."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import os
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.build import build_digest
+from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.coordinator.reporter import SILENT, Reporter
+from throwcollect.collect.runtimes.local import LocalNodes
+from throwcollect.collect.runtimes.nodes import (
+    CONFIGURATION,
+    LAUNCHER,
+    ROBOT_FILES,
+    simulation_name_of,
+    simulation_nodes,
+)
+from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.supervisor import Supervisor
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.dataset.carried_robot import unpack_robot
+from throwcollect.errors import ConfigError, UnreachableError, WorkerError
+from throwcollect.files import write_file
+from throwcollect.plan.conditions import build_of
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import split_address
+from throwcollect.run_key import RunKey
+from throwcollect.wording import format_count
+
+_START = "tc2."
+"""Beginning of every token; the number is the version of the format."""
+_ANSWER_S = 15.0
+"""Time in which the router, and then the launcher, has to answer."""
+_POLL_S = 0.1
+_SILENT_S = 120.0
+"""If no report arrives for this long, the run counts as over. A shorter silence may be a failure of the network."""
+_OVER_S = 5.0
+"""The same time, for a run whose last trial has ended."""
+
+
+@dataclass(frozen=True)
+class JoinToken:
+    """The facts of a run that another machine needs to join it. It holds the key of the run, so it is a secret, too.
+
+    Attributes:
+        endpoint: Endpoint at which other machines reach the router.
+        secret: Secret of the key of the run, in hexadecimal.
+        build: Digest over the code that computes the run's throws with this engine, robot, tool and task; see
+            `throwcollect.build`.
+    """
+
+    run: str
+    endpoint: str
+    secret: str
+    domain_id: int
+    engine: str
+    build: str
+    robot: str = "talos"
+    tool: str = "spoon"
+    task: str = "throw"
+    policy: str = ""
+
+    @classmethod
+    def of(cls, run: str, endpoint: str, key: RunKey, config: Config) -> JoinToken:
+        """Make the token of a run with this configuration."""
+        policy = config.task.policy.use if config.task.policy else ""
+        names = config.sim.engine, build_of(config), config.robot.name, config.tool.name, config.task.name, policy
+        return cls(run, endpoint, key.secret.hex(), config.run.domain_id, *names)
+
+    def encode(self) -> str:
+        """The token as one word."""
+        text = json.dumps(asdict(self), separators=(",", ":"))
+        return _START + base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
+
+    @classmethod
+    def decode(cls, word: str) -> JoinToken:
+        """Read a token."""
+        data = word.strip().removeprefix(_START)
+        try:
+            if data == word.strip():
+                raise ValueError(word)
+            # `encode` leaves out the padding, but `b64decode` demands it.
+            text = base64.b64decode(data + "=" * (-len(data) % 4), altchars=b"-_", validate=True)
+            token = _JSON.validate_json(text)
+            bytes.fromhex(token.secret)
+            split_address(token.endpoint)
+        except (ValueError, binascii.Error, ValidationError) as error:
+            raise ConfigError("this is no token of a run, or only a part of one", expected=f"{_START}...") from error
+        return token
+
+    def check_build(self) -> None:
+        """Check that this machine would compute the same throws as the run's own machine."""
+        if self.build != build_digest(self.engine, self.robot, self.tool, self.task, self.policy):
+            raise ConfigError(
+                f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
+                f"package of the robot {self.robot}, the tool {self.tool} or the task {self.task}, and would collect "
+                "other bytes",
+                hint="install the same versions on both machines, or the image on both; throwcollect doctor shows the "
+                "build of each",
+            )
+
+
+_JSON = TypeAdapter(JoinToken)
+
+
+def join_run(
+    word: str,
+    simulations: int,
+    *,
+    reporter: Reporter = SILENT,
+    interruptions: Callable[[], int] = lambda: 0,
+) -> None:
+    """Simulate trials of a run that another machine has begun, until the run is over; `word` is the token of the run.
+
+    If somebody asks to stop, which `interruptions` counts, simulations of other machines do the running trials again.
+    """
+    token = JoinToken.decode(word)
+    token.check_build()
+    with TemporaryDirectory(prefix="throwcollect-join-") as made:
+        scratch = Path(made)
+        key = RunKey(scratch / "key")
+        key.create(bytes.fromhex(token.secret))
+        connection = Connection(token.endpoint, key, token.domain_id)
+        text, files = _read_configuration(connection, token)
+        write_file(scratch / "config.yaml", text.encode())
+        unpack_robot(files, scratch)
+        config = load(scratch / "config.yaml")
+        reporter.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
+        context = RunContext(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
+        _simulate(LocalNodes(context, config, elsewhere=token.endpoint), connection, config, reporter, interruptions)
+
+
+def _simulate(
+    host: LocalNodes, connection: Connection, config: Config, reporter: Reporter, interruptions: Callable[[], int]
+) -> None:
+    """Keep the simulations alive until the run is over."""
+    from throwcollect.collect.runtimes.run_listener import RunListener
+
+    reports = _Reports(reporter)
+    # Names of nodes have to be unique, and several processes of one machine may join.
+    name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
+    roster = simulation_nodes([f"{name}_{index}" for index in range(host.context.simulations)], host.data)
+    with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
+        supervisor.start()
+        while not reports.over and not interruptions():
+            listener.spin(connection, _POLL_S)
+            # The first value is the end of the main node, which is on another machine.
+            _, news = supervisor.poll()
+            for line in news:
+                reporter.warn(line)
+    if interruptions():
+        reporter.say("left; the run goes on without the simulations of this machine")
+    elif reports.finished:
+        reporter.say("the run is over")
+    else:
+        raise WorkerError(
+            f"no report of the run has arrived for {_SILENT_S:g} s", hint="join it again if it still goes on"
+        )
+
+
+class _Reports:
+    """Passes reports of the coordinator on, and concludes from them whether the run is over."""
+
+    def __init__(self, reporter: Reporter) -> None:
+        self._onlooker = reporter
+        self._last_at = time.monotonic()
+        self.finished = False
+
+    def update(self, progress: Progress) -> None:
+        self._last_at = time.monotonic()
+        self.finished = progress.steps[0] >= progress.steps[1]
+        self._onlooker.update(progress)
+
+    @property
+    def over(self) -> bool:
+        return time.monotonic() > self._last_at + (_OVER_S if self.finished else _SILENT_S)
+
+
+def _read_configuration(connection: Connection, token: JoinToken) -> tuple[str, str]:
+    """Ask the launcher of the run for the configuration, and for the files of its robot."""
+    connection.middleware.joining.settle()
+    from throwcollect.collect.runtimes.run_listener import call_nodes
+    from throwcollect.ros.srv import GetParameters
+
+    request = GetParameters.Request(names=[CONFIGURATION, ROBOT_FILES])
+    try:
+        (response,) = call_nodes(
+            connection, [f"/{LAUNCHER}"], GetParameters, "get_parameters", request, patience_s=_ANSWER_S
+        )
+    except UnreachableError as error:
+        raise WorkerError(
+            f"run {token.run}: {error.message}",
+            hint="is that run over, or does a firewall keep its port closed? another run has another token",
+        ) from error
+    text, files = (value.string_value for value in response.values)
+    return text, files

@@ -1,0 +1,167 @@
+"""The record of one run: its facts, as they are written to a file."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Literal
+
+from pydantic import JsonValue
+
+from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.runtimes.runtime import NodeState, RunContext
+from throwcollect.dataset.summary import Info
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+
+VERSION: Literal[1] = 1
+"""Version of the layout of records."""
+Kind = Literal["collection", "session", "container"]
+"""A run collects a dataset, or offers simulations to clients, or is a container of the catalogue."""
+_EMBEDDED = Middleware()
+_KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
+
+
+@dataclass(frozen=True)
+class Summary(Info):
+    """Summary of a run's dataset; `open` says whether anybody could join the run."""
+
+    open: bool = False
+
+
+@dataclass(frozen=True)
+class RunFailure:
+    """The error that a run ended with, in a form that a record can hold; `errors.ThrowcollectError` has the fields."""
+
+    message: str
+    expected: str | None = None
+    evidence: str | None = None
+    hint: str | None = None
+
+    @classmethod
+    def of(cls, error: ThrowcollectError) -> RunFailure:
+        """The failure that describes an error."""
+        return cls(error.message, error.expected, error.evidence, error.hint)
+
+    def error(self, exit_code: int | None) -> ThrowcollectError:
+        """The error as it was raised; the exit code of the run determines its class."""
+        kind = next((kind for kind in _KINDS if kind.exit_code == exit_code), ThrowcollectError)
+        error = kind(self.message)
+        error.expected, error.evidence, error.hint = self.expected, self.evidence, self.hint
+        return error
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The request of a client of `serve` from which a run was made.
+
+    Attributes:
+        component: Name of the component that the run is an instance of.
+        simulations: Number of simulations; None takes that of the component's configuration.
+        changes: Dotted keys of the component's configuration that the client has changed, with their values.
+        joins: Id of the run that a container joins; None if it joins none.
+    """
+
+    component: str
+    simulations: int | None = None
+    changes: dict[str, JsonValue] = field(default_factory=dict)
+    joins: str | None = None
+
+
+@dataclass(frozen=True)
+class Planning:
+    """How far the plan of a run is: how many of its trials have been checked."""
+
+    checked: int
+    trials: int
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """The record of a run; its launcher changes it, everybody else reads it.
+
+    Attributes:
+        name: Name of the collection.
+        runtime: Name of the runtime; empty until one is chosen.
+        directory: Absolute path of the dataset.
+        logs: Absolute path of the directory with the logs.
+        launcher: Process id of the launcher.
+        simulations: Number of simulations that the run is to have.
+        endpoint: Zenoh endpoint at which this machine reaches the router; None while there is no router.
+        nodes: The nodes; empty once the run has ended.
+        progress: Last report of the coordinator; None before the first one.
+        ended: Time of the end; None before.
+        exit_code: Exit code of the launcher; None before the end.
+        left: Whether containers of the run may still exist, because its launcher did not remove them.
+        failure: The error with which the run ended; None if there was none.
+        summary: Summary of the dataset; None if the dataset is not finished.
+        middleware: The middleware that carries the messages of the nodes.
+        origin: The request of a client; None if a command or a program began the run.
+        stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.
+        planning: How far the plan is while a large one is made in the background; else None.
+        recordings: Directory into which clients of a session record; None if they cannot.
+        version: Version of this layout.
+    """
+
+    run: str
+    name: str
+    runtime: str
+    directory: str
+    logs: str
+    domain_id: int
+    started: datetime
+    launcher: int
+    simulations: int
+    endpoint: str | None = None
+    nodes: tuple[NodeState, ...] = ()
+    progress: Progress | None = None
+    ended: datetime | None = None
+    exit_code: int | None = None
+    left: bool = False
+    failure: RunFailure | None = None
+    summary: Summary | None = None
+    middleware: Middleware = _EMBEDDED
+    kind: Kind = "collection"
+    origin: Origin | None = None
+    stopping: bool = False
+    planning: Planning | None = None
+    recordings: str | None = None
+    version: Literal[1] = VERSION
+
+    @classmethod
+    def begin(
+        cls,
+        run: str,
+        name: str,
+        directory: Path,
+        *,
+        logs: Path,
+        runtime: str = "",
+        kind: Kind = "collection",
+        origin: Origin | None = None,
+    ) -> RunRecord:
+        """Make the record of a run for which no runtime is chosen and which this process launches."""
+        now = datetime.now(timezone.utc)
+        context = os.path.realpath(directory)
+        return cls(run, name, runtime, context, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
+
+    def context(self, key: RunKey) -> RunContext:
+        """The context of the run, which has this key."""
+        return RunContext(
+            run=self.run,
+            directory=Path(self.directory),
+            logs=Path(self.logs),
+            simulations=self.simulations,
+            middleware=self.middleware,
+            key=key,
+            collects=self.kind == "collection",
+            recordings=self.recordings,
+        )
+
+    @property
+    def error(self) -> ThrowcollectError | None:
+        """The error that the run ended with; None if it finished its dataset."""
+        return None if self.exit_code == 0 else (self.failure or RunFailure("")).error(self.exit_code)

@@ -1,0 +1,158 @@
+"""Collects one slice of a dataset whose plan is frozen; an array task of a scheduler does so on its machine."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from throwcollect.collect.coordinator.reporter import SILENT, Reporter
+from throwcollect.collect.coordinator.resume import refuse_changes
+from throwcollect.collect.runs.preparation import prepare_run
+from throwcollect.config.loader import load_locating_errors
+from throwcollect.config.schema import Config
+from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.creation import create
+from throwcollect.dataset.directory import PLAN, config_path
+from throwcollect.dataset.slices import (
+    find_attempts,
+    find_finished,
+    make_attempt,
+    mark_stopped,
+    publish,
+    remove_stopped,
+    take_recordings,
+)
+from throwcollect.dataset.summary import explain_loss
+from throwcollect.errors import ConfigError, Interrupted, Problem
+from throwcollect.plan.plan import Plan
+from throwcollect.plan.slice import Slice
+from throwcollect.wording import command
+
+
+def collect_slice(
+    directory: str | os.PathLike[str],
+    slice: Slice,
+    *,
+    overrides: Sequence[str] = (),
+    reporter: Reporter = SILENT,
+    interruptions: Callable[[], int] = lambda: 0,
+) -> bool:
+    """Collect one slice of a dataset, in a directory of its own until it is finished.
+
+    The collection begins with the recordings of earlier attempts at this slice.
+
+    Args:
+        directory: Directory of the dataset, with its configuration and its plan.
+        slice: The slice.
+        overrides: Keys to change that do not influence the data: ``key=value`` pairs, as ``--set`` takes them.
+        reporter: Receives the progress.
+        interruptions: How often somebody has asked to stop: the first time, running trials are still finished.
+
+    Returns:
+        Whether there was anything to do.
+    """
+    directory = Path(directory)
+    config = read_frozen_config(directory, overrides)
+    plan = Plan.read(directory / PLAN, config).slice_of(slice)
+    finished = find_finished(directory)
+    # They could never be joined, which otherwise only the join would tell, after all tasks have run.
+    if others := sorted({each.count for each in finished} - {slice.count}):
+        raise ConfigError(
+            f"{directory}: slice {slice} cannot be joined with those there, which are slices of {others[0]}",
+            expected=f"slices I/{others[0]}",
+        )
+    if slice in finished:
+        reporter.say(f"{directory}: slice {slice} is finished, nothing is left to do")
+        return False
+    again = command("up", "--slice", slice, "--output", directory)
+    scratch = _find_scratch(config)
+    earlier = find_attempts(directory, slice)
+    attempt = make_attempt(directory, slice, scratch=scratch)
+    create(attempt, plan)
+    take_recordings(earlier, attempt)
+    # A scratch directory lies on the disk of this machine, which may be lost, so then the earlier attempts are kept.
+    if scratch is None:
+        remove_stopped(earlier)
+    reporter.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
+    with ExitStack() as unpublished:
+        if scratch is not None:
+            unpublished.callback(_keep_recordings, attempt, earlier, directory, slice)
+        with prepare_run(config, attempt, plan, reporter=reporter) as run:
+            try:
+                summary = run.collect(interruptions=interruptions)
+            except Interrupted as error:
+                mark_stopped(attempt)
+                raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
+        if (lost := explain_loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
+            raise lost
+        publish(attempt, directory, slice)
+        unpublished.pop_all()
+    return True
+
+
+def _keep_recordings(attempt: Path, earlier: Sequence[Path], directory: Path, slice: Slice) -> None:
+    """Move the recordings of an attempt that is over from the scratch directory into the directory of the dataset.
+
+    The next attempt may run on another machine, which does not see the scratch directory of this one.
+    """
+    kept = make_attempt(directory, slice)
+    take_recordings([attempt], kept)
+    mark_stopped(kept)
+    remove_stopped(earlier)
+    shutil.rmtree(attempt, ignore_errors=True)
+
+
+def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
+    """Read the configuration of a dataset that is to be collected in slices, with overrides as `collect_slice` has."""
+    read_changed_config(directory, overrides)
+    with load_locating_errors(config_path(directory), overrides) as config:
+        check_sliceable(config)
+        check_closed(config)
+        return config
+
+
+def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
+    """Read the configuration of a dataset whose plan is frozen, with overrides as `collect_slice` has."""
+    if not (directory / PLAN).is_file():
+        raise ConfigError(
+            f"{directory}: holds no plan", hint=command("plan", "CONFIG", "--output", directory) + " makes one"
+        )
+    kept = read_config(directory)
+    with load_locating_errors(config_path(directory), overrides) as config:
+        refuse_changes(directory, kept, config)
+        if config.trials != kept.trials:
+            raise ConfigError(
+                [Problem(f"the plan in {directory} has {kept.trials}, got {config.trials}", key="trials")],
+                expected="the same number, as tasks share the plan that lies there",
+                hint="a dataset with another seed can be merged with it (throwcollect dataset merge)",
+            )
+        return config
+
+
+def _find_scratch(config: Config) -> Path | None:
+    """The directory on this machine's own disk that `cluster.scratch` names; None if it names none."""
+    if (named := config.cluster.scratch) is None:
+        return None
+    path = Path(os.path.expandvars(named))
+    if not path.is_absolute() or "$" in str(path):
+        raise ConfigError([Problem(f"{named} is {path} here, not an absolute path", key="cluster.scratch")])
+    return path
+
+
+def check_sliceable(config: Config) -> None:
+    """Check that a configuration can be collected in slices."""
+    if config.until is not None:
+        raise ConfigError(
+            [Problem("a dataset whose end depends on its results cannot be collected in slices", key="until")],
+            expected="a fixed number of trials",
+            hint="throwcollect submit --mode live collects it in one run on several nodes",
+        )
+
+
+def check_closed(config: Config) -> None:
+    """Check that others cannot join a run on a cluster, whose nodes many users share."""
+    if config.run.open:
+        raise ConfigError([Problem("should be false, as many users share the nodes of a cluster", key="run.open")])

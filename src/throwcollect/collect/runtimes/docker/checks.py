@@ -1,0 +1,146 @@
+"""Checks before the start that an engine and this machine have everything that a configuration asks for."""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path, PurePosixPath
+
+from docker.client import DockerClient
+
+from throwcollect.collect.runtimes.docker.address import engine_address
+from throwcollect.collect.runtimes.docker.container_options import image
+from throwcollect.collect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors, find_image
+from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, Problem, WorkerError
+from throwcollect.state_directory import state_directory
+
+_SYSTEM = (
+    *("/bin", "/boot", "/dev", "/etc", "/lib", "/lib32", "/lib64", "/libx32", "/lost+found", "/proc"),
+    *("/run", "/sbin", "/sys", "/usr", "/var/backups", "/var/cache", "/var/lib", "/var/lock", "/var/log", "/var/mail"),
+    *("/var/run", "/var/spool"),
+)
+"""Directories of the system. Neither what is in them nor a directory that contains one of them may be mounted."""
+
+_SHARED = ("/home", "/tmp", "/var/tmp")  # noqa: S108
+"""Directories that all users and programs share; directories in them may be data."""
+
+_HOME = re.compile("/root|/home/[^/]+")
+"""Home directories. What begins with a dot in them belongs to programs, and is full of keys and passwords."""
+
+_DEVICE = re.compile(r"/dev/(dri(/.+)?|nvidia[^/]*|nvidia-caps(/.+)?|kfd|dxg)")
+"""Device files of graphics processors, with which a simulation may compute."""
+
+_DEVICES = "graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg"
+
+
+def check(client: DockerClient, config: Config) -> str:
+    """Check the image, the mounts and the networks of a run.
+
+    Returns:
+        Id of the image, which is a SHA-256 of its content.
+    """
+    kinds = ("router", "sim", "coordinator")
+    return _check(client, image(config), {f"containers.{kind}": getattr(config.containers, kind) for kind in kinds})
+
+
+def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:
+    """Check the image, the mounts and the networks of a container that the catalogue describes for a component."""
+    _check(client, spec.image, {f"components.{component}": spec.section}, mounts="volumes")
+
+
+def _check(
+    client: DockerClient, name: str, sections: Mapping[str, NodeContainerConfig], *, mounts: str = "mounts"
+) -> str:
+    with engine_errors("the Docker engine cannot be asked"):
+        # The network of the host, and none at all, are in the list of every engine.
+        networks = {each["Name"] for each in client.api.networks()} - {"host", "none"}
+        root = os.path.realpath(client.api.info()["DockerRootDir"])
+    if (found := find_image(client, name)) is None:
+        hint = BUILD_COMMAND if name == default_tag() else f"docker pull {name}"
+        raise WorkerError(f"the Docker engine has no image {name}", hint=hint)
+    problems: list[Problem] = []
+    for key, section in sections.items():
+        problems += _problems(key, section, networks, root, mounts=mounts)
+    if problems:
+        raise ConfigError(problems)
+    return str(found.id)
+
+
+def _problems(
+    key: str, section: NodeContainerConfig, networks: set[str], root: str, *, mounts: str
+) -> Iterator[Problem]:
+    for index, mount in enumerate(section.mounts):
+        source, target, *_ = mount.split(":")
+        wrong = _wrong_mount(Path(source), root) or _wrong_target(target)
+        if wrong is not None:
+            yield Problem(wrong, f"{key}.{mounts}.{index}")
+    for index, device in enumerate(section.options.get("devices", [])):
+        if (wrong := _wrong_device(Path(device.partition(":")[0]))) is not None:
+            yield Problem(wrong, f"{key}.options.devices.{index}")
+    for index, network in enumerate(section.networks):
+        if network not in networks:
+            wrong = f"the Docker engine has no network {network}; create it first"
+            yield Problem(wrong, f"{key}.networks.{index}")
+
+
+def _wrong_target(path: str) -> str | None:
+    """Why nothing must be mounted at a path in a container; None if it may."""
+    target = PurePosixPath(posixpath.normpath(path))
+    first = target.parts[1:2]
+    taken = not first or first[0] in ("data", "key")
+    return f"{target} is refused, as the dataset, the key or the image is there in the container" if taken else None
+
+
+def _wrong_mount(source: Path, root: str) -> str | None:
+    """Why a path, or the target of a link, must not be mounted; None if it may. `root` holds the engine's files."""
+    if not source.exists():
+        return f"{source} does not exist on this machine"
+    real = source.resolve()
+    if real.is_socket():
+        return f"{source} is refused, as it is a socket; mounts are for data"
+    kind, _, address = engine_address().partition("://")
+    # The keys of all runs lie in the directory of the state.
+    more = [root, str(state_directory().resolve()), *([os.path.realpath(address)] if kind == "unix" else [])]
+    reason = refusal(str(real), more=more)
+    if reason is None and Path.home().resolve().is_relative_to(real):
+        reason = "is refused, as a home directory holds secrets; mounts are for data"
+    if reason is None:
+        return None
+    return f"{source} {reason}" if real == source else f"{source}, which is {real}, {reason}"
+
+
+def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
+    """Say why a directory or file of the host must not be mounted; None if it may be.
+
+    Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets. The
+    path is absolute and leads through no links; `more` are further directories of the system, such as those of the
+    engine.
+    """
+    if path in _SHARED:
+        return f"is refused, as all users of the machine share {path}; mounts are for data"
+    for place in (*_SYSTEM, *more):
+        if os.path.commonpath([path, place]) in (path, place):
+            return f"is refused, as {place} belongs to the system; mounts are for data"
+    if _HOME.fullmatch(path):
+        return "is refused, as a home directory holds secrets; mounts are for data"
+    hidden = next((part for part in PurePosixPath(path).parts if part.startswith(".")), None)
+    return None if hidden is None else f"is refused, as {hidden} may hold secrets of programs; mounts are for data"
+
+
+def is_allowed_device(path: str) -> bool:
+    """Whether a device file, or a directory of them, may be handed over to a container; the path has no links."""
+    return _DEVICE.fullmatch(path) is not None
+
+
+def _wrong_device(device: Path) -> str | None:
+    """Why a container must not get a device, or its target if it is a link; None if it may."""
+    if not device.exists():
+        return f"{device} does not exist on this machine"
+    files = [device, *device.rglob("*")] if device.is_dir() else [device]
+    if all(is_allowed_device(str(file.resolve())) and not file.is_block_device() for file in files):
+        return None
+    return f"{device} is refused, as it leads to other devices; containers get {_DEVICES}"

@@ -1,0 +1,178 @@
+"""The options with which the containers of a run are made: names, labels, limits, mounts, environment."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from docker.types import DeviceRequest, EndpointConfig, LogConfig, Ulimit
+
+from throwcollect.collect.runtimes.docker.docker_engine import default_tag
+from throwcollect.collect.runtimes.nodes import (
+    COORDINATOR,
+    ROUTER,
+    NodeSpec,
+    is_simulation,
+    node_environment,
+    protocol_of,
+)
+from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import DIRECTORY_VARIABLE
+from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE
+from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import LOOPBACK
+from throwcollect.run_key import RunKey
+from throwcollect.version import __version__
+
+RUN_LABEL = "throwcollect.run"
+NODE_LABEL = "throwcollect.node"
+DIRECTORY_LABEL = "throwcollect.directory"
+VERSION_LABEL = "throwcollect.version"
+JOINED_LABEL = "throwcollect.joined"
+"""Label with the id of the run that a component's container has joined, and with which it ends."""
+
+ROUTER_PORT = 7447
+
+DATA = "/data"
+KEY = RunKey(Path("/key"))
+"""The key of the run, as nodes in containers see it."""
+
+API_VERSION = "1.41"
+_PIDS = 512
+_TMP = "/tmp"  # noqa: S108 - a file system of the container's own
+_TMPFS = "rw,noexec,nosuid,size=64m"
+_LOG_SIZE = {"max-size": "10m", "max-file": "2"}
+
+
+def network_of(run: str) -> str:
+    """Name of the network of a run."""
+    return f"throwcollect-{run}"
+
+
+def container_of(run: str, node: str) -> str:
+    """Name of the container of a node."""
+    return f"throwcollect-{run}-{node}"
+
+
+def labels(context: RunContext) -> dict[str, str]:
+    """Labels of everything that is made for a run."""
+    return {RUN_LABEL: context.run, DIRECTORY_LABEL: str(context.directory.resolve()), VERSION_LABEL: __version__}
+
+
+def key_mount(key: RunKey) -> str:
+    """The mount of the directory of a key, whose files only their owner can read.
+
+    On hosts with SELinux, `z` gives it the label with which all containers may read it.
+    """
+    return f"{key.directory}:{KEY.directory}:ro,z"
+
+
+def router_endpoint(config: Config, middleware: Middleware) -> str:
+    """Zenoh endpoint of the router; by this name, the router listens only at its address in the run's network."""
+    return f"{protocol_of(config.run, middleware)}/{ROUTER}:{ROUTER_PORT}"
+
+
+def image(config: Config) -> str:
+    """Image of all nodes."""
+    return config.containers.image or default_tag()
+
+
+def section_of(config: Config, name: str) -> NodeContainerConfig:
+    """The section of the configuration for a node's container."""
+    return config.containers.sim if is_simulation(name) else getattr(config.containers, name)
+
+
+def publishes_port(config: Config) -> bool:
+    """Whether a port is published to this machine, which is impossible from a network without a way out."""
+    sections = (config.containers.router, config.containers.sim, config.containers.coordinator)
+    return bool(config.run.router_port or any(section.ports for section in sections))
+
+
+def node_options(
+    node: NodeSpec, *, context: RunContext, config: Config, image_id: str, address: str | None = None
+) -> dict[str, Any]:
+    """Keywords for `containers.create` that make the container of a node.
+
+    The configuration may bind the node to another core. The id of the image goes into the dataset's provenance; the
+    address is that in the run's network, None for any.
+    """
+    section, network = section_of(config, node.name), network_of(context.run)
+    directory = str(context.directory.resolve())
+    endpoint = router_endpoint(config, context.middleware)
+    own = {
+        **node_environment(Connection(endpoint, KEY, config.run.domain_id, context.middleware)),
+        # Otherwise nodes would write a random id and /data into the provenance, which mean nothing outside.
+        HOST_VARIABLE: socket.gethostname(),
+        IMAGE_VARIABLE: image_id,
+        DIRECTORY_VARIABLE: directory,
+        "THROWCOLLECT_NODE": node.name,
+    }
+    mounts = [key_mount(context.key)]
+    if node.name != ROUTER:
+        mounts.append(f"{directory}:{DATA}:{'rw' if node.name == COORDINATOR else 'ro'},z")
+    options = container_options(context, image(config), node.name, section, environment=own, mounts=mounts)
+    if node.name == ROUTER and config.run.router_port:
+        options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
+    return {
+        **options,
+        "command": list(node.arguments),
+        "network": network,
+        "networking_config": {network: EndpointConfig(API_VERSION, aliases=[node.name], ipv4_address=address)},
+        "cpuset_cpus": section.cpuset or (None if node.core is None else str(node.core)),
+    }
+
+
+def container_options(
+    context: RunContext,
+    image: str,
+    node: str,
+    section: NodeContainerConfig,
+    *,
+    environment: Mapping[str, str],
+    mounts: Sequence[str],
+) -> dict[str, Any]:
+    """Keywords for `containers.create` for a node or a component, which can do little but compute.
+
+    Options of its section of the configuration, or of the catalogue, replace the general ones.
+    """
+    options: dict[str, Any] = dict(section.options)
+    if "gpus" in options:
+        options["device_requests"] = [DeviceRequest(count=options.pop("gpus"), capabilities=[["gpu"]])]
+    chosen = {key: str(value) for key, value in section.environment.items()}
+    return {
+        "image": image,
+        "user": f"{os.getuid()}:{os.getgid()}",
+        # The kernel keeps signals without a handler from process 1, which also has to reap orphans. An init does both.
+        "init": True,
+        "read_only": True,
+        "cap_drop": ["ALL"],
+        "security_opt": ["no-new-privileges"],
+        "pids_limit": _PIDS,
+        "stop_signal": "SIGTERM",
+        "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
+        **options,
+        "name": container_of(context.run, node),
+        "labels": {**options.get("labels", {}), **labels(context), NODE_LABEL: node},
+        # Nothing but /tmp can be written in the container.
+        "environment": {"HOME": _TMP, **chosen, **environment},
+        "tmpfs": _with_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
+        "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
+        "volumes": [*mounts, *section.mounts],
+        "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
+        "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
+        "mem_limit": section.memory,
+        # This limits memory and swap together; the same value as above leaves no swap.
+        "memswap_limit": section.memory,
+        "cpuset_cpus": section.cpuset,
+    }
+
+
+def _with_tmpfs(own: Mapping[str, str], chosen: Mapping[str, str]) -> dict[str, str]:
+    # The kernel takes the last of mount options that contradict each other.
+    return {**own, **{path: ",".join(filter(None, [own.get(path), options])) for path, options in chosen.items()}}

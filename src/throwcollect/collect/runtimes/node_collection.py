@@ -1,0 +1,181 @@
+"""Drives a run with nodes from its start to its end: keeps the nodes alive, listens to them, scales and stops them.
+
+The launcher is the node ``/launcher`` meanwhile; setting its integer parameter ``simulations`` scales the run.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from throwcollect import ros
+from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.runtimes.nodes import (
+    CONFIGURATION,
+    COORDINATOR,
+    LAUNCHER,
+    ROBOT_FILES,
+    ROUTER,
+    SIMULATIONS,
+    NodeExit,
+    NodeHost,
+    NodeRole,
+    NodeSpec,
+    is_simulation,
+    simulation_name,
+    simulation_nodes,
+)
+from throwcollect.collect.runtimes.run_listener import RunListener
+from throwcollect.collect.runtimes.runtime import Session, make_interruption_error
+from throwcollect.collect.runtimes.supervisor import Supervisor
+from throwcollect.dataset.carried_robot import config_text, pack_robot
+from throwcollect.dataset.summary import Info
+from throwcollect.errors import DatasetError, LossError, WorkerError
+from throwcollect.ros import IntegerRange
+from throwcollect.ros.fast_dds import SERVER_REST_S
+
+MOST_SIMULATIONS = 256
+
+_POLL_S = 0.05
+_MEET_S = 12.0
+_MEET_EACH_S = 0.5
+"""Simulations that are ready are usually seen within a second, but many that start at once share cores and a router.
+Something is wrong after the first of these times plus the second one for each simulation."""
+
+
+def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
+    """List the nodes of a run: a router, simulations, and a coordinator if the run collects a dataset."""
+    rest_s = SERVER_REST_S if host.context.middleware.is_fast_dds else 0.0
+    return [
+        NodeSpec(ROUTER, ("router", "--listen", host.listen), NodeRole.VITAL, rest_s=rest_s),
+        *simulation_nodes([*map(simulation_name, range(simulations))], host.data, recordings=host.context.recordings),
+        *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.context.collects else []),
+    ]
+
+
+def offer_scaling(node: ros.Node, simulations: int, on_wanted: Callable[[int], None], *, most: int) -> None:
+    """Declare the launcher's parameter by which any ROS 2 node may change the number of simulations, up to `most`."""
+
+    def report(parameters: list[ros.Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == SIMULATIONS:
+                on_wanted(int(parameter.value))
+
+    span = IntegerRange(from_value=0, to_value=most, step=1)
+    descriptor = ros.ParameterDescriptor(description="Number of simulations.", integer_range=[span])
+    node.declare_parameter(SIMULATIONS, simulations, descriptor)
+    node.add_post_set_parameters_callback(report)
+
+
+class NodeCollection:
+    """Drives one run with nodes, a collection or a session; closes the host at the end."""
+
+    def __init__(self, host: NodeHost, session: Session) -> None:
+        self._host = host
+        self._session = session
+        self._simulations = self._wanted = host.context.simulations
+        self._set_aside: set[str] = set()
+        self._apart_since = math.inf
+        self._started_again = False
+        self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
+        self._listener = RunListener(self._report, name=LAUNCHER, reports=host.context.collects, on_connect=self._offer)
+
+    def run_to_the_end(self) -> Info | None:
+        """See `runtime.Host.collect`."""
+        with self._supervisor, self._listener:
+            self._host.open()
+            self._session.event("started", simulations=self._simulations)
+            self._supervisor.start()
+            end = self._follow()
+            if not self._host.context.collects:
+                return None
+            self._check(end)
+            # The simulations end while this process reads the dataset.
+            self._supervisor.dismiss()
+            return self._host.info()
+
+    def _follow(self) -> NodeExit | None:
+        """Look after the nodes until the run ends or is interrupted.
+
+        Returns:
+            How the coordinator ended; None if it had to be ended by force, or there is none.
+        """
+        end = None
+        while end is None and not self._session.interruptions():
+            self._listen()
+            if self._wanted != self._simulations:
+                self._simulations = self._wanted
+                self._session.event("scaled", simulations=self._simulations)
+                self._supervisor.change(roster(self._host, self._simulations))
+            end, news = self._supervisor.poll()
+            for line in news:
+                self._session.warn(line)
+            self._session.nodes(self._supervisor.states(), endpoint=self._host.endpoint, simulations=self._simulations)
+        if end is None:
+            self._session.event("stopping")
+            if not self._host.context.collects:
+                return None
+            self._session.say("interrupted: finishing the running trials; once more ends at once")
+            end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
+        # While this process waited for the end of the coordinator, its last report may have arrived.
+        self._listen()
+        return end
+
+    def _check(self, end: NodeExit | None) -> None:
+        context = self._host.context
+        # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
+        finished = end is not None and end.code in (0, LossError.exit_code)
+        if self._session.interruptions() and not finished:
+            raise make_interruption_error(context)
+        if end is not None and not finished:
+            kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
+            hint = context.resume_command if kind is WorkerError else None
+            raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
+
+    def _listen(self) -> None:
+        self._listener.spin(self._host.connection, _POLL_S)
+
+    def _report(self, progress: Progress) -> None:
+        self._session.update(progress)
+        self._check_that_nodes_meet(progress)
+        self._supervisor.replace(progress.hung)
+        for name in progress.set_aside.keys() - self._set_aside:
+            self._set_aside.add(name)
+            self._session.warn(f"{name} gets no more trials, because {progress.set_aside[name]}")
+
+    def _check_that_nodes_meet(self, progress: Progress) -> None:
+        """Start all nodes again if they do not see each other, which at times happens on DDS."""
+        states = self._supervisor.states()
+        ready = any(state.status == "running" for state in states if is_simulation(state.name))
+        if progress.simulations or progress.ended or not ready:
+            self._apart_since = math.inf
+            return
+        self._apart_since = min(self._apart_since, time.monotonic())
+        patience_s = _MEET_S + _MEET_EACH_S * self._simulations
+        if time.monotonic() - self._apart_since <= patience_s:
+            return
+        if not self._started_again:
+            self._started_again = True
+            # The new nodes get the same time to meet, from the first report of the new coordinator on.
+            self._apart_since = math.inf
+            self._session.warn("the coordinator does not see the simulations; all of them are started again")
+            self._supervisor.replace([state.name for state in states if state.name != ROUTER])
+        else:
+            raise WorkerError(
+                f"simulations have been ready for {patience_s:g} s, twice, but the coordinator does not see them",
+                evidence=f"they use {self._host.context.middleware.rmw}, and the router at {self._host.endpoint}",
+                hint="throwcollect logs router shows what it said; a firewall may keep nodes apart",
+            )
+
+    def _offer(self, node: ros.Node) -> None:
+        """Declare the launcher's parameters: the number of simulations, and the configuration for other machines."""
+        config = self._host.config
+        for name, text in ((CONFIGURATION, config_text(config)), (ROBOT_FILES, pack_robot(config))):
+            node.declare_parameter(name, text, ros.ParameterDescriptor(read_only=True))
+        most = 1 if config.run.root_namespace else MOST_SIMULATIONS
+        offer_scaling(node, self._simulations, self._request_simulations, most=most)
+
+    def _request_simulations(self, simulations: int) -> None:
+        # `_follow` scales the run later, so that the client that sets the parameter does not wait for nodes to end.
+        self._wanted = simulations

@@ -1,0 +1,213 @@
+"""The interface of runtimes, and the values that runs and runtimes exchange.
+
+A runtime tells whether it can be used on this machine, and gives each run a host, which simulates the trials from the
+start of the run to its end. Hosts that start nodes derive from `nodes.NodeHost`. `registry` finds runtimes by name.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+
+from throwcollect.errors import Interrupted
+from throwcollect.extras import ENGINE_PACKAGES, require_engine
+from throwcollect.members import load_member
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+from throwcollect.wording import command
+
+if TYPE_CHECKING:
+    # Records of runs import this module, and should not wait for these imports.
+    from throwcollect.collect.coordinator.progress import Progress
+    from throwcollect.config.schema import Config
+    from throwcollect.dataset.summary import Info
+
+RunEvent = Literal["started", "scaled", "stopping", "finished", "stopped", "failed"]
+Status = Literal["starting", "running", "frozen", "restarting", "lost"]
+
+
+@dataclass(frozen=True)
+class NodeState:
+    """The state of one node.
+
+    Attributes:
+        status: ``starting`` until a simulation is ready, ``running``, ``frozen``, ``restarting`` (the node ended and
+            waits for its next start), or ``lost`` for good.
+        restarts: Number of times that the node was started again.
+        handle: Process or container id; None if the node does not run.
+        last_end: How the node ended last, in words; None if it never did.
+    """
+
+    name: str
+    status: Status
+    restarts: int
+    handle: str | None
+    last_end: str | None
+
+
+@dataclass(frozen=True)
+class RunContext:
+    """The directories of a run on this machine, and how its nodes communicate.
+
+    Attributes:
+        run: Id of the run.
+        directory: Directory of the dataset.
+        logs: Directory of the logs.
+        simulations: Number of simulations at the start.
+        key: The key that the router asks for.
+        collects: Whether the run collects a dataset; if not, its simulations serve clients until it is stopped.
+        recordings: Directory into which clients of these simulations record; None if they cannot.
+    """
+
+    run: str
+    directory: Path
+    logs: Path
+    simulations: int
+    middleware: Middleware
+    key: RunKey
+    collects: bool = True
+    recordings: str | None = None
+
+    @property
+    def resume_command(self) -> str | None:
+        """The command that goes on with the dataset once the run is over; None if it collects none."""
+        return command("resume", self.directory) if self.collects else None
+
+
+def make_interruption_error(context: RunContext) -> Interrupted:
+    """The error that somebody stopped a collection before every trial had ended."""
+    message = f"interrupted; finished throws are in {context.directory}, the dataset is not complete"
+    return Interrupted(message, hint=context.resume_command)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding of `doctor` about the machine, and what follows from it.
+
+    The status is `ok`, `note` (collections run, with a restriction), or `problem` (they do not).
+    """
+
+    name: str
+    status: Literal["ok", "note", "problem"]
+    finding: str
+
+
+class Session(Protocol):
+    """The launcher, as the host of the run sees it: it takes reports, and tells when the user wants to stop."""
+
+    def say(self, line: str) -> None:
+        """Show the user a line of information."""
+
+    def warn(self, line: str) -> None:
+        """Show the user a warning."""
+
+    def update(self, progress: Progress) -> None:
+        """Show the user a progress report."""
+
+    def interruptions(self) -> int:
+        """How often the user has asked to stop: the first time, running trials are still finished."""
+
+    def event(self, event: RunEvent, *, simulations: int | None = None) -> None:
+        """Write an event of the run."""
+
+    def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
+        """Write the states of the nodes, the endpoint of the router, and how many simulations there are to be."""
+
+
+class Host(Protocol):
+    """Simulates the trials of one run.
+
+    Attributes:
+        cleared: Whether, after `close`, nothing of the run exists any more but its dataset.
+    """
+
+    cleared: bool
+
+    def collect(self, session: Session) -> Info | None:
+        """Collect until every trial has ended, finish the dataset, and close; a session goes on until an interruption.
+
+        Returns:
+            The summary of the dataset; None for a run that collects none.
+
+        Raises:
+            WorkerError: If nodes cannot be started or kept alive.
+            DatasetError: If another process changes the dataset, or it cannot be written.
+            Interrupted: If the user stopped the collection.
+        """
+
+    def close(self) -> None:
+        """End everything that still runs, and remove everything that was made for the run but the dataset."""
+
+
+class Runtime(ABC):
+    """A way to simulate trials; the defaults hold for one whose nodes end with their launcher.
+
+    Attributes:
+        handle: The kind of id that its nodes have, as a noun.
+        outlives_launcher: Whether nodes go on without the process that started them.
+        can_be_scaled: Whether a run may have any number of simulations, which can be changed while it lives.
+    """
+
+    handle: ClassVar[str] = "pid"
+    outlives_launcher: ClassVar[bool] = False
+    can_be_scaled: ClassVar[bool] = True
+
+    @abstractmethod
+    def describe(self, config: Config) -> str:
+        """The runtime in words, as in ``runtime: local processes``."""
+
+    @abstractmethod
+    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
+        """Make the host of a run, which starts nothing yet; `warn` gets a line of text about each long wait.
+
+        Raises:
+            ConfigError: If the router's port is taken, or the configuration asks for something that does not exist.
+            WorkerError: If this machine does not have the runtime.
+        """
+
+    def prepare(
+        self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
+    ) -> Middleware:
+        """Make sure that this machine can do a run, even if that takes minutes.
+
+        `middleware` is that of this process. `say` gets a line of text before anything that takes long, and `warn` gets
+        a line about anything that may be wrong.
+
+        Returns:
+            The middleware that will carry the messages of the nodes.
+
+        Raises:
+            WorkerError: If the runtime cannot be used.
+            ConfigError: If the configuration asks for something that this machine does not have.
+            MissingExtraError: If simulations run on this Python, and it lacks the physics engine.
+        """
+        require_engine(config.sim.engine)
+        if config.sim.engine not in ENGINE_PACKAGES:
+            # An engine of another package may be broken. Otherwise every simulation would report that, and later.
+            load_member("engines", config.sim.engine)
+        return middleware
+
+    def check(self) -> Check | None:
+        """Examine the runtime for `doctor`; None if there is nothing to report."""
+        return None
+
+    def simulations(self, config: Config) -> int:
+        """Number of simulations with which a run begins."""
+        return config.run.simulations if self.can_be_scaled else 1
+
+    def remove(self, run: str) -> list[str]:
+        """Remove everything that the runtime holds of a run, but no directory with a dataset.
+
+        A runtime that has ended holds nothing.
+
+        Returns:
+            Names of the containers and networks that were removed.
+
+        Raises:
+            WorkerError: If the runtime does not answer in time, or something could not be removed; everything else is
+                removed first.
+        """
+        return []

@@ -1,1 +1,0 @@
-"""Stored throws, simulated once more and compared bit for bit."""
