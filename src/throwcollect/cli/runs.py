@@ -262,8 +262,7 @@ def _describe_status(run: Run, record: RunRecord) -> str:
 
 def _list_node_lines(run: Run) -> list[tuple[str, ...]]:
     """Format the nodes that can still run, as the launcher last wrote them."""
-    from throwcollect.collect.runtimes.registry import find_runtime
-    from throwcollect.collect.runtimes.runtime import Runtime
+    from throwcollect.collect.runtimes.runtime import Runtime, find_runtime
 
     handle = (find_runtime(run.record.runtime) or Runtime).handle
     lines: list[tuple[str, ...]] = []

@@ -30,7 +30,7 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import Origin, Planning, RunFailure, RunRecord
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
-from throwcollect.collect.runtimes.registry import choose, get_runtime
+from throwcollect.collect.runtimes.runtime import choose, get_runtime
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config

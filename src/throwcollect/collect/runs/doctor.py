@@ -10,8 +10,7 @@ from pathlib import Path
 
 from throwcollect import ros_installation
 from throwcollect.build import build_digest
-from throwcollect.collect.runtimes.registry import get_runtime
-from throwcollect.collect.runtimes.runtime import Check
+from throwcollect.collect.runtimes.runtime import Check, get_runtime
 from throwcollect.config.robot_config import DescribedRobotConfig
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import (

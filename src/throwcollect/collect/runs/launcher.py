@@ -14,8 +14,7 @@ from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.runs.events import EventLog
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import RunFailure, Summary
-from throwcollect.collect.runtimes.registry import get_runtime
-from throwcollect.collect.runtimes.runtime import Host, NodeState, RunContext, RunEvent
+from throwcollect.collect.runtimes.runtime import Host, NodeState, RunContext, RunEvent, get_runtime
 from throwcollect.config.schema import Config
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.summary import explain_loss

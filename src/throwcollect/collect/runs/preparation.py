@@ -18,7 +18,7 @@ from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.collect.runs.run_selection import refuse_busy
-from throwcollect.collect.runtimes.registry import RuntimeChoice, choose, get_runtime
+from throwcollect.collect.runtimes.runtime import RuntimeChoice, choose, get_runtime
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import reading_config
@@ -180,7 +180,7 @@ def prepare_run(
         is_new = not directory.exists()
         if config.run.runtime in ("auto", "local"):
             # What nodes need is imported, and a loop compiled, while this process makes the plan.
-            from throwcollect.collect.runtimes.node_process import begin_imports
+            from throwcollect.collect.runtimes.local import begin_imports
 
             begin_imports(*find_modules("engines", config.sim.engine), foreseen=config.model_dump_json())
         made = plan(directory) if callable(plan) else plan

@@ -19,8 +19,7 @@ from pydantic import TypeAdapter, ValidationError
 from throwcollect.collect.runs.run_record import RunRecord, Summary
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
-from throwcollect.collect.runtimes.registry import find_runtime
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext
+from throwcollect.collect.runtimes.runtime import NodeState, RunContext, find_runtime
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, NotFoundError, WorkerError
 from throwcollect.files import beside, open_log, write_all

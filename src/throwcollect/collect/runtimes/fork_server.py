@@ -13,7 +13,7 @@ import os
 import sys
 from contextlib import suppress
 
-from throwcollect.collect.runtimes.node_process import FORESEEN
+from throwcollect.collect.runtimes.local import FORESEEN
 from throwcollect.own_process import prepare_environment
 from throwcollect.ros.middleware import Middleware
 
@@ -21,6 +21,7 @@ _IMPORTED = (
     "throwcollect.cli.main",
     "throwcollect.cli.node_commands",
     "throwcollect.collect.coordinator_node.node",
+    "throwcollect.collect.runtimes.local",
     "throwcollect.ros.nodes.simulation.process",
     "throwcollect.ros.router",
     "pinocchio",

@@ -13,7 +13,7 @@ VERSION_LABEL = "org.opencontainers.image.version"
 UNKNOWN = "unknown"
 """Content of a label that has no value."""
 
-_CLONE = Path(__file__).parents[3]
+_CLONE = Path(__file__).parents[4]
 """Directory of the clone from which this package runs, if it is in one."""
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
 

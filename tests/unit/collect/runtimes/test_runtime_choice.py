@@ -8,11 +8,11 @@ from unittest.mock import Mock
 import pytest
 from docker.client import DockerClient
 
-from throwcollect.collect.runtimes import registry
 from throwcollect.collect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.collect.runtimes.docker import docker_engine as docker_image
 from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 from throwcollect.collect.runtimes.image_sources import SOURCES_LABEL
+from throwcollect.collect.runtimes.runtime import choose as choose_runtime
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
@@ -27,7 +27,7 @@ def choose() -> Callable[..., tuple[str, list[str]]]:
     def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
         said: list[str] = []
         config = Config(run=RunConfig(runtime=runtime), containers=ContainersConfig(image=image))
-        chosen = registry.choose(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
+        chosen = choose_runtime(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
         assert chosen.middleware == Middleware()
         return chosen.name, said
 
@@ -109,9 +109,9 @@ def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
 ) -> None:
     labels = {} if rmw is None else {docker_image.RMW_LABEL: rmw}
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels=labels))
-    monkeypatch.setattr(registry, "choose_middleware", lambda _: launcher)
+    monkeypatch.setattr("throwcollect.collect.runtimes.runtime.choose_middleware", lambda _: launcher)
     said: list[str] = []
-    found = registry.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
+    found = choose_runtime(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
     assert found.middleware == expected
     assert ("on genuine rclpy" in said[0]) == (expected.backend == "rclpy")
 

@@ -11,7 +11,7 @@ from throwcollect.sim.live import LiveSimulator
 FORK = """
 import multiprocessing
 from tests.unit.ros.nodes.simulation import test_process
-from throwcollect.collect.runtimes.node_process import begin_imports
+from throwcollect.collect.runtimes.local import begin_imports
 
 begin_imports("throwcollect.engines.ballistic.ballistic_engine", foreseen={foreseen})
 process = multiprocessing.get_context("forkserver").Process(target=test_process.print_what_is_read)

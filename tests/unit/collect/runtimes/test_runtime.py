@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect import extras, members
-from throwcollect.collect.runtimes.registry import AUTOMATIC, choose, get_runtime
-from throwcollect.collect.runtimes.runtime import Host, RunContext, Runtime
+from throwcollect.collect.runtimes.runtime import AUTOMATIC, Host, RunContext, Runtime, choose, get_runtime
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
