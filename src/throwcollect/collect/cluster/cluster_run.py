@@ -75,7 +75,7 @@ class ClusterRun:
         slurm.cancel([job for each in self.submission.jobs for job in (each.array, each.join) if job])
 
     def explain(self, look: SlicesState) -> ThrowcollectError | None:
-        """Make the error that says why a run that has ended has no finished dataset; None if it has one."""
+        """Make the error that explains why a run that has ended has no finished dataset; None if it has one."""
         if look.complete:
             return None
         again = command("resume", self.directory)
@@ -101,7 +101,9 @@ class ClusterRun:
         if task is not None and task.state == "CANCELLED":
             return Interrupted(f"job {job} was cancelled", hint=f"{again} submits it again")
         how = "ended" if task is None else f"ended: {task.state}, exit code {task.reason}"
-        return WorkerError(f"job {job} {how}", hint=f"{again} submits it again; throwcollect logs says what it printed")
+        return WorkerError(
+            f"job {job} {how}", hint=f"{again} submits it again; throwcollect logs shows what it printed"
+        )
 
     @property
     def logs(self) -> dict[str, Path]:
@@ -167,7 +169,7 @@ class SlicesState:
 class ProgressOfSlices:
     """Counts the trials of finished slices, and reads each slice only once.
 
-    The speed is measured from the first look on, as no file says how fast trials ended before.
+    The speed is measured from the first look on, as no file has how fast trials ended before.
     """
 
     def __init__(self, run: ClusterRun) -> None:

@@ -38,7 +38,7 @@ _ENDED = frozenset(
 _UNSEEN_OUTPUT = "0:53"
 """Exit code of a task whose log could not be opened: its node does not see the directory."""
 _UNREACHED = ("Could not establish a configuration source", "Unable to contact slurm controller")
-"""Words by which Slurm's commands say that there is no controller, or that it cannot be reached."""
+"""Parts of the messages of Slurm's commands if there is no controller, or it cannot be reached."""
 
 
 @dataclass(frozen=True)
@@ -182,13 +182,13 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
     except subprocess.TimeoutExpired as error:
         raise WorkerError(f"{program} has not answered within {patience_s:g} s") from error
     if done.returncode:
-        said = [line for line in done.stderr.splitlines() if line.strip()]
-        if any(words in line for words in _UNREACHED for line in said):
+        printed = [line for line in done.stderr.splitlines() if line.strip()]
+        if any(words in line for words in _UNREACHED for line in printed):
             raise WorkerError(
                 f"Slurm has no controller that {program} can reach: none is configured here, or it is down",
                 hint="run this on a login node, or see docs/running.md for other schedulers",
             )
-        raise WorkerError(f"{program} refuses: {'; '.join(said) or f'exit code {done.returncode}'}")
+        raise WorkerError(f"{program} refuses: {'; '.join(printed) or f'exit code {done.returncode}'}")
     return done.stdout
 
 

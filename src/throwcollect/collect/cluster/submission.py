@@ -76,7 +76,7 @@ def read_submission(directory: Path) -> Submission:
     try:
         return _JSON.validate_json(path.read_bytes())
     except (OSError, ValidationError) as error:
-        raise ConfigError(f"{path}: does not say what was submitted: {error}") from error
+        raise ConfigError(f"{path}: does not record what was submitted: {error}") from error
 
 
 def write_submission(directory: Path, submission: Submission) -> None:

@@ -101,7 +101,7 @@ def submit(
             )
         made, planned = not directory.exists(), not (directory / PLAN).exists()
         _freeze(complete, directory, config.parent, reporter)
-        # Only from here on, because a directory that was refused holds the files of somebody else.
+        # Only from here on, because a directory that was refused holds files of another user or program.
         undo.callback(_remove, directory, made=made, planned=planned)
         if not live:
             Plan.read(directory / PLAN, read_frozen_config(directory)).slice_of(Slice(0, tasks))
@@ -151,7 +151,7 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
 
         def submit_job(script: Path, *options: str) -> str:
             job = slurm.submit(script, *options)
-            # Until the record names the job, nobody finds it again, and what fails removes the files that it needs.
+            # Until the record names the job, no command finds it again, and a failure removes the files that it needs.
             undo.callback(slurm.cancel, [job])
             return job
 

@@ -32,7 +32,7 @@ from throwcollect.wording import command, format_count
 
 _SYNC_EVERY_S = 1.0
 """Real time after which data is forced to the disk: a power cut costs what was collected in this time at most."""
-_TELL_EVERY_S = 2.0
+_REPORT_EVERY_S = 2.0
 _REPLAY_AHEAD_S = 3.0
 """How long before the expected end of the last trial the process starts that simulates some trials again."""
 
@@ -90,13 +90,13 @@ class TrialCollection:
         """
         collection = cls(DatasetWriter.open(directory), directory)
         count = 0
-        told = time.monotonic()
+        reported_s = time.monotonic()
 
         def count_episode(trial: int, result: Result) -> bool:
-            nonlocal count, told
+            nonlocal count, reported_s
             # Episodes come file by file, so this is the number in all files that were read so far.
-            if count and time.monotonic() >= told + _TELL_EVERY_S:
-                told = time.monotonic()
+            if count and time.monotonic() >= reported_s + _REPORT_EVERY_S:
+                reported_s = time.monotonic()
                 say(f"has found {format_count(count, 'episode')} of an earlier collection so far")
             count += 1
             return collection.recall(trial, result)
@@ -140,7 +140,7 @@ class TrialCollection:
         if not self._draining:
             self._draining = True
             self._drain_deadline = time.monotonic() + self._config.run.grace_s
-            # Only the first trial that a simulation holds runs. The others go back, which `on_change` tells it.
+            # Only the first trial that a simulation holds runs. The others go back, and `on_change` sends the new list.
             for simulation in self._names:
                 self._leases.release(simulation)
             self.on_change()
@@ -203,7 +203,7 @@ class TrialCollection:
     def take_in(self, simulation: str, episode: Episode) -> bool:
         """Take in an episode, which `write_one` writes later; refuse one that is not what the plan asks for.
 
-        The first episode of a trial counts, whoever holds the trial by now, and further ones are dropped.
+        The first episode of a trial counts, even if another simulation holds it by now, and further ones are dropped.
 
         Returns:
             Whether it was taken in.
@@ -236,7 +236,7 @@ class TrialCollection:
         """Take all trials back from a simulation, which failed with the first and had not begun the others.
 
         The reason is kept as evidence. With `refused`, the simulation refused the trials, and may refuse all others.
-        If it is `alive`, this does not count; None if only a later call of `settle` can say so.
+        If it is `alive`, this does not count; None if only a later call of `settle` decides it.
         """
         self._leases.release(simulation)
         for trial in self._leases.find_held(simulation):
@@ -323,7 +323,7 @@ class TrialCollection:
 
     def name_of(self, simulation: str) -> str:
         """Find the name of a simulation's node, even after the simulation has left."""
-        # Unless it was told otherwise, a simulation lives in a namespace that has the name of its node.
+        # By default, a simulation lives in a namespace that has the name of its node.
         return self._names.get(simulation, simulation.strip("/"))
 
     def _note(self, trial: int, outcome: str) -> None:

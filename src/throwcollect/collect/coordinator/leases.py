@@ -83,13 +83,13 @@ class Leases:
         return {name: why for name in self._wrong_refusals if (why := self.why_set_aside(name)) is not None}
 
     def why_set_aside(self, simulation: str) -> str | None:
-        """Say why a simulation gets no more trials; None if it gets more."""
+        """Explain why a simulation gets no more trials; None if it gets more."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
             return None
         return f"it refused trials that other simulations could do: {self._refusals[simulation][-1][1]}"
 
     def explain_hopelessness(self, simulations: Collection[str]) -> str | None:
-        """Say why none of these simulations will ever do a trial: none ever did, and all refuse. Else None."""
+        """Explain why none of these simulations will ever do a trial: none ever did, and all refuse. Else None."""
         if self._completed or not simulations or not all(map(self._is_doubted, simulations)):
             return None
         return self._refusals[min(simulations)][-1][1]
@@ -132,8 +132,6 @@ class Leases:
 
     def recall(self, trial: int) -> None:
         """Count a trial as completed that an earlier collection has completed."""
-        if self._open[trial] != _FRESH:
-            raise ValueError(trial)
         self._take_fresh(trial)
         self._end(trial)
 
@@ -161,7 +159,7 @@ class Leases:
         """Take a trial back from a simulation that was lost or could not do it; let it wait again, or give it up.
 
         The reason is kept as evidence. With `refused`, the simulation refused the trial, and may refuse all others. If
-        it is `alive`, this does not count; None if only a later call of `settle` can say so.
+        it is `alive`, this does not count; None if only a later call of `settle` decides it.
 
         Returns:
             All reasons when its retries are used up, else None.

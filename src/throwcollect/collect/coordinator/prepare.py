@@ -37,8 +37,8 @@ _MANY_TRIALS = 2000
 """From this number of trials on, starting processes that check them side by side saves time."""
 _TRIALS_A_PIECE, _MOST_A_PIECE = 100, 1000
 """Similar trials share work, so large plans are cut into larger pieces; to hand over many pieces takes time, too."""
-_TELL_FIRST_S = 2.0
-_TELL_EVERY_S = 10.0
+_REPORT_FIRST_S = 2.0
+_REPORT_EVERY_S = 10.0
 
 
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, reporter: Reporter = SILENT) -> Plan:
@@ -52,7 +52,7 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, reporter: 
         directory: Where a relative `sweep.file` is looked for: the directory of the configuration's file.
         processes: How many processes may check the trials of a large plan. If more than one, they import the program
             that calls this, as processes of `multiprocessing` do.
-        reporter: Is told how many trials of a large plan have been checked, and warned of limits that may be wrong.
+        reporter: Receives how many trials of a large plan have been checked, and warnings of limits that may be wrong.
     """
     points = draw_points(config, directory=directory)
     return _check_trials(config, points, processes=processes, reporter=reporter)
@@ -79,7 +79,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, reporter: R
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
     pieces = [points[first:stop] for first, stop in pairwise([*firsts, count])]
     processes = processes if count >= _MANY_TRIALS else 1
-    say_at = time.monotonic() + _TELL_FIRST_S
+    say_at = time.monotonic() + _REPORT_FIRST_S
     reporter.update_plan(0, count)
     reasons: list[str | None] = []
     with working_side_by_side(pieces, _make_checks, (config,), processes=processes, doing="checks trials") as checked:
@@ -87,7 +87,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, reporter: R
             reasons += piece
             reporter.update_plan(len(reasons), count)
             if time.monotonic() >= say_at:
-                say_at = time.monotonic() + _TELL_EVERY_S
+                say_at = time.monotonic() + _REPORT_EVERY_S
                 reporter.say(f"plan: {len(reasons)} of {count} trials checked")
     # If some trials have not been checked, and few have, others may be left that can be run.
     if count == len(points.values) or count >= _TRIALS_A_PIECE:
@@ -97,7 +97,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, reporter: R
 
 
 def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:
-    """Make a function that says for each of some points why the robot cannot do its trial; None if it can."""
+    """Make a function that returns for each of some points why the robot cannot do its trial; None if it can."""
     feasibility = Feasibility(config)
 
     def find_reasons(points: Points) -> list[str | None]:
@@ -118,7 +118,7 @@ def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:
 
 
 def feasibility_check(config: Config) -> Check:
-    """Make a function that says why the robot cannot do a trial, in 2 to 5 ms each.
+    """Make a function that returns why the robot cannot do a trial, in 2 to 5 ms each.
 
     With `sweep.feasibility: nominal`, the function checks the robot as its owner believes it to be.
     """
@@ -160,7 +160,7 @@ def count_trials(plan: Plan) -> str:
 
 
 def make_self_contained(config: Config) -> Config:
-    """Make the configuration as a dataset stores it: its list of trials lies beside it."""
+    """Make the configuration as a dataset stores it: with its list of trials in the same directory."""
     if config.sweep.file is None:
         return config
     return config.model_copy(update={"sweep": config.sweep.model_copy(update={"file": TRIALS})})

@@ -91,7 +91,7 @@ class Progress:
 
     @classmethod
     def read(cls, text: str) -> Progress | None:
-        """Read progress from its JSON; None if the text is anything else, as anybody may publish on the topic."""
+        """Read progress from its JSON; None if the string is anything else, as any node may publish there."""
         try:
             return _PROGRESS.validate_json(text, strict=True)
         except ValidationError:

@@ -36,7 +36,7 @@ class ReplayCheck:
 
     Args:
         directory: Directory of the dataset.
-        config: Its configuration, which says how many trials are simulated again.
+        config: Its configuration, which has the number of trials that are simulated again.
     """
 
     def __init__(self, directory: Path, config: Config) -> None:
@@ -123,7 +123,7 @@ def _begin(directory: Path) -> Callable[[int], Row]:
 
 
 def _find_difference(row: Row, again: Row) -> str | None:
-    """Say which column of a row came out otherwise, beginning with the episode's digest; None if none did."""
+    """Find the column of a row that came out otherwise, beginning with the episode's digest; None if none did."""
     for column in sorted(again, key=lambda column: column != "digest"):
         if again[column] != row[column]:
             return f"{column} is {row[column]} in the dataset, {again[column]} in the fresh process"

@@ -1,4 +1,4 @@
-"""The interface by which a run tells a program or a terminal what goes on."""
+"""The interface by which a run reports its progress to a program or a terminal."""
 
 from __future__ import annotations
 

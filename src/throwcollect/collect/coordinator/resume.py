@@ -64,8 +64,7 @@ def resume(
         processes: How many processes may check the trials of a large plan, as for `draw_plan`.
         before_writing: Is called before anything is written, unless every trial has ended; what it raises leaves the
             dataset as it is.
-        reporter: Is warned of what is missing or damaged in a finished dataset, and told how much there is to look
-            through.
+        reporter: Gets a warning for each file of a finished dataset that is missing or damaged.
     """
     with hold_lock(directory):
         _refuse_uncollected(directory, config)
@@ -96,7 +95,7 @@ def resume(
             remove(directory / METADATA)
         replanned = old is None or plan.trials is not old.trials
         if replanned:
-            # Were this process killed here, the plan must not lie beside another configuration. If it is empty, it is
+            # Were this process killed here, the plan must not lie next to another configuration. If it is empty, it is
             # made again, and the directory still holds a dataset.
             write_file(directory / PLAN, b"")
         write_config(directory, plan.config)
@@ -205,7 +204,7 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
     except ForeignPlanError:
         raise
     except DatasetError:
-        # Without the stored configuration, nothing tells whether the given one is that of the dataset.
+        # Without the stored configuration, it is unknown whether the given one is that of the dataset.
         if stored is None:
             raise
         return None

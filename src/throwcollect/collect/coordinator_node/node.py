@@ -25,7 +25,7 @@ from throwcollect.run_key import Signer
 from throwcollect.side_by_side import count_cores
 
 _IDLE_S = 0.05
-_TELL_EVERY_S = 10.0
+_REPORT_EVERY_S = 10.0
 """Real time between two lines of progress in the log; it is published on its topic more often."""
 
 _DISCOVERY_PERIOD_S = 0.05
@@ -117,7 +117,7 @@ class Coordinator(Node):
             if name != simulation.name:
                 self._lose(namespace, "left the ROS graph")
             elif publishers - simulation.publishers:
-                # The graph may keep a dead node for a while, and show its successor beside it.
+                # The graph may keep a dead node for a while, and show its successor at the same time.
                 self._lose(namespace, "was started again")
         for namespace in offered.keys() - self._simulations.keys():
             self._simulations[namespace] = SimulationClient(
@@ -185,7 +185,7 @@ class Coordinator(Node):
         try:
             handed = unpack(message, self._signer)
         except DatasetError as error:
-            # Anybody may have sent it, so the simulation is not blamed.
+            # Any node may have sent it, so the simulation is not blamed.
             self.get_logger().warning(
                 f"{namespace}: an episode is dropped: {error}", throttle_duration_sec=_WARNING_PERIOD_S
             )
@@ -199,7 +199,7 @@ class Coordinator(Node):
         self._lease(namespace)
 
     def _stop_waiting(self, namespace: str, simulation: SimulationClient) -> None:
-        """Take the trials of a simulation that is too slow; if it is alive, give everybody more time from now on."""
+        """Take the trials of a simulation that is too slow; if it is alive, give all simulations more time."""
         alive = simulation.alive
         reason = f"no episode within {self._patience_s:g} s{'' if alive else ', and no answer to the lease'}"
         simulation.hung = True
@@ -225,7 +225,7 @@ def run(directory: Path, *, patience_s: float = math.inf) -> None:
     # The dataset is opened before the node exists, because opening a large one takes long and a node has to answer.
     with TrialCollection.open(directory, say=_say, processes=count_cores()) as collection:
         ros.init()
-        # Note in the journal that anybody could join this run, because the finished dataset has to say so.
+        # Note in the journal that any node could join this run, because the finished dataset records it.
         if not ros.joins_protected():
             collection.writer.note("exposed")
         node = Coordinator(collection)
@@ -255,7 +255,7 @@ def _collect(
     patience_s: float,
 ) -> None:
     """Collect until all trials have ended or, after a signal that asks to stop, those that run."""
-    told = seen = time.monotonic()
+    reported = seen = time.monotonic()
     while not collection.finished:
         heartbeat.beat()
         if stopped():
@@ -271,10 +271,10 @@ def _collect(
         elif time.monotonic() > seen + patience_s:
             raise WorkerError(
                 f"no simulation was there for {patience_s:g} s (run.start_timeout_s)",
-                hint="what the simulations print says why",
+                hint="the simulations print the reason",
             )
-        if time.monotonic() >= told + _TELL_EVERY_S:
-            told = time.monotonic()
+        if time.monotonic() >= reported + _REPORT_EVERY_S:
+            reported = time.monotonic()
             _say(node.report().line)
     _say(node.report().line)
 

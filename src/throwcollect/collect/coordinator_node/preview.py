@@ -16,7 +16,7 @@ PROGRESS_TOPIC = "/coordinator/progress"
 PROGRESS_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 SHOWN_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""A slow subscriber misses some episodes, and delays nobody."""
+"""A slow subscriber misses some episodes, and delays no other node."""
 
 _PERIOD_S = 1.0
 
@@ -42,7 +42,7 @@ class EpisodePreview:
         The simulation is given by the name of its node.
         """
         if simulation not in self._publishers:
-            # The publisher is made before anybody watches, because reporters find the topic by it.
+            # The publisher is made before a viewer subscribes, because reporters find the topic by it.
             topic = make_shown_topic(simulation)
             self._publishers[simulation] = self._node.create_publisher(UInt8MultiArray, topic, SHOWN_QOS)
         if simulation in self._watched:

@@ -181,7 +181,7 @@ def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interrupt
 
 
 class _Planner(Reporter):
-    """Writes the progress of the plan into the record, ends the planning if somebody asks to stop, passes all else on.
+    """Writes the progress of the plan into the record, ends the planning on a request to stop, passes all else on.
 
     It is the reporter of the preparation, and passes on to the reporter of the run.
     """
@@ -211,7 +211,7 @@ class _Planner(Reporter):
                 self._run.update(planning=Planning(checked, trials))
 
     def end_if_asked(self) -> None:
-        """End the preparation if somebody has asked to stop."""
+        """End the preparation on a request to stop."""
         if self._interruptions():
             raise Interrupted("stopped before any node was started")
 

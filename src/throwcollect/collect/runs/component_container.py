@@ -40,7 +40,7 @@ def check_request(spec: ContainerSpec, origin: Origin) -> None:
 
 
 def launch_container(run: Run, spec: ContainerSpec, *, reporter: Reporter, interruptions: Callable[[], int]) -> None:
-    """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run."""
+    """Run the container until it ends, the run that it joins ends, or the user asks to stop; close the run."""
     origin = cast(Origin, run.record.origin)
 
     def host(context: RunContext) -> Host:

@@ -34,7 +34,7 @@ def cover(
 
     The first round has the trials that the configuration draws; the throws of each further round are aimed at the cells
     in which few throws of all rounds before have landed. Rounds that are there already are kept or continued, so the
-    same call goes on after an interruption, and adds rounds if `rounds` is larger. Beside each dataset, such as
+    same call goes on after an interruption, and adds rounds if `rounds` is larger. Next to each dataset, such as
     ``round_02``, lie its configuration, which `throwcollect up` takes, too, and the list of its trials, which only the
     first one lacks.
 

@@ -51,13 +51,11 @@ def _check_cores() -> Check:
 
 
 def _check_memory() -> Check:
-    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-        if line.startswith("MemAvailable:"):
-            available = int(line.split()[1]) * 1024 / _GIB
-            room = int(available / _SIMULATION_MEMORY_GIB)
-            found = f"{available:.1f} GiB available, enough for {format_count(room, 'simulation')}"
-            return Check("memory", "ok" if room >= 1 else "problem", found)
-    return Check("memory", "note", "/proc/meminfo does not say what is available")
+    lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    available = next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")) * 1024 / _GIB
+    room = int(available / _SIMULATION_MEMORY_GIB)
+    found = f"{available:.1f} GiB available, enough for {format_count(room, 'simulation')}"
+    return Check("memory", "ok" if room >= 1 else "problem", found)
 
 
 def _check_engine(name: str) -> Check:

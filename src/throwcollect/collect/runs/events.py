@@ -1,4 +1,4 @@
-"""The events of a run: one JSON document a line in ``events.jsonl`` beside the logs."""
+"""The events of a run: one JSON document a line in ``events.jsonl`` next to the logs."""
 
 from __future__ import annotations
 

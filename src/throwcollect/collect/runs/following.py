@@ -63,7 +63,7 @@ def wait(run: Run) -> Summary:
     """Wait until a run has ended.
 
     Returns:
-        The summary of the dataset; its outcomes tell whether trials are lost.
+        The summary of the dataset; its outcomes show whether trials are lost.
     """
     while run.status == "running":
         time.sleep(_READ_S)

@@ -125,7 +125,7 @@ def join_run(
 ) -> None:
     """Simulate trials of a run that another machine has begun, until the run is over; `word` is the token of the run.
 
-    If somebody asks to stop, which `interruptions` counts, simulations of other machines do the running trials again.
+    If the user asks to stop, which `interruptions` counts, simulations of other machines do the running trials again.
     """
     token = JoinToken.decode(word)
     token.check_build()

@@ -28,11 +28,11 @@ def launch(run: Run, interruptions: Callable[[], int], *, config: Config, report
     """Launch a prepared run until its last trial has ended.
 
     A run that collects no dataset goes on until the user stops it. This function writes the end of the run into its
-    record, and closes the run. `interruptions` tells how often the user has asked to stop: the first time, running
+    record, and closes the run. `interruptions` returns how often the user has asked to stop: the first time, running
     trials are still finished.
 
     Returns:
-        The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
+        The summary of the dataset, whose outcomes show whether trials are lost; None if the run collects none.
     """
 
     def host(context: RunContext) -> Host:
@@ -52,11 +52,11 @@ def launch_host(
 ) -> Summary | None:
     """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
 
-    With `is_open`, anybody can join the run.
+    With `is_open`, joining the run takes no key.
     """
     session = _Session(run, reporter, interruptions)
     context = run.context
-    # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always tells an end.
+    # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always has an end.
     code, summary = 1, None
     failure: RunFailure | None = RunFailure("internal error")
     host: Host | None = None
@@ -123,7 +123,7 @@ class _Session:
         )
 
     def end(self, code: int, failure: RunFailure | None, summary: Summary | None, *, left: bool) -> None:
-        """Write the end of the run; `left` tells whether its containers may still exist."""
+        """Write the end of the run; `left` is whether its containers may still exist."""
         event: RunEvent = "failed"
         if code in (0, LossError.exit_code):
             event = "finished"

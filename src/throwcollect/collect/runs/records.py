@@ -1,10 +1,10 @@
 """The records of this machine's runs, each with a lock that the launcher of the run holds as long as it lives.
 
-The files lie in a directory of the user and not in datasets, so that a dataset does not depend on who looked at it::
+The files lie in a directory of the user and not in datasets, so that a dataset does not depend on who read it::
 
     runs/<run>.json     the record; each change writes the whole file
     runs/<run>.lock     locked by the launcher, see `state_directory.is_locked`
-    runs/<run>/key/     the key of the run, with which everybody can join who can read it
+    runs/<run>/key/     the key of the run, with which every process can join that can read it
     runs/<run>/         further files of a run without a dataset, or before its plan is made
 
 Only the owner can read these files.

@@ -40,7 +40,7 @@ _POLL_S = 0.05
 class Run:
     """A run of this user on this machine.
 
-    To most processes it is what its record said when it was read; `now` reads the record again. One that `prepare` or
+    To most processes it is what its record had when it was read; `now` reads the record again. One that `prepare` or
     `resume` has returned has not begun: launch it once, by `collect` or `start`, and use it as a context manager, which
     removes its files if it is not launched. Until then, no other run can be prepared into its directory.
 
@@ -153,7 +153,7 @@ class Run:
         handler of its own.
 
         Returns:
-            The summary of the dataset; its outcomes tell whether trials are lost.
+            The summary of the dataset; its outcomes show whether trials are lost.
         """
         launch = self._hand_over()
         with count_interruptions(_find_fatal_signals()) as terminations:
@@ -249,7 +249,7 @@ class Run:
 
     def forget(self) -> None:
         """Remove the record and the files of the run, but no dataset in a directory, and release the lock."""
-        # The record is removed first and the lock is released last: nobody finds or takes a half-removed run.
+        # The record is removed first and the lock is released last: no process finds or takes a half-removed run.
         for path in (self._path, self._lock_path):
             with suppress(OSError):
                 path.unlink()

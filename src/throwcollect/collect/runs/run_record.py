@@ -27,7 +27,7 @@ _KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
 
 @dataclass(frozen=True)
 class Summary(Info):
-    """Summary of a run's dataset; `open` says whether anybody could join the run."""
+    """Summary of a run's dataset; `open` is whether joining it took no key."""
 
     open: bool = False
 
@@ -81,7 +81,7 @@ class Planning:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """The record of a run; its launcher changes it, everybody else reads it.
+    """The record of a run; its launcher changes it, other processes read it.
 
     Attributes:
         name: Name of the collection.
@@ -100,7 +100,7 @@ class RunRecord:
         summary: Summary of the dataset; None if the dataset is not finished.
         middleware: The middleware that carries the messages of the nodes.
         origin: The request of a client; None if a command or a program began the run.
-        stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.
+        stopping: Whether the run was asked to stop; it still finishes the trials that run.
         planning: How far the plan is while a large one is made in the background; else None.
         recordings: Directory into which clients of a session record; None if they cannot.
         version: Version of this layout.

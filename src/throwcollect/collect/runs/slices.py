@@ -49,7 +49,7 @@ def collect_slice(
         slice: The slice.
         overrides: Keys to change that do not influence the data: ``key=value`` pairs, as ``--set`` takes them.
         reporter: Receives the progress.
-        interruptions: How often somebody has asked to stop: the first time, running trials are still finished.
+        interruptions: How often the user has asked to stop: the first time, running trials are still finished.
 
     Returns:
         Whether there was anything to do.
@@ -58,7 +58,7 @@ def collect_slice(
     config = read_frozen_config(directory, overrides)
     plan = Plan.read(directory / PLAN, config).slice_of(slice)
     finished = find_finished(directory)
-    # They could never be joined, which otherwise only the join would tell, after all tasks have run.
+    # They could never be joined, which the join would report only after all tasks have run.
     if others := sorted({each.count for each in finished} - {slice.count}):
         raise ConfigError(
             f"{directory}: slice {slice} cannot be joined with those there, which are slices of {others[0]}",
@@ -107,11 +107,10 @@ def _keep_recordings(attempt: Path, earlier: Sequence[Path], directory: Path, sl
 
 def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
     """Read the configuration of a dataset that is to be collected in slices, with overrides as `collect_slice` has."""
-    read_changed_config(directory, overrides)
-    with load_locating_errors(config_path(directory), overrides) as config:
-        check_sliceable(config)
-        check_closed(config)
-        return config
+    config = read_changed_config(directory, overrides)
+    check_sliceable(config)
+    check_closed(config)
+    return config
 
 
 def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Config:

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from throwcollect.dataset.summary import Info
     from throwcollect.sim.simulator import Simulator
 
-_TELL_EVERY_S = 0.2
+_REPORT_EVERY_S = 0.2
 _IDLE_S = 0.05
 _SIMULATION = simulation_name(0)
 
 
 class InProcessRuntime(Runtime):
-    """Simulates in the launcher's own process; nobody can join or scale such a run."""
+    """Simulates in the launcher's own process; such a run cannot be joined or scaled."""
 
     can_be_scaled = False
 
@@ -49,7 +49,7 @@ class InProcess:
     def __init__(self, context: RunContext, config: Config) -> None:
         self._context = context
         self._config = config
-        self._told_at = 0.0
+        self._reported_at = 0.0
 
     def close(self) -> None:
         """Do nothing: `collect` leaves nothing behind."""
@@ -106,7 +106,7 @@ class InProcess:
                 collection.write_one()
             collection.look_after()
             session.nodes(states, endpoint=None, simulations=1)
-            if time.monotonic() >= self._told_at + _TELL_EVERY_S:
-                self._told_at = time.monotonic()
+            if time.monotonic() >= self._reported_at + _REPORT_EVERY_S:
+                self._reported_at = time.monotonic()
                 session.update(collection.progress())
         session.update(collection.progress())

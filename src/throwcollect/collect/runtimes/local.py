@@ -69,9 +69,6 @@ class LocalNodes(NodeHost):
 
     Args:
         elsewhere: Endpoint of a router on another machine; None if the router is one of the nodes.
-
-    Raises:
-        ConfigError: If the router's port is taken.
     """
 
     cleared = True

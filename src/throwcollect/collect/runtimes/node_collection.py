@@ -165,7 +165,7 @@ class NodeCollection:
             raise WorkerError(
                 f"simulations have been ready for {patience_s:g} s, twice, but the coordinator does not see them",
                 evidence=f"they use {self._host.context.middleware.rmw}, and the router at {self._host.endpoint}",
-                hint="throwcollect logs router shows what it said; a firewall may keep nodes apart",
+                hint="throwcollect logs router shows what it printed; a firewall may keep nodes apart",
             )
 
     def _offer(self, node: ros.Node) -> None:

@@ -30,7 +30,7 @@ LAUNCHER = "launcher"
 SIMULATIONS = "simulations"
 """Name of the launcher's parameter with the number of simulations."""
 CONFIGURATION = "configuration"
-"""Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
+"""Name of the launcher's parameter that holds the configuration as a string, for machines that join."""
 ROBOT_FILES = "robot_files"
 """Name of the launcher's parameter that holds the files of a robot that is not installed, see `pack_robot`."""
 

@@ -50,9 +50,6 @@ def call_nodes(
         name: Its name below that of a node.
         request: The request.
         patience_s: Longest wait for the router, and then for the nodes [s].
-
-    Raises:
-        UnreachableError: If the router or a node does not answer, or the router does not accept the key.
     """
     if not answers(connection.endpoint, patience_s=patience_s):
         raise UnreachableError(f"no router answers at {connection.endpoint}")

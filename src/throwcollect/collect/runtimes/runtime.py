@@ -82,7 +82,7 @@ class RunContext:
 
 
 def make_interruption_error(context: RunContext) -> Interrupted:
-    """The error that somebody stopped a collection before every trial had ended."""
+    """The error that the user stopped a collection before every trial had ended."""
     message = f"interrupted; finished throws are in {context.directory}, the dataset is not complete"
     return Interrupted(message, hint=context.resume_command)
 
@@ -100,7 +100,7 @@ class Check:
 
 
 class Session(Protocol):
-    """The launcher, as the host of the run sees it: it takes reports, and tells when the user wants to stop."""
+    """The launcher, as the host of the run sees it: it takes reports, and counts requests to stop."""
 
     def say(self, line: str) -> None:
         """Show the user a line of information."""
@@ -165,7 +165,7 @@ class Runtime(ABC):
 
     @abstractmethod
     def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
-        """Make the host of a run, which starts nothing yet; `warn` gets a line of text about each long wait.
+        """Make the host of a run, which starts nothing yet; `warn` gets a line about each long wait.
 
         Raises:
             ConfigError: If the router's port is taken, or the configuration asks for something that does not exist.
@@ -177,7 +177,7 @@ class Runtime(ABC):
     ) -> Middleware:
         """Make sure that this machine can do a run, even if that takes minutes.
 
-        `middleware` is that of this process. `say` gets a line of text before anything that takes long, and `warn` gets
+        `middleware` is that of this process. `say` gets a line before each long step, and `warn` gets
         a line about anything that may be wrong.
 
         Returns:
@@ -218,7 +218,11 @@ class Runtime(ABC):
 
 
 def get_runtime(name: str) -> Runtime:
-    """Make the runtime of this name."""
+    """Make the runtime of this name.
+
+    Raises:
+        ConfigError: If there is no such runtime.
+    """
     if name not in names_of("runtimes"):
         meant = suggest(name, names_of("runtimes"))
         raise ConfigError([Problem(f"there is no runtime {name}{meant}", key="run.runtime")])

@@ -19,7 +19,7 @@ _LONGEST_BACKOFF_S = 10.0
 _CLOSING_S = 7.0
 """Time for the coordinator to write its files once the running trials have ended or were dropped."""
 _FROZEN_S = 3.0
-"""A node that is stopped for this long counts as lost. A shorter stop is allowed: somebody may examine the node."""
+"""A node that is stopped for this long counts as lost. A shorter stop is allowed: a user may examine the node."""
 
 _RESTARTS_BEFORE_READY = 1
 """A simulation that was never ready is started again only this often, because further attempts rarely help, unless it
@@ -108,7 +108,7 @@ class Supervisor:
 
     def states(self) -> list[NodeState]:
         """All nodes of the run, in the order of the roster."""
-        return [self._state(name) for name in self._roster]
+        return [self._get_state(name) for name in self._roster]
 
     def replace(self, hung: Iterable[str]) -> None:
         """Kill the nodes that hang, so that they are started again, except those that the last call has killed."""
@@ -117,7 +117,7 @@ class Supervisor:
             self.host.signal(name, signal.SIGKILL)
 
     def drain(self, *, hurry: Callable[[], bool] = lambda: False) -> NodeExit | None:
-        """Let the main node finish the running trials and close its files, unless `hurry` says that it has to end now.
+        """Let the main node finish the running trials and close its files, unless `hurry` asks for its end now.
 
         Returns:
             How the main node ended; None if it had to be ended by force, or was about to be started again.
@@ -147,7 +147,7 @@ class Supervisor:
     def _list_names(self, role: NodeRole) -> list[str]:
         return [node.name for node in self._roster.values() if node.role is role]
 
-    def _state(self, name: str) -> NodeState:
+    def _get_state(self, name: str) -> NodeState:
         handle = self.host.handle(name)
         status: Status = "running"
         if name in self._given_up:
@@ -195,7 +195,7 @@ class Supervisor:
             return False
         self._restarts[node.name] = count + 1
         if node.name in self._ready:
-            # What was printed until now says nothing of the next start.
+            # What was printed until now does not count for the next start.
             self._ready.discard(node.name)
             self.host.logs.skip(node.name)
         rest = min(_FIRST_BACKOFF_S * 2**count, _LONGEST_BACKOFF_S)
@@ -204,7 +204,7 @@ class Supervisor:
 
     def _check_that_run_can_go_on(self) -> None:
         """Check that the run can go on."""
-        hint = "throwcollect logs shows what the nodes said"
+        hint = "throwcollect logs shows what the nodes printed"
         names = self._expendables
         vital = next(
             (self._given_up[name] for name in self._list_names(NodeRole.VITAL) if name in self._given_up), None
@@ -240,7 +240,7 @@ def _may_go_on(node: NodeExit) -> bool:
         return False
     # No node itself returns the exit code of one that was killed. A killed process has minus the number of the signal
     # as its exit code, a container 128 plus the number. In a container, 130 would be SIGINT, but a node that was
-    # interrupted also returns 130 by itself, so it does not count.
+    # interrupted also returns 130, so it does not count.
     was_killed = node.code < 0 or node.code > Interrupted.exit_code
     return was_killed or node.code == UnreachableError.exit_code
 

@@ -117,13 +117,9 @@ def test_down_removes_the_container_of_a_launcher_that_died(engine: Engine) -> N
 def test_a_container_joins_a_run_of_containers_over_the_network_of_the_run(tmp_path: Path) -> None:
     connection = Connection("tls/172.18.0.2:7447", RunKey(tmp_path), 7)
     options = find_join_options("talos", "docker", connection, SPEC)
-    assert (options.network, options.key["Source"], options.key["ReadOnly"]) == (
-        "throwcollect-talos",
-        str(tmp_path),
-        True,
-    )
+    assert (options.network, options.key) == ("throwcollect-talos", f"{tmp_path}:/key:ro,z")
     assert "tls/router:7447" in options.environment["ZENOH_CONFIG_OVERRIDE"]
     assert (options.environment["ROS_DOMAIN_ID"], options.environment["RMW_IMPLEMENTATION"]) == ("7", "rmw_zenoh_cpp")
     options = find_join_options("talos", "local", connection, SPEC)
-    assert (options.network, options.key["Source"], options.key["Target"]) == (None, str(tmp_path), "/key")
+    assert (options.network, options.key) == (None, f"{tmp_path}:/key:ro,z")
     assert "tls/172.18.0.2:7447" in options.environment["ZENOH_CONFIG_OVERRIDE"]

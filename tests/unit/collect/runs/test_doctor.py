@@ -12,7 +12,7 @@ from throwcollect.collect.runs.doctor import examine
 from throwcollect.members import names_of
 from throwcollect.robots.talos import TALOS
 
-PLUGINS = Path(__file__).parents[2] / "plugins"
+PLUGINS = Path(__file__).parents[3] / "plugins"
 
 
 def test_doctor_finds_no_problem_on_a_machine_that_runs_the_tests(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     package = tmp_path / "cluster-1.0.dist-info"
     package.mkdir()
     (package / "METADATA").write_text("Metadata-Version: 2.1\nName: cluster\nVersion: 1.0\n")
-    (package / "entry_points.txt").write_text(f"[throwcollect.collect.runtimes]\ncluster = {__name__}:Cluster\n")
+    (package / "entry_points.txt").write_text(f"[throwcollect.runtimes]\ncluster = {__name__}:Cluster\n")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
     members._find_members.cache_clear()

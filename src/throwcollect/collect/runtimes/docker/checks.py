@@ -64,22 +64,22 @@ def _check(
         raise WorkerError(f"the Docker engine has no image {name}", hint=hint)
     problems: list[Problem] = []
     for key, section in sections.items():
-        problems += _problems(key, section, networks, root, mounts=mounts)
+        problems += _find_problems(key, section, networks, root, mounts=mounts)
     if problems:
         raise ConfigError(problems)
     return str(found.id)
 
 
-def _problems(
+def _find_problems(
     key: str, section: NodeContainerConfig, networks: set[str], root: str, *, mounts: str
 ) -> Iterator[Problem]:
     for index, mount in enumerate(section.mounts):
         source, target, *_ = mount.split(":")
-        wrong = _wrong_mount(Path(source), root) or _wrong_target(target)
+        wrong = _refuse_mount(Path(source), root) or _refuse_target(target)
         if wrong is not None:
             yield Problem(wrong, f"{key}.{mounts}.{index}")
     for index, device in enumerate(section.options.get("devices", [])):
-        if (wrong := _wrong_device(Path(device.partition(":")[0]))) is not None:
+        if (wrong := _refuse_device(Path(device.partition(":")[0]))) is not None:
             yield Problem(wrong, f"{key}.options.devices.{index}")
     for index, network in enumerate(section.networks):
         if network not in networks:
@@ -87,7 +87,7 @@ def _problems(
             yield Problem(wrong, f"{key}.networks.{index}")
 
 
-def _wrong_target(path: str) -> str | None:
+def _refuse_target(path: str) -> str | None:
     """Why nothing must be mounted at a path in a container; None if it may."""
     target = PurePosixPath(posixpath.normpath(path))
     first = target.parts[1:2]
@@ -95,7 +95,7 @@ def _wrong_target(path: str) -> str | None:
     return f"{target} is refused, as the dataset, the key or the image is there in the container" if taken else None
 
 
-def _wrong_mount(source: Path, root: str) -> str | None:
+def _refuse_mount(source: Path, root: str) -> str | None:
     """Why a path, or the target of a link, must not be mounted; None if it may. `root` holds the engine's files."""
     if not source.exists():
         return f"{source} does not exist on this machine"
@@ -114,7 +114,7 @@ def _wrong_mount(source: Path, root: str) -> str | None:
 
 
 def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
-    """Say why a directory or file of the host must not be mounted; None if it may be.
+    """Explain why a directory or file of the host must not be mounted; None if it may be.
 
     Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets. The
     path is absolute and leads through no links; `more` are further directories of the system, such as those of the
@@ -136,7 +136,7 @@ def is_allowed_device(path: str) -> bool:
     return _DEVICE.fullmatch(path) is not None
 
 
-def _wrong_device(device: Path) -> str | None:
+def _refuse_device(device: Path) -> str | None:
     """Why a container must not get a device, or its target if it is a link; None if it may."""
     if not device.exists():
         return f"{device} does not exist on this machine"

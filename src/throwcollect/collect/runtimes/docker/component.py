@@ -82,11 +82,7 @@ class ComponentContainer:
         context: The run that consists of this container.
         joining: The options for the run that the container joins; None if it joins none.
         is_running: Returns whether the run with an id is running; it is called again and again.
-        warn: Gets a line of text when the engine is silent for long.
-
-    Raises:
-        ConfigError: If the container needs a mount or a network that does not exist.
-        WorkerError: If no engine answers, or it does not have the image.
+        warn: Gets a line when the engine is silent for long.
     """
 
     def __init__(
@@ -115,9 +111,9 @@ class ComponentContainer:
             self._containers.open()
             session.event("started")
             # Up to version 1.43 of the engine's API, a container is made in one network, and joins others afterwards.
-            self._containers.start(CONTAINER, self._options(), networks=self._networks[1:])
+            self._containers.start(CONTAINER, self._make_options(), networks=self._networks[1:])
             while not session.interruptions():
-                session.nodes([self._state()], endpoint=None, simulations=0)
+                session.nodes([self._get_state()], endpoint=None, simulations=0)
                 if self._has_ended(session):
                     return
                 time.sleep(_POLL_S)
@@ -142,7 +138,7 @@ class ComponentContainer:
         """Whether the run that the container has joined has ended."""
         return self._joining is not None and not self._is_running(self._joining.run)
 
-    def _options(self) -> dict[str, Any]:
+    def _make_options(self) -> dict[str, Any]:
         joining, spec = self._joining, self._spec
         options = container_options(
             self._context,
@@ -165,7 +161,7 @@ class ComponentContainer:
             options["networking_config"] = {first: EndpointConfig(API_VERSION)}
         return options
 
-    def _state(self) -> NodeState:
+    def _get_state(self) -> NodeState:
         container = self._containers.by_node[CONTAINER]
         if container.id is None:
             return NodeState(CONTAINER, "starting", 0, None, None)

@@ -161,7 +161,7 @@ def container_options(
         "labels": {**options.get("labels", {}), **labels(context), NODE_LABEL: node},
         # Nothing but /tmp can be written in the container.
         "environment": {"HOME": _TMP, **chosen, **environment},
-        "tmpfs": _with_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
+        "tmpfs": _join_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
         "volumes": [*mounts, *section.mounts],
         "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
@@ -173,6 +173,6 @@ def container_options(
     }
 
 
-def _with_tmpfs(own: Mapping[str, str], chosen: Mapping[str, str]) -> dict[str, str]:
+def _join_tmpfs(own: Mapping[str, str], chosen: Mapping[str, str]) -> dict[str, str]:
     # The kernel takes the last of mount options that contradict each other.
     return {**own, **{path: ",".join(filter(None, [own.get(path), options])) for path, options in chosen.items()}}

@@ -101,7 +101,7 @@ class Containers:
 
     Args:
         logs: The files to which the output of the containers is appended.
-        warn: Gets a line of text when the engine does not answer for long.
+        warn: Gets a line when the engine does not answer for long.
     """
 
     def __init__(self, client: DockerClient, run: str, logs: NodeLogs, warn: Callable[[str], None]) -> None:

@@ -97,7 +97,7 @@ def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Ima
 
 def find_image(client: DockerClient, name: str) -> Image | None:
     """Find an image of the engine, with its labels; None if the engine does not have it."""
-    with engine_errors(f"the engine does not say whether it has the image {name}"):
+    with engine_errors(f"the engine does not report whether it has the image {name}"):
         try:
             return client.images.get(name)
         except ImageNotFound:

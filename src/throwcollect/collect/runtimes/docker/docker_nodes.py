@@ -46,12 +46,8 @@ class DockerNodes(NodeHost):
 
     Args:
         context: The run; its id has to be unique on the engine.
-        warn: Gets a line of text when the engine is silent for long.
+        warn: Gets a line when the engine is silent for long.
         client: Client of the engine; None connects to the one that `engine_address` finds.
-
-    Raises:
-        ConfigError: If a mount or a network of the configuration does not exist, or a port is taken.
-        WorkerError: If no engine answers, or it does not have the image.
     """
 
     def __init__(
@@ -106,7 +102,7 @@ class DockerNodes(NodeHost):
         """The address that a node is to have in the run's network; None if it may be any."""
         if node.name != ROUTER or not self.context.middleware.is_fast_dds:
             return None
-        with engine_errors("the engine does not say which addresses the run's network has"):
+        with engine_errors("the engine does not report which addresses the run's network has"):
             network = self._client.networks.get(network_of(self.context.run))
         # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])

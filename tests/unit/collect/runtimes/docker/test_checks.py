@@ -98,10 +98,10 @@ def test_a_device_link_to_a_device_that_is_not_allowed_is_refused(
     gpus.mkdir()
     (gpus / "card0").touch()
     monkeypatch.setattr(docker_checks, "is_allowed_device", lambda path: path.startswith(str(gpus)))
-    assert docker_checks._wrong_device(gpus) is None
+    assert docker_checks._refuse_device(gpus) is None
     (gpus / "disk").symlink_to("/dev/null")
-    assert "leads to other devices" in (docker_checks._wrong_device(gpus) or "")
-    assert "leads to other devices" in (docker_checks._wrong_device(gpus / "disk") or "")
+    assert "leads to other devices" in (docker_checks._refuse_device(gpus) or "")
+    assert "leads to other devices" in (docker_checks._refuse_device(gpus / "disk") or "")
     assert problems(options={"devices": ["/dev/nvidia99:/dev/nvidia99:rw"]}) == [
         "options.devices.0: /dev/nvidia99 does not exist on this machine"
     ]
