@@ -15,8 +15,8 @@ from pathlib import Path
 
 from throwcollect.collect.coordinator.collection import TrialCollection
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.throws_table import judge_episode
 from throwcollect.episode.episode_message import Episode, pack, unpack
 from throwcollect.plan.conditions import Settings
 from throwcollect.plan.plan import Plan

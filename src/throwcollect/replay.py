@@ -11,11 +11,10 @@ import numpy as np
 
 from throwcollect.arguments import check_bounds
 from throwcollect.config.values import column_of, with_values
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.manifest import Finding
 from throwcollect.dataset.provenance import find_versions, read_provenance
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throws_table import ThrowsTable
+from throwcollect.dataset.throws_table import ThrowsTable, judge_episode
 from throwcollect.dataset.verify import verify
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode

@@ -17,9 +17,8 @@ from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.config.values import reason_not_sweepable, with_values
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import ThrowsTable
+from throwcollect.dataset.throws_table import ThrowsTable, judge_episode
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require

@@ -80,11 +80,6 @@ def describe_other(directory: Path) -> str:
     return f"holds no dataset{suggest_path(directory)}"
 
 
-def is_attempt(directory: Path) -> bool:
-    """Whether a directory belongs to an attempt at a slice, which no other process knows (see `slices`)."""
-    return ATTEMPT in directory.name
-
-
 def find_known_directory(directory: Path) -> Path | None:
     """Find the directory of a dataset as its user knows it; a process in a container may see it at another path.
 

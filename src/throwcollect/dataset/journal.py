@@ -34,11 +34,7 @@ Event = Literal["opened", "exposed", "recovered", "lease", "commit", "fail", "lo
 
 
 class Journal:
-    """The journal of a dataset that is being collected, which one process at a time may hold.
-
-    Raises:
-        DatasetError: If another process holds it, or it cannot be written.
-    """
+    """The journal of a dataset that is being collected, which one process at a time may hold."""
 
     def __init__(self, directory: Path) -> None:
         self._path = directory / JOURNAL

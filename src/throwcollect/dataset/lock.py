@@ -26,7 +26,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from throwcollect.dataset.directory import is_attempt
+from throwcollect.dataset.directory import ATTEMPT
 from throwcollect.errors import DatasetError
 from throwcollect.files import unreadable
 
@@ -77,7 +77,7 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool =
                 ) from error
             time.sleep(_RETRY_S)
         except OSError as error:
-            if error.errno in _NO_LOCKS and (not needed or is_attempt(directory)):
+            if error.errno in _NO_LOCKS and (not needed or ATTEMPT in directory.name):
                 return
             raise DatasetError(
                 f"cannot be locked: {error.strerror}",

@@ -25,11 +25,10 @@ from throwcollect.dataset.directory import (
     TRIALS,
     path_of_part,
 )
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import open_mcap, scan_file
 from throwcollect.dataset.shard import FinishedShard, OpenShard, rewrite
-from throwcollect.dataset.throws_table import Row, place_columns
+from throwcollect.dataset.throws_table import Row, judge_episode, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError

@@ -53,11 +53,7 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 
 
 def find_rows(condition: str, table: pa.Table, argument: str) -> Any:
-    """Find the rows that fulfil a condition, as an Arrow mask; null, where a number is missing, is not fulfilled.
-
-    Raises:
-        ConfigError: If it is no condition on columns of the table; the message names the argument that it was given as.
-    """
+    """Find the rows that fulfil a condition, as an Arrow mask; null, where a number is missing, is not fulfilled."""
     mask = compute(condition, table, argument)
     if not pa.types.is_boolean(mask.type):
         raise refuse_argument(argument, f"{condition!r} is no condition", expected=_EXAMPLE)
@@ -65,11 +61,7 @@ def find_rows(condition: str, table: pa.Table, argument: str) -> Any:
 
 
 def compute(expression: str, table: pa.Table, argument: str) -> Any:
-    """Compute an expression in each row, as an Arrow array; a null stays null in comparisons and arithmetic.
-
-    Raises:
-        ConfigError: If it cannot be evaluated; the message names the argument that it was given as.
-    """
+    """Compute an expression in each row, as an Arrow array; a null stays null in comparisons and arithmetic."""
     try:
         # In parentheses, it may go over several lines.
         value = _evaluate(ast.parse(f"({expression})", mode="eval").body, table)

@@ -22,14 +22,13 @@ from throwcollect.dataset.carried_robot import carry_robot, config_text
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import refuse_many_files, refuse_taken
 from throwcollect.dataset.directory import CONFIG, MANIFEST, PLAN, THROWS, path_of_part, shard_name
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import read_manifest
 from throwcollect.dataset.provenance import Provenance
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.shard import Recording
 from throwcollect.dataset.slices import read_statistics
-from throwcollect.dataset.throws_table import read_throws_table
+from throwcollect.dataset.throws_table import judge_episode, read_throws_table
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode

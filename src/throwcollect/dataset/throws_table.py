@@ -1,4 +1,7 @@
-"""The table of throws: one row a trial, with its swept values, its result, and the place of its episode."""
+"""The table of throws: one row a trial, with its swept values, its result, and the place of its episode.
+
+`judge_episode` finds the result from an episode, by the rules of the coordinator.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +26,11 @@ from throwcollect.plan.arrow_column import find_trial, make_table, read_validity
 from throwcollect.plan.parquet_file import read_parquet
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.trials import Trial
+from throwcollect.robots.description import robot_of
 from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import REFUSED, Result
 from throwcollect.tasks.result_columns import BodyColumns
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.units import ascii_unit, unit_of_name
 
 Row = dict[str, Any]
@@ -35,6 +39,16 @@ Row = dict[str, Any]
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
 _STATE = BodyColumns("")
+
+
+def judge_episode(config: Config, episode: Episode) -> Result:
+    """Find the result of a trial with this configuration from its episode."""
+    samples = episode.samples(robot_of(config).joints)
+    if (np.diff(samples.stamps_ns) <= 0).any():
+        raise DatasetError("chunk: the stamps do not increase")
+    with explain_failure("tasks", config.task.name, f"judge trial {episode.header.trial}"):
+        result: Result = task_of(config).judge(samples, episode.header, trajectory_of(config))
+    return result
 
 
 def place_columns(shard: str, chunk_offset: int, episode: Episode) -> Row:
@@ -67,10 +81,6 @@ class ThrowsTable:
         columns: Columns with their types.
 
     The parameters are the swept keys, and the targets columns of targets, in their order.
-
-    Raises:
-        ConfigError: If two columns have the same name.
-        MemberError: If the task comes from another package, and fails to declare its results.
     """
 
     def __init__(self, parameters: Sequence[str], config: Config, targets: Sequence[str] = ()) -> None:

@@ -162,10 +162,6 @@ def read_trajectories(
 
     `known` are the joints, and `bodies` the bodies that are recorded, with the object first; the other arguments are
     those of `Dataset.trajectories`.
-
-    Raises:
-        ConfigError: If there is no such column.
-        DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
     """
     there = list_columns(bodies)
     for column in columns:

@@ -16,12 +16,11 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.manifest import FileEntry, Finding
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import McapContents, WholeEpisode, open_mcap, scan
 from throwcollect.dataset.shard import rewrite
-from throwcollect.dataset.throws_table import Row, ThrowsTable, place_columns
+from throwcollect.dataset.throws_table import Row, ThrowsTable, judge_episode, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import count_indexed
 from throwcollect.episode.episode_message import Episode

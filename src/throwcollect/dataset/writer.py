@@ -8,7 +8,7 @@ stopped, the next writer takes in the files that it left (see `recovery`) and go
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
@@ -19,15 +19,14 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.carried_robot import write_config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import data_card
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, path_of_part, shard_name
 from throwcollect.dataset.journal import Event, Journal, was_open
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import Judge, LeftOfShard, find_left, recover_shard, remove_unfinished
-from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording, ShardLayout
+from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.summary_files import write_description
-from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, place_columns
+from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, judge_episode, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
@@ -50,6 +49,9 @@ class DatasetWriter:
         plan: The plan in that directory.
         journal: Receives events; None for datasets that are written in one go.
         channels: What is recorded; None for the channels of the robot that is installed here.
+
+    Attributes:
+        plan: The trials.
     """
 
     def __init__(
@@ -63,10 +65,11 @@ class DatasetWriter:
         self._directory = directory
         self._config: Config = plan.config
         self._journal = journal
-        self._layout = ShardLayout(directory, plan)
+        self.plan, self._trials_per_shard = plan, plan.config.record.trials_per_shard
         self._channels = channels or Channels(self._config, full_description(self._config))
         self._table = ThrowsTable.of(plan)
-        self._unfinished = set(self._layout.numbers_of(plan.trials.numbers))
+        trials = plan.trials.numbers
+        self._unfinished = {*range(self._number_of(trials.start), self._number_of(trials.stop - 1) + 1)}
         self._shards: dict[int, OpenShard] = {}
         """Unfinished shards with at least one trial that has ended."""
         self._recordings: dict[int, Recording] = {}
@@ -74,15 +77,10 @@ class DatasetWriter:
         self._finished_rows: dict[int, pa.Table] = {}
         """The rows of each finished shard, in order of trials."""
         self._held = ExitStack()
-        for number in self._layout.numbers_of(plan.trials.numbers):
+        for number in sorted(self._unfinished):
             # A shard of refused trials alone waits for no episode, and nothing would finish it later.
-            if next(self._layout.to_run(number), None) is None:
+            if next(self._list_to_run(number), None) is None:
                 self._finish_shard_if_complete(number)
-
-    @property
-    def plan(self) -> Plan:
-        """The trials."""
-        return self._layout.plan
 
     @classmethod
     def open(cls, directory: Path, *, channels: Channels | None = None) -> DatasetWriter:
@@ -118,9 +116,15 @@ class DatasetWriter:
             remove(self._directory / name)
         count = 0
         # Every process gets the trials of the shards that it looks through, and not a whole plan.
-        parts = {each: self._layout.part(each) for each in sorted(self._unfinished) if self._layout.has_file(each)}
-        all_left = find_left([*parts.values()], self._channels, judge=judge, processes=processes)
-        for number, found in zip(parts, all_left, strict=True):
+        paths = {number: self._make_path(number) for number in sorted(self._unfinished)}
+        begun = {number: path for number, path in paths.items() if path.exists() or path_of_part(path).exists()}
+        first = self.plan.trials.first
+        parts = [
+            (path, Plan(self._config, self.plan.trials[members.start - first : members.stop - first]))
+            for path, members in zip(begun.values(), map(self._list_members, begun), strict=True)
+        ]
+        all_left = find_left(parts, self._channels, judge=judge, processes=processes)
+        for number, found in zip(begun, all_left, strict=True):
             kept = {trial: each for trial, each in sorted(found.episodes.items()) if keep(trial, each.result)}
             left = found if len(kept) == len(found.episodes) else LeftOfShard(found.path, kept, None)
             shard = self._get_shard(number)
@@ -141,7 +145,7 @@ class DatasetWriter:
     def refuse(self, trial: int, reason: str) -> None:
         """Note that a trial, which has no episode, is not run after all."""
         self.plan.trials.refused[trial] = reason
-        number = self._layout.number_of(trial)
+        number = self._number_of(trial)
         self._get_shard(number).missing.discard(trial)
         self._finish_shard_if_complete(number)
 
@@ -150,11 +154,11 @@ class DatasetWriter:
 
         All trials up to the last one have to be in, and no later one may be.
         """
-        self._layout.plan = replace(self.plan, trials=self.plan.trials[: last + 1 - self.plan.trials.first])
+        self.plan = replace(self.plan, trials=self.plan.trials[: last + 1 - self.plan.trials.first])
         self.plan.write(self._directory / PLAN)
-        self._unfinished = {number for number in self._unfinished if number <= self._layout.number_of(last)}
+        self._unfinished = {number for number in self._unfinished if number <= self._number_of(last)}
         for number in list(self._unfinished):
-            self._get_shard(number).missing.intersection_update(self._layout.members(number))
+            self._get_shard(number).missing.intersection_update(self._list_members(number))
             self._finish_shard_if_complete(number)
 
     def take_shard(self, number: int, recording: Recording | None, rows: pa.Table) -> None:
@@ -244,18 +248,35 @@ class DatasetWriter:
         self._held.close()
         self._journal = None
 
+    def _number_of(self, trial: int) -> int:
+        """Find the number of the shard of a trial."""
+        return trial // self._trials_per_shard
+
+    def _list_members(self, number: int) -> range:
+        """List the trials of a shard."""
+        size, numbers = self._trials_per_shard, self.plan.trials.numbers
+        return range(max(number * size, numbers.start), min((number + 1) * size, numbers.stop))
+
+    def _list_to_run(self, number: int) -> Iterator[int]:
+        """List the trials of a shard that are not refused."""
+        return (each for each in self._list_members(number) if each not in self.plan.trials.refused)
+
+    def _make_path(self, number: int) -> Path:
+        """Make the path of a shard once it is finished."""
+        return self._directory / shard_name(self._config.name, number)
+
     def _get_shard(self, number: int) -> OpenShard:
         """Return an unfinished shard, which takes memory only once it has been asked for."""
         if number not in self._shards:
-            self._shards[number] = OpenShard(self._layout.path(number), self._channels)
-            self._shards[number].missing.update(self._layout.to_run(number))
+            self._shards[number] = OpenShard(self._make_path(number), self._channels)
+            self._shards[number].missing.update(self._list_to_run(number))
         return self._shards[number]
 
     def _make_row(self, trial: int, result: Result, place: Row | None) -> Row:
         return self._table.row(self.plan.trial(trial), result, place)
 
     def _find_waiting_shard(self, trial: int) -> int:
-        shard = self._layout.number_of(trial)
+        shard = self._number_of(trial)
         if shard not in self._unfinished or trial not in self._get_shard(shard).missing:
             raise DatasetError(f"no episode of trial {trial} is waited for", path=self._directory)
         return shard
@@ -267,7 +288,7 @@ class DatasetWriter:
 
     def _close_shard(self, number: int, finished: FinishedShard) -> None:
         shard, refused = self._shards.pop(number), self._table.make_refused_row
-        rows = [shard.rows.get(trial) or refused(self.plan.trial(trial)) for trial in self._layout.members(number)]
+        rows = [shard.rows.get(trial) or refused(self.plan.trial(trial)) for trial in self._list_members(number)]
         for row in rows:
             row["chunk_offset"] = finished.offsets.get(row["trial"])
         self.take_shard(number, finished.recording, self._table.table(rows))

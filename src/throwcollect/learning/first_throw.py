@@ -73,9 +73,6 @@ def find_first_throw(
         task: Name of the task.
         engine: Name of the physics engine.
         say: Is given progress, a line at a time.
-
-    Raises:
-        ConfigError: If no throw was found; the message has what failed how often.
     """
     return _Search(robot, lines, task, engine, say).run()
 

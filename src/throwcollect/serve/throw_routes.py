@@ -13,9 +13,8 @@ from pydantic import BaseModel
 
 from throwcollect.dataset.directory import JOURNAL, THROWS, path_of_part, shard_of
 from throwcollect.dataset.journal import read_commits
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_reader import EpisodePlace, scan_file
-from throwcollect.dataset.throws_table import find_row
+from throwcollect.dataset.throws_table import find_row, judge_episode
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import NotFoundError
 from throwcollect.plan.parquet_file import read_parquet

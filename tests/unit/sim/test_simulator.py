@@ -9,7 +9,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.dataset.judging import judge_episode
+from throwcollect.dataset.throws_table import judge_episode
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.engine import Observer, Steps
 from throwcollect.episode.episode_message import Episode

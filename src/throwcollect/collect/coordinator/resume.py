@@ -20,13 +20,12 @@ from throwcollect.config.values import differences
 from throwcollect.dataset.carried_robot import carry_robot, config_text, find_files, write_config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS, config_path
-from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import is_begun
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws_table import ThrowsTable, find_row, read_throws, read_throws_table
+from throwcollect.dataset.throws_table import ThrowsTable, find_row, judge_episode, read_throws, read_throws_table
 from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels

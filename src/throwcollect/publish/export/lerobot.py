@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from throwcollect.config.sensors import PictureConfig
+from throwcollect.dataset.derive.statistics import Moments
 from throwcollect.dataset.directory import THROWS
-from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
 from throwcollect.plan.parquet_file import encode_table

@@ -84,11 +84,6 @@ def render(
         size: Width and height of the picture of a throw [pixels].
         slow: How many times slower than real time it is.
         strip: Number of pictures in a PNG file, from the start to the end of the throws; a single one shows the end.
-
-    Raises:
-        ConfigError: If there is no such format or camera, or there are too many trials.
-        DatasetError: If there is no such trial, or it cannot be read.
-        MissingExtraError: If Pillow or, for a video, PyAV is not installed.
     """
     kind = output.suffix.lower()
     if kind not in _KINDS:

@@ -5,7 +5,7 @@ from functools import reduce
 import numpy as np
 import pytest
 
-from throwcollect.dataset.moments import Moments
+from throwcollect.dataset.derive.statistics import Moments
 
 
 def test_moments_of_portions_add_up_to_those_of_the_whole() -> None:
