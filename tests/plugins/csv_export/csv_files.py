@@ -7,8 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 from pyarrow.csv import write_csv
 
-from throwcollect.publish.export.exporter import Exporter
-from throwcollect.publish.export.readme import Layout, tabulate_signals
+from throwcollect.publish.export.exporter import Exporter, Layout, tabulate_signals
 from throwcollect.publish.export.throw_source import ExportSource
 
 

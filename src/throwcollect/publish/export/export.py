@@ -14,8 +14,7 @@ from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, write_file
 from throwcollect.members import explain_failure, load_member, names_of
 from throwcollect.plan.point_file import encode_points
-from throwcollect.publish.export.exporter import Exporter
-from throwcollect.publish.export.readme import render_card
+from throwcollect.publish.export.exporter import Exporter, render_card
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource, choose_streams
 from throwcollect.wording import suggest
 
@@ -45,7 +44,7 @@ def export(
     The format is ``parquet``, ``npz``, ``lerobot``, ``hdf5``, ``mat``, or one of another package. The directory to
     write must be new or empty, and nothing is left there on failure.
 
-    What sensors saw is stored as `images` says: as ``av1``, ``h264``, ``png`` or, with depths, ``depth`` in
+    What sensors saw is stored as `images` states: as ``av1``, ``h264``, ``png`` or, with depths, ``depth`` in
     ``lerobot``, as ``arrays`` in ``hdf5`` and ``npz``, or not at all (``none``, which is usual but in ``lerobot`` and
     ``hdf5``). Each sample then has a frame of each sensor, so that the rate is that of the sensors.
 
@@ -70,16 +69,16 @@ def export(
     source = ExportSource.of(dataset, streams, rate_hz=rate_hz, images=way)
     if images not in (None, NO_IMAGES) and not source.streams:
         raise refuse_argument("images", f"{directory} has no sensors that {to} has images of", expected=NO_IMAGES)
-    with new_directory(output) as beside:
+    with new_directory(output) as scratch:
         with explain_failure("exporters", to, f"write {output}", passing=(OSError,)):
-            chosen.write(source, beside)
+            chosen.write(source, scratch)
             card = render_card(source, chosen.describe(source))
-        shutil.copyfile(directory / CONFIG, beside / CONFIG)
-        carry_robot(source.dataset.config, beside)
+        shutil.copyfile(directory / CONFIG, scratch / CONFIG)
+        carry_robot(source.dataset.config, scratch)
         if source.dataset.config.sweep.file is not None:
-            write_file(beside / TRIALS, encode_points(source.dataset.plan.trials.points))
-        (beside / CARD).write_text(card, encoding="utf-8")
-        size = sum(path.stat().st_size for path in beside.rglob("*") if path.is_file())
+            write_file(scratch / TRIALS, encode_points(source.dataset.plan.trials.points))
+        (scratch / CARD).write_text(card, encoding="utf-8")
+        size = sum(path.stat().st_size for path in scratch.rglob("*") if path.is_file())
     return Exported(
         directory=str(output),
         format=to,

@@ -13,15 +13,14 @@ from numpy.typing import NDArray
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
 from throwcollect.interruption import count_interruptions
-from throwcollect.publish.export.exporter import Exporter
+from throwcollect.publish.export.exporter import Exporter, Layout, tabulate_signals
 from throwcollect.publish.export.npz import to_array
-from throwcollect.publish.export.readme import Layout, tabulate_signals
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource, Signal, ThrowSeries, read_metadata
 
 h5py = lazily("h5py")
 
 _COMMAND = "command_position_rad"
-_BESIDE = ("time_s", _COMMAND, "command_velocity_radps", "command_acceleration_radps2")
+_OTHERS = ("time_s", _COMMAND, "command_velocity_radps", "command_acceleration_radps2")
 """Signals that are neither an observation nor an action, so they are stored next to both."""
 _LATER = " One sample later."
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
@@ -32,7 +31,7 @@ _GYM = 2
 
 
 def describe(source: ExportSource) -> Layout:
-    """Say how `write` lays a source out."""
+    """Describe how `write` lays a source out."""
     config, task = source.dataset.config, source.dataset.config.task
     noun, position = task.noun, f"{config.acted_on}_position_m"
     success, measure = task.success, next(iter(task.targets), "outcome")
@@ -141,11 +140,11 @@ def _add_throw(group: Any, throw: ThrowSeries, source: ExportSource) -> None:
     group["rewards"] = throw.done * throw.succeeded
     for signal in source.signals:
         values = throw.signals[signal.name]
-        if signal.name in _BESIDE:
+        if signal.name in _OTHERS:
             _add_signal(group, signal.name, signal, values)
         else:
             _add_signal(group, f"obs/{signal.name}", signal, values)
-            # As in robomimic's own conversions, the last observation is followed by itself.
+            # As in robomimic's own conversions, the last observation is repeated.
             _add_signal(group, f"next_obs/{signal.name}", signal, np.concatenate([values[1:], values[-1:]]), _LATER)
         if signal.name == _COMMAND:
             _add_signal(group, "actions", signal, throw.find_actions(source.rate_hz), _LATER)

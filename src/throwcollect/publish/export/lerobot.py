@@ -21,7 +21,7 @@ from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
 from throwcollect.plan.parquet_file import encode_table
-from throwcollect.publish.export.exporter import Exporter
+from throwcollect.publish.export.exporter import Exporter, Layout, list_joints
 from throwcollect.publish.export.images import (
     CODECS,
     MEGABYTES_PER_VIDEO,
@@ -31,7 +31,6 @@ from throwcollect.publish.export.images import (
     encode_pictures,
 )
 from throwcollect.publish.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
-from throwcollect.publish.export.readme import Layout, list_joints
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource, ThrowSeries, unit_of
 from throwcollect.robots.surroundings import moving_bodies_of
 
@@ -74,7 +73,7 @@ class Feature:
 
 
 def describe(source: ExportSource) -> Layout:
-    """Say how `write` lays a source out."""
+    """Describe how `write` lays a source out."""
     config = source.dataset.config
     success, noun, body = config.task.success, config.task.noun, config.acted_on
     longest = max(map(source.count_samples, source.throws))
@@ -82,7 +81,7 @@ def describe(source: ExportSource) -> Layout:
         files={
             "data/": "one row a frame.",
             "meta/": "features, statistics, tasks, episodes; `meta/episodes/` has the columns of the table below, too.",
-            THROWS: "one row a trial, also of those without episode; `episode_index` says which frames are its own.",
+            THROWS: "one row a trial, also of those without episode; `episode_index` numbers its frames.",
         },
         loading=f"""\
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -148,10 +147,10 @@ def write(source: ExportSource, directory: Path) -> None:
         for start in range(0, len(episodes), _EPISODES_PER_GROUP):
             rows = []
             for number, throw in enumerate(islice(throws, _EPISODES_PER_GROUP), start=start):
-                task = _say_task(source, throw.throw)
+                task = _word_task(source, throw.throw)
                 index = tasks.setdefault(task, len(tasks))
                 features = _compute_features(throw, source, episode=number, first=first, task=index)
-                # This comes before the frames are appended, and says in which file they will be.
+                # This comes before the frames are appended, and finds the file that they go to.
                 chunk, file = data.place()
                 columns = {name: feature.as_column() for name, feature in features.items()}
                 table_of_frames = pa.table(columns, metadata={"throwcollect.digest": source.dataset.digest})
@@ -290,12 +289,12 @@ def _describe_dataset(
     }
 
 
-def _say_task(source: ExportSource, throw: Throw) -> str:
-    """Say in words what the robot is to do, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
+def _word_task(source: ExportSource, throw: Throw) -> str:
+    """Put into words what the robot is to do, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
     task = source.dataset.config.task
-    said = task.instruction or task.name.replace("_", " ").capitalize()
+    words = task.instruction or task.name.replace("_", " ").capitalize()
     goal = [f"{each.word} {throw[each.name]:.2f} {unit_of(each.name)}" for each in source.targets]
-    return f"{said} to {', '.join(goal)}." if goal else f"{said}."
+    return f"{words} to {', '.join(goal)}." if goal else f"{words}."
 
 
 def _describe_goal(source: ExportSource) -> str:
@@ -305,7 +304,7 @@ def _describe_goal(source: ExportSource) -> str:
 
 
 def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
-    """Make a table with one row for each task, whose text is the index, as pandas stores it."""
+    """Make a table with one row for each task, whose words are the index, as pandas stores it."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": stored, "metadata": None}
         for name, kind, stored in (("task_index", "int64", "int64"), ("task", "unicode", "object"))

@@ -20,9 +20,8 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
 from throwcollect.progress_log import log_progress
-from throwcollect.publish.export.exporter import Exporter
+from throwcollect.publish.export.exporter import Exporter, Layout, list_joints
 from throwcollect.publish.export.npz import to_array
-from throwcollect.publish.export.readme import Layout, list_joints
 from throwcollect.publish.export.throw_source import ExportSource, ThrowSeries, read_metadata
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
@@ -39,7 +38,7 @@ _LARGEST = 2**31 - 1
 
 
 def describe(source: ExportSource) -> Layout:
-    """Say how `write` lays a source out."""
+    """Describe how `write` lays a source out."""
     return Layout(
         files={
             "throws.mat": "`throws` has one field a column of the table of all trials, with NaN, -1 or an empty string "
@@ -98,7 +97,7 @@ def write(source: ExportSource, directory: Path) -> None:
             f"mat has no room for the name of the column {long[0]}",
             expected=f"at most {_LONGEST_NAME} characters, or another format",
         )
-    # An array of objects, as texts are, becomes a cell array; one of texts would become a matrix of characters.
+    # An array of objects, as strings are, becomes a cell array; one of strings would become a matrix of characters.
     columns = {name: to_array(source.table[name])[:, np.newaxis] for name in source.table.column_names}
     units = {field.name: read_metadata(field).get("unit", "") for field in source.table.schema}
     _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.dataset.digest})

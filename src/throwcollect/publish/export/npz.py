@@ -17,8 +17,7 @@ from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
-from throwcollect.publish.export.exporter import Exporter
-from throwcollect.publish.export.readme import Layout, tabulate_signals
+from throwcollect.publish.export.exporter import Exporter, Layout, tabulate_signals
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -28,7 +27,7 @@ _LARGEST = 2 * 2**30
 
 
 def describe(source: ExportSource) -> Layout:
-    """Say how `write` lays a source out."""
+    """Describe how `write` lays a source out."""
     shard, trial, noun = next(iter(source.shards)), source.throws[0].trial, source.dataset.config.task.noun
     position = f"{source.dataset.config.acted_on}_position_m"
     return Layout(
@@ -97,7 +96,7 @@ def _write_shard(source: ExportSource, throws: Dataset, path: Path) -> None:
         for name, values in names.items():
             _add(archive, name, values)
         for name, file_of_signal in unpacked.items():
-            # `zipfile` does not know the size beforehand, and fails at 2 GiB unless it is told to expect more.
+            # `zipfile` does not know the size beforehand, and fails at 2 GiB unless `force_zip64` is set.
             with file_of_signal.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
                 shutil.copyfileobj(array, packed)
             file_of_signal.unlink()

@@ -10,8 +10,7 @@ import pyarrow.parquet as pq
 
 from throwcollect.dataset.directory import THROWS
 from throwcollect.plan.parquet_file import encode_table
-from throwcollect.publish.export.exporter import Exporter
-from throwcollect.publish.export.readme import Layout, tabulate_signals
+from throwcollect.publish.export.exporter import Exporter, Layout, tabulate_signals
 from throwcollect.publish.export.throw_source import ExportSource, ThrowSeries
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.trajectory import JointTrajectory
@@ -71,12 +70,12 @@ _ROWS_PER_GROUP = 30_000
 
 
 def describe(source: ExportSource) -> Layout:
-    """Say how `write` lays a source out."""
+    """Describe how `write` lays a source out."""
     noun, events = source.dataset.config.task.noun, source.dataset.config.task.events
     return Layout(
         files={
             THROWS: f"one row a trial: swept values, outcome, {', '.join(events) or 'measures'}.",
-            f"{_TRAJECTORIES}/": f"one row a sample, {noun} after {noun}; `trial` says of which. No {noun} is divided "
+            f"{_TRAJECTORIES}/": f"one row a sample, {noun} after {noun}; `trial` has its number. No {noun} is divided "
             "between files or row groups.",
             f"{_MOTIONS}/": "one row a point of the trajectories that controllers were sent, as `task.trajectory` with "
             "`family: file` reads them.",

@@ -27,7 +27,7 @@ from throwcollect.members import load_member
 from throwcollect.publish.export.export import export
 from throwcollect.publish.export.throw_source import unit_of
 
-PLUGINS = Path(__file__).parents[2] / "plugins"
+PLUGINS = Path(__file__).parents[3] / "plugins"
 
 
 @pytest.mark.parametrize("to", FORMATS)
