@@ -306,7 +306,7 @@ def _begin_other(directory: Path, engine: str) -> Callable[[int], Deviation]:
         trial = plan.trial(number)
         result = judge_episode(with_values(config, trial.values), simulator.run(trial))
         stored, again = dataset.select([number])[0].row, table.row(trial, result, None)
-        # Columns of text, and numbers that only one of the two rows has, cannot be compared.
+        # Columns of strings, and numbers that only one of the two rows has, cannot be compared.
         compared = [
             column
             for column in again

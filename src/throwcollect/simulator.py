@@ -50,7 +50,7 @@ class Simulator:
 
     Args:
         config: YAML file of a configuration, or a `Config`, as `load_config` gives it; its sweep is not looked at.
-        overrides: ``key=value`` pairs that win over the file, as ``--set`` takes them; none beside a `Config`.
+        overrides: ``key=value`` pairs that win over the file, as ``--set`` takes them; none with a `Config`.
 
     Attributes:
         config: The resolved configuration.
@@ -93,8 +93,8 @@ class Simulator:
                 ``{"task.duration_s": 1.1}``.
             trial: Number of the trial, from 0. The clock of a later trial shows a later time, which is in the stamps
                 and in the digest; nothing else depends on the number.
-            target: Where the throw should end, such as ``{"target_x_m": 1.4, "target_y_m": -0.2}``; the throw then says
-                by how much it missed, and is the same otherwise.
+            target: Where the throw should end, such as ``{"target_x_m": 1.4, "target_y_m": -0.2}``; the throw then has
+                its miss, and is the same otherwise.
 
         Returns:
             The throw, as `throwcollect.load` gives it; it is in no shard.
@@ -124,7 +124,7 @@ class Simulator:
 
         Args:
             policy: Has ``reset(seed, target)`` and ``act(observation)``; see `throwcollect.sim.policy.Policy`.
-            values: As for `throw`; `task.end` only says which joints move.
+            values: As for `throw`; `task.end` only names the joints that move.
             trial: As for `throw`; the seed that the policy gets follows from it.
             target: As for `throw`; the policy gets it, too.
             rate_hz: Commands per simulated second; divides `sim.physics_hz`.
@@ -174,7 +174,7 @@ class Simulator:
         return self._make_throw(config, planned, episode)
 
     def find_refusal(self, values: Point) -> str | None:
-        """Say why the plan of a collection would refuse a throw with these values; None if it would not.
+        """Return why the plan of a collection would refuse a throw with these values; None if it would not.
 
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
@@ -243,7 +243,7 @@ class Simulator:
 
 
 def find_refusal(config: Config, values: Point, check: Check) -> str | None:
-    """Say why the plan of a collection would refuse a trial with these values; None if it would not.
+    """Return why the plan of a collection would refuse a trial with these values; None if it would not.
 
     Raises:
         ConfigError: If a key cannot vary, or a value is out of its range.

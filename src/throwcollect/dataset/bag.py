@@ -40,7 +40,7 @@ _MOST_NEARBY = 5
 
 @dataclass(frozen=True)
 class FileSummary:
-    """What a bag's metadata say of one file: its name, and the times of its first and last message [ns].
+    """What a bag's metadata state of one file: its name, and the times of its first and last message [ns].
 
     Attributes:
         counts: Number of messages of each channel, by the channel's number.
@@ -124,7 +124,7 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
 
 @lru_cache(maxsize=8)
 def _parse(text: str) -> Any:
-    """Parse a text; the last ones are remembered, because one command reads the metadata of a dataset several times."""
+    """Parse YAML; the last strings are cached, because one command reads the metadata of a dataset several times."""
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _PlainComposer
     return yaml.load(text)

@@ -30,7 +30,7 @@ def write_config(directory: Path, config: Config) -> None:
 
 
 def config_text(config: Config) -> str:
-    """Write the text of a configuration as a dataset has it, which carries the files that it names."""
+    """Write a configuration as YAML as a dataset has it, which carries the files that it names."""
     return dump_yaml(_place_robot(config, Path(ROBOT)).with_files_in(Path()))
 
 
@@ -86,7 +86,7 @@ def find_files(config: Config) -> Path | None:
 
 
 def pack_robot(config: Config) -> str:
-    """Write all files that a dataset carries as a text, a zip archive in base64; it is empty if there are none."""
+    """Write all files that a dataset carries as a string, a zip archive in base64; it is empty if there are none."""
     source = find_files(config)
     files = {f"{ROBOT}/{path.name}": path.read_bytes() for path in (list_files(source) if source else ())}
     if isinstance(family := config.task.trajectory, MotionFile):

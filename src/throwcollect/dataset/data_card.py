@@ -66,7 +66,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "## Limits",
         "",
         _describe_limits(config.sim.engine)
-        + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` says how."
+        + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` has the kind of failure."
         + _describe_policy(config),
         "",
         "## Provenance",
@@ -85,7 +85,7 @@ _RIGID_BODIES = {"bullet": "Bullet", "mujoco": "MuJoCo"}
 
 
 def _describe_limits(engine: str) -> str:
-    """Say what a physics engine leaves out; nothing is known of engines of other packages."""
+    """Describe what a physics engine leaves out; nothing is known of engines of other packages."""
     if engine in _RIGID_BODIES:
         return (
             f"Simulated with {_RIGID_BODIES[engine]}: rigid bodies, the base of the robot fixed, ideal motors within "
@@ -93,14 +93,14 @@ def _describe_limits(engine: str) -> str:
         )
     if engine == "ballistic":
         return (
-            "Computed without contacts (`sim.engine: ballistic`): the arm is always where it is told to be, and the "
-            "ball leaves the tool when the tool would have to pull it. No robot throws like that."
+            "Computed without contacts (`sim.engine: ballistic`): the arm is always where it is commanded to be, and "
+            "the ball leaves the tool when the tool would have to pull it. No robot throws like that."
         )
     return f"Simulated with the physics engine `{engine}`, without sensor noise."
 
 
 def _describe_policy(config: Config) -> str:
-    """Name the policy that commanded the joints, and say what follows if it is not reproducible."""
+    """Name the policy that commanded the joints, and state what follows if it is not reproducible."""
     if (policy := config.task.policy) is None:
         return ""
     if policy.use == SESSION:
@@ -132,7 +132,7 @@ def _list_ranges(config: Config, throws: pa.Table) -> list[str]:
 
 
 def _list_targets(config: Config, throws: pa.Table) -> list[str]:
-    """Tell how trials missed their targets; no lines if they have none."""
+    """Describe how trials missed their targets; no lines if they have none."""
     found = summarise_misses(config, throws)
     if not found:
         return []
@@ -153,7 +153,7 @@ def _list_targets(config: Config, throws: pa.Table) -> list[str]:
 
 
 def _describe_drawing(config: Config) -> list[str]:
-    """Tell how the values were drawn, one sentence a line."""
+    """Describe how the values were drawn, one sentence a line."""
     if config.task.policy is not None and config.task.policy.use == SESSION:
         return ["Nothing was drawn: what differs is what clients did."]
     lines = [f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}."]

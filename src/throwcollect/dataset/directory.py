@@ -74,7 +74,7 @@ def has_files(directory: Path) -> bool:
 
 
 def describe_other(directory: Path) -> str:
-    """Say what a directory without any file of a dataset is."""
+    """Describe a directory without any file of a dataset is."""
     if (directory / METADATA).is_file():
         return "is a rosbag2 bag, but not of throwcollect"
     return f"holds no dataset{suggest_path(directory)}"

@@ -25,7 +25,7 @@ _MOST_NAMED = 5
 
 
 def info(directory: Path) -> Info:
-    """Summarise a dataset from its tables; `verify` says whether they are right."""
+    """Summarise a dataset from its tables; `verify` checks whether they are right."""
     return summary(Dataset.open(directory))
 
 
@@ -77,7 +77,7 @@ def _find_landing_area(throws: pa.Table, task: TaskConfig) -> Mapping[str, tuple
 
 
 def check_recordings_are_there(dataset: Dataset) -> None:
-    """Refuse a finished dataset of which recordings are missing; `verify` says whether the others are right."""
+    """Refuse a finished dataset of which recordings are missing; `verify` checks the others."""
     missing = [name for name in dataset.shards if not (dataset.directory / name).exists()]
     if missing:
         raise DatasetError(
@@ -105,5 +105,5 @@ def digest(directory: Path) -> str:
         digests.append(episode.digest)
     combined = combine_digests(digests, read_targets(dataset.throws))
     if combined != dataset.digest:
-        raise DatasetError(f"digest {combined}", path=directory, expected=f"{dataset.digest} as metadata.yaml says")
+        raise DatasetError(f"digest {combined}", path=directory, expected=f"{dataset.digest} as in metadata.yaml")
     return combined

@@ -128,7 +128,7 @@ def read_commits(
         with open(open_log(path, os.O_RDONLY), "rb") as file:
             file.seek(first)
             data = file.read(most_bytes)
-            # One byte more tells whether another part follows.
+            # One byte more shows whether another part follows.
             rest = file.read(1)
     except FileNotFoundError:
         return [], first, False
@@ -154,12 +154,12 @@ def _parse(line: bytes) -> dict[str, Any]:
 
 
 def was_open(directory: Path) -> bool:
-    """Whether anybody who reached the router could join one of the collections into a dataset."""
+    """Whether any process that reached the router could join one of the collections into a dataset."""
     return any(entry.get("event") == "exposed" for entry in _read_lines(directory / JOURNAL, b'"exposed"'))
 
 
 def measure_collected_s(directory: Path) -> float | None:
-    """Add up the real time for which processes have collected into a dataset [s]; None if no journal says so.
+    """Add up the real time for which processes have collected into a dataset [s]; None if no journal has it.
 
     The process that finishes a dataset writes this time down. Processes that came after it count from their first to
     their last event, and so do all if none has finished the dataset.

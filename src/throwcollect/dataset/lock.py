@@ -1,19 +1,19 @@
 """Keeps two processes from changing one dataset: a lock on its directory, on whatever machine the second process runs.
 
 A process that prepares or resumes a dataset holds the lock alone, before it reads anything.
-The launcher and the coordinator of a run hold it together as long as they live. So nobody can prepare the dataset while
+The launcher and the coordinator of a run hold it together while they live. So no process can prepare the dataset while
 it is collected into, not even while a coordinator that was lost is started again.
 
 Between its preparation and its launch, a run releases the lock for a moment. If another process takes it just then, the
 run ends before it starts a node. If that process has released it by then and launches a run of its own, the journal
 decides between the two, as only one coordinator can hold it (see `journal`). The winner reads configuration and plan
-when nobody can change them any more, so they fit each other.
+when no process can change them any more, so they fit each other.
 
 It is a lock of the kernel (flock) on the directory itself. So it leaves no file behind, holds across containers and
 other names of the directory, and ends with the process. On NFS, only processes of the same machine see it.
 
 Some file systems of clusters have no locks. A dataset that is collected in slices needs none: an attempt at a slice has
-a directory that one process alone knows, and whoever joins the slices, however often, makes the same dataset.
+a directory that only one process knows, and joining the slices, however often, makes the same dataset.
 """
 
 from __future__ import annotations

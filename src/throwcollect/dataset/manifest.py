@@ -38,7 +38,7 @@ from throwcollect.wording import command
 _PROFILE = "data-package"
 _HASH = "sha256:"
 DESCRIBING = (CONFIG, PLAN, TRIALS, MOTIONS, SOURCES, THROWS)
-"""Files beside the recordings and ``metadata.yaml`` that the manifest has, as far as a dataset has them."""
+"""Files next to the recordings and ``metadata.yaml`` that the manifest has, as far as a dataset has them."""
 _NAME = re.compile(rf"(?:(?:{ROBOT}|{BODIES})/)?[A-Za-z0-9][A-Za-z0-9_.-]*")
 """A file name without directories but those two, so that no manifest can name a file outside of the dataset."""
 _MOST_BYTES = 100_000_000

@@ -1,7 +1,7 @@
 """One MCAP file of a dataset, written record by record.
 
 The file starts with all schemas and channels and a chunk with the latched messages. Each episode is one uninterrupted
-run of records: its chunks, each with message indexes, and a Metadata record named `EPISODE` that says what it is. The
+run of records: its chunks, each with message indexes, and a Metadata record named `EPISODE` that describes it. The
 first chunk has the samples, and those behind it what sensors saw.
 """
 
@@ -171,7 +171,7 @@ class McapFile:
         self._put(run.data)
 
     def finish(self, name: str) -> FileSummary:
-        """Write everything that follows the last episode; returns what the bag's metadata say of the file of this name.
+        """Write everything that follows the last episode; returns what the bag's metadata have of this file.
 
         The name also stands in the copy of the bag's metadata that rosbag2 looks for in each file.
         """

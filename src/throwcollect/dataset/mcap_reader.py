@@ -1,4 +1,4 @@
-"""Reads the records of one MCAP file of a dataset, and believes nothing that the file says without a check.
+"""Reads the records of one MCAP file of a dataset, and uses nothing from the file without a check.
 
 Finding the episodes of a damaged file relies neither on the order of records nor on their lengths: chunks are found by
 the bytes that every header of theirs holds, wherever they lie. So damage costs the damaged episodes, and never those
@@ -100,7 +100,7 @@ class McapContents:
         return -1
 
     def read_robot_description(self) -> str:
-        """Read the URDF text of the robot, which is among the latched messages that every file begins with."""
+        """Read the URDF of the robot, which is among the latched messages that every file begins with."""
         try:
             table = MessageTable(self.chunk(self.next_chunk(0)).decompress(), 1)
             message = table.messages(ROBOT_DESCRIPTION_ID)[0].tobytes()
@@ -181,7 +181,7 @@ def open_mcap(path: Path) -> Iterator[McapContents]:
             # An empty file cannot be mapped.
             data = mmap.mmap(descriptor, size, access=mmap.ACCESS_READ) if size else b""
         finally:
-            # The mapping keeps the file open by itself.
+            # The mapping keeps the file open.
             os.close(descriptor)
     except OSError as error:
         raise unreadable(path, error) from error
@@ -195,7 +195,7 @@ def open_mcap(path: Path) -> Iterator[McapContents]:
 class EpisodePlace(NamedTuple):
     """The place of an episode: its file, and the offset of its chunk there [bytes].
 
-    `start_ns`, the time of its first sample [ns], says which trial it is of; `samples` is their number.
+    `start_ns`, the time of its first sample [ns], identifies its trial; `samples` is their number.
     """
 
     path: Path
@@ -253,6 +253,6 @@ def scan_file(path: Path) -> Iterator[WholeEpisode]:
         with open_mcap(path) as contents:
             yield from scan(contents)
     except DatasetError as error:
-        # Only opening tells whether it is there: another process may remove it after a look for it.
+        # Only opening shows whether it is there: another process may remove it after a look for it.
         if not isinstance(error.__cause__, FileNotFoundError):
             raise

@@ -51,7 +51,7 @@ _MOST_BYTES = 1_000_000
 _GIT_S = 5.0
 _OWN_HASH = "sha256"
 _CARD_HASH = "card_sha256"
-_OPEN = "anybody who reached the router could join, read and disturb the collection"
+_OPEN = "any process that reached the router could join, read and disturb the collection"
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Provenance:
         libraries: Versions of the libraries that the data pass through.
         simulations: Number of simulations of the run that finished it; None if it had none, or if not known.
         wall_s: Real time that it took [s]; None if not known.
-        was_open: Whether anybody who reached its router could join it.
+        was_open: Whether any process that reached its router could join it.
         revision: Git revision of the sources that ran, with ``-dirty`` behind it if they were changed; None if they lie
             in no clone.
         image: Id of the image that ran; None without one.
@@ -131,7 +131,7 @@ class Provenance:
 
 
 def write_provenance(directory: Path, provenance: Provenance) -> None:
-    """Write how a dataset was collected beside its data card, which is there already."""
+    """Write how a dataset was collected; its data card is there already."""
     document = _JSON.dump_python(provenance, mode="json") | {_CARD_HASH: entry_of_file(directory / CARD).sha256}
     write_file(directory / PROVENANCE, _seal(document).encode())
 

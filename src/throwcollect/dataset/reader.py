@@ -1,4 +1,4 @@
-"""Reads a dataset as a sequence of throws, beside its table of throws and the episodes."""
+"""Reads a dataset: a sequence of throws, its table of throws, and the episodes."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Dataset(Sequence[Throw]):
     def __getitem__(self, which: int | slice | str) -> Throw | Dataset | NDArray[Any]:
         """Return a throw by its position, the throws of a slice, or a column of `throws` by its name.
 
-        A column is an array with one value a throw; a number that is missing is NaN, a text None.
+        A column is an array with one value a throw; a number that is missing is NaN, a string None.
 
         Raises:
             IndexError: If there is no throw at this position.
@@ -190,7 +190,7 @@ class Dataset(Sequence[Throw]):
         """Read the episode of a trial by its number, with everything that was recorded.
 
         Raises:
-            DatasetError: If the trial is not among the throws, has no episode, or it is not where the table says.
+            DatasetError: If the trial is not among the throws, has no episode, or it is not at the place in the table.
         """
         return self.throw(trial).read_episode()
 
@@ -199,7 +199,7 @@ class Dataset(Sequence[Throw]):
         return self.plan.config_of(self.plan.trial(throw.trial))
 
     def robot_description(self) -> str | None:
-        """Read the URDF text of the robot from the first recording; None if there is no recording.
+        """Read the URDF of the robot from the first recording; None if there is no recording.
 
         Raises:
             DatasetError: If that recording is missing or damaged.
@@ -217,7 +217,7 @@ class Dataset(Sequence[Throw]):
         """Read the episodes of the throws that have one, in the order of the throws.
 
         Raises:
-            DatasetError: If an episode is not where the table says.
+            DatasetError: If an episode is not at its place in the table.
         """
         return (stored.read() for stored in self._stored if stored is not None)
 
@@ -256,7 +256,7 @@ class Dataset(Sequence[Throw]):
 
         Raises:
             ConfigError: If there is no such column or joint.
-            DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
+            DatasetError: If an episode is not at its place in the table, or it is damaged; CRCs are compared.
         """
         trials, known = self.throws["trial"].to_pylist(), self.joints
         chosen = known if joints is None else tuple(joints)
@@ -305,7 +305,7 @@ def load(directory: StrPath) -> Dataset:
         UnfinishedDatasetWarning: If it is not finished.
     """
     path = Path(directory)
-    # If the directory is no dataset at all, `open` says what is wrong.
+    # If the directory is no dataset at all, `open` explains what is wrong.
     if (path / METADATA).exists() or not (path / PLAN).exists():
         return Dataset.open(path)
     plan = Plan.read(path / PLAN, read_config(path))
@@ -334,7 +334,7 @@ def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
 
 
 def _read_column(column: pa.ChunkedArray) -> NDArray[Any]:
-    """Copy a column of a table into an array, one value a row; a number that is missing is NaN, a text None."""
+    """Copy a column of a table into an array, one value a row; a number that is missing is NaN, a string None."""
     if pa.types.is_string(column.type):
         return np.array(column.to_pylist(), dtype=object)
     if column.null_count:

@@ -73,7 +73,7 @@ class LeftOfShard:
 
 
 def remove_unfinished(directory: Path) -> None:
-    """Remove half-written files that a killed process left beside the recordings; the files themselves stay."""
+    """Remove half-written files that a killed process left next to the recordings; the files themselves stay."""
     for name in (CONFIG, PLAN, TRIALS, MOTIONS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
         remove(directory / f"{name}.new")
     for path in (directory / BODIES).glob("*.new"):

@@ -97,7 +97,7 @@ def _evaluate(node: ast.expr, table: pa.Table) -> Any:
             return reduce(pc.and_kleene, (_compare(left, by, right, table) for left, by, right in pairs))
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
             return _FUNCTIONS[name](*(_evaluate(each, table) for each in arguments))
-    raise ValueError(f"{ast.unparse(node)} is none of: column, number, text, comparison, and, or, not, arithmetic")
+    raise ValueError(f"{ast.unparse(node)} is none of: column, number, string, comparison, and, or, not, arithmetic")
 
 
 def _compare(left: ast.expr, operator: ast.cmpop, right: ast.expr, table: pa.Table) -> Any:

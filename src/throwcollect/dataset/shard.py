@@ -27,7 +27,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
 
 Recording = tuple[FileSummary, FileEntry]
-"""What bag's metadata and manifest say of an MCAP file."""
+"""What bag metadata and manifest state of an MCAP file."""
 
 
 @dataclass(frozen=True)

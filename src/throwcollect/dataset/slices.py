@@ -1,20 +1,20 @@
 """Slices of a dataset: their directories while many tasks collect them, and how they are joined.
 
-A slice is collected as a dataset of its own, in a directory that nobody else uses, called an **attempt**. When it is
-finished, its recordings, its table and its manifest go to the directory of the slice by one rename, which succeeds for
-one attempt alone. So nothing has to be locked, and an attempt that seemed dead, or was started twice, does no harm, as
-it would put the same bytes there::
+A slice is collected as a dataset of its own, in a directory that no other process uses, called an **attempt**. When it
+is finished, its recordings, its table and its manifest go to the directory of the slice by one rename, which succeeds
+for one attempt alone. So nothing has to be locked, and an attempt that seemed dead, or was started twice, does no harm,
+as it would put the same bytes there::
 
     slices/3-of-8/                      a finished slice
     slices/3-of-8.attempt-<id>/         an attempt, unfinished; its logs are in it
 
 An attempt begins with what earlier ones have recorded. It removes attempts that were stopped and shut down properly, so
 that a task that is queued again and again does not fill the disk; attempts that ended in another way stay, as their
-logs may say why.
+logs may explain it.
 
-To join them, their recordings are moved beside each other, and the tables of the whole are written. Only the statistics
-at the end of each recording are read. If joining is interrupted, it can be done again and gives the same dataset:
-``metadata.yaml``, which marks a finished dataset, is written last, and the slices are removed after that.
+To join them, their recordings are moved into one directory, and the tables of the whole are written. Only the
+statistics at the end of each recording are read. If joining is interrupted, it can be done again and gives the same
+dataset: ``metadata.yaml``, which marks a finished dataset, is written last; then the slices are removed.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def find_attempts(directory: Path, slice: Slice) -> list[Path]:
 
 
 def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) -> Path:
-    """Make an empty directory for an attempt at a slice, in `scratch` or else beside all slices, unlike any other."""
+    """Make an empty directory for an attempt at a slice, in `scratch` or else next to all slices, unlike any other."""
     name = f"{slice_directory(directory, slice).name}{ATTEMPT}{socket.gethostname()}-{secrets.token_hex(4)}"
     path = (scratch or directory / SLICES) / name
     try:
@@ -112,7 +112,7 @@ def _rank_copy(path: Path) -> tuple[bool, int]:
 
 
 def mark_stopped(attempt: Path) -> None:
-    """Mark an attempt as shut down properly: nobody writes to it any more."""
+    """Mark an attempt as shut down properly: no process writes to it any more."""
     with suppress(OSError):  # without the mark, it only stays on disk
         (attempt / _STOPPED).touch()
 
@@ -244,13 +244,13 @@ def _move_recording(source: Path, target: Path, entry: FileEntry) -> FileSummary
 
 
 def read_statistics(target: Path, entry: FileEntry) -> FileSummary:
-    """Read the statistics of a finished recording, which has the size that a manifest says."""
+    """Read the statistics of a finished recording, which has the size that its manifest states."""
     try:
         with open(open_regular(target), "rb") as file:
             size = os.fstat(file.fileno()).st_size
             # Only the size is checked: hashing would mean to read all recordings of the dataset in one process.
             if size != entry.bytes:
-                raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as its manifest says")
+                raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as in its manifest")
             summary = make_reader(file).get_summary()
     except OSError as error:
         raise unreadable(target, error) from error

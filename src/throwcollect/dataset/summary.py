@@ -48,7 +48,7 @@ class Info:
         recordings_bytes: Size of these files; `size_bytes` is the size of all files.
         topics: Number of messages of each topic.
         digest: Hash over all episodes in order of trials, and their targets, as it was written.
-        wall_s: Real time for which it was collected, without pauses [s]; None if no journal tells.
+        wall_s: Real time for which it was collected, without pauses [s]; None if no journal has it.
         success: Outcome of trials that succeeded.
         noun: What a trial is called.
         end: Name of the instant of `landing`; empty if the task has none.
@@ -81,4 +81,6 @@ def explain_loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError 
     if not lost:
         return None
     verb = "is" if lost == 1 else "are"
-    return LossError(f"{lost} of {format_count(all_of_them, 'trial')} {verb} lost; throws.parquet says why", hint=hint)
+    return LossError(
+        f"{lost} of {format_count(all_of_them, 'trial')} {verb} lost; throws.parquet has the reasons", hint=hint
+    )

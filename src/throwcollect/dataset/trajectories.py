@@ -214,7 +214,7 @@ def _fill(
         f"{body}_{_ORIENTATION}": [name for name in (f"{body}_velocity", f"{body}_angular_velocity") if name in columns]
         for body in bodies
     }
-    # Velocities in world follow from orientations, and times from stamps, so these are read even if nobody asks.
+    # Velocities in world follow from orientations, and times from stamps, so these are always read with them.
     sources = {**velocities, STAMPS: [name for name in (STAMPS, TIMES) if name in columns]}
     missing = {name for name, derived in sources.items() if derived} - columns.keys()
     count = sum(place.samples for place in places)

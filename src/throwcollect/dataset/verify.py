@@ -119,7 +119,7 @@ def find_damage(directory: Path, *, in_full: bool, hashed: Collection[FileEntry]
 
 @dataclass
 class _Tables:
-    """The contents of the files beside the recordings, as far as they can be read, and what is wrong with them."""
+    """The contents of the files next to the recordings, as far as they can be read, and what is wrong with them."""
 
     config: Config | None = None
     plan: Plan | None = None

@@ -51,8 +51,8 @@ class RecordingReport:
     Attributes:
         findings: What is wrong.
         has_file: Whether there should be a file: no trial without an episode needs one.
-        summary: What the bag's metadata should say of the file; None if it does not have all its episodes.
-        entry: What the manifest should say of the file; None if not all its bytes are right.
+        summary: What the bag's metadata should state of the file; None if it does not have all its episodes.
+        entry: What the manifest should state of the file; None if not all its bytes are right.
         channels: What it records; None if that cannot be read.
         digests: Digest of each episode that it should have and that is whole, by trial.
     """
@@ -199,7 +199,7 @@ def _are_same(value: Any, other: Any) -> bool:
 
 
 def _explain_missing(contents: McapContents, row: Row) -> str:
-    """Say why a file has no whole episode of a trial, whose place is in its row."""
+    """Explain why a file has no whole episode of a trial, whose place is in its row."""
     try:
         contents.whole_episode(row["chunk_offset"])
     except DatasetError as error:

@@ -1,7 +1,7 @@
 """Fills a dataset: from a frozen plan and episodes in any order to files that depend on nothing but the plan.
 
 A directory that holds ``config.yaml`` and ``plan.parquet`` is a created dataset; one that also holds ``metadata.yaml``
-is finished, as that file is written last. While a dataset is filled, each open shard lies beside its final name (see
+is finished, as that file is written last. While a dataset is filled, each open shard lies next to its final name (see
 `shard`), and the rows of finished shards are kept in memory, 0.5 kB each, for ``throws.parquet``. If the process is
 stopped, the next writer takes in the files that it left (see `recovery`) and goes on.
 """
@@ -38,7 +38,7 @@ from throwcollect.tasks.task import task_of
 from throwcollect.wording import format_count
 
 Keep = Callable[[int, Result], bool]
-"""Receives the number of a trial and the result of its episode, and says whether the episode belongs to the dataset."""
+"""A callback: gets the number of a trial and the result of its episode, and returns whether the episode is kept."""
 
 
 class DatasetWriter:
@@ -84,12 +84,12 @@ class DatasetWriter:
 
     @classmethod
     def open(cls, directory: Path, *, channels: Channels | None = None) -> DatasetWriter:
-        """Open a dataset to collect into, and keep all others from doing so; call `recover` next."""
+        """Open a dataset to collect into, and keep all other processes from doing so; call `recover` next."""
         for name in (CONFIG, PLAN):
             if not (directory / name).is_file():
                 raise DatasetError(f"holds no {name}", path=directory, expected="a dataset that was created")
         with ExitStack() as held:
-            # Plan and configuration are read after this, when nobody else can change them any more.
+            # Plan and configuration are read after this, when no other process can change them any more.
             held.enter_context(hold_lock(directory, alone=False))
             journal = held.enter_context(closing(Journal(directory)))
             plan = Plan.read(directory / PLAN, read_config(directory))
@@ -231,7 +231,7 @@ class DatasetWriter:
             robot=self._channels.robot,
             engine=self._config.sim.engine,
         )
-        # How it was run must not change the dataset, so only data card and provenance say that.
+        # How it was run must not change the dataset, so only data card and provenance have that.
         config = self._config.without_run()
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
         write_provenance(self._directory, provenance)

@@ -28,7 +28,7 @@ _STEPS = 30
 _LOOKS = 4
 """In this many first steps, residuals are those of the nearest throws; later, these throws might alternate for ever."""
 _SMALL_STEP = 1e-5
-"""The search ends after a step smaller than this [scaled, or m or rad]: nobody could measure the difference."""
+"""The search ends after a step smaller than this [scaled, or m or rad]: no measurement could show the difference."""
 _THROWS_FOR_BIAS = 3
 _FAR = 2.0
 """Parameters and context farther than this from the middle of their range [scaled: the range ends at 1] are refused."""
@@ -47,7 +47,7 @@ class Method(str, Enum):
     OFFSET = "offset"
     """All trials end elsewhere, by the same offset."""
     BIAS = "bias"
-    """The robot does not do what it is told: all parameters have a bias, and ends an offset."""
+    """The robot does not do what is commanded: all parameters have a bias, and ends an offset."""
     LATENT = "latent"
     """The latents, which the dataset varied from trial to trial, have other values, and ends an offset."""
 
@@ -163,7 +163,7 @@ def _list_found(learned: LearnedMap, correction: Correction, method: Method, dev
 
 
 def refuse_far_throws(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> None:
-    """Refuse throws where the map says nothing: mostly mistakes, such as degrees in place of radians.
+    """Refuse throws where the map predicts nothing: mostly mistakes, such as degrees in place of radians.
 
     Args:
         learned: The map.

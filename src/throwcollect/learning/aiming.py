@@ -1,4 +1,4 @@
-"""Aims: finds, for a target, the parameters of a trial that ends there, and says why a target is out of reach."""
+"""Aims: finds, for a target, the parameters of a trial that ends there, and explains why a target is out of reach."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def _weigh(learned: LearnedMap, choice: Choice, inputs: Array, steps: Array) -> 
 
 
 def explain_reach(learned: LearnedMap, aim: Aim) -> str:
-    """Say why a target is out of reach and, unless predictions say nothing there, what comes nearest to it."""
+    """Explain why a target is out of reach and, unless predictions mean nothing there, what comes nearest to it."""
     ends, given = np.split(aim.target, [len(learned.targets)])
     away, missed = (float(np.linalg.norm(place - ends)) for place in (aim.nearest, aim.predicted))
     outside = [

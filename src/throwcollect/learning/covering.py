@@ -252,6 +252,6 @@ def _start_from(learned: LearnedMap, throws: NDArray[np.intp], noise: Array) -> 
     context = learned.inputs[throws, learned.columns_of(KeyRole.CONTEXT)]
     values = learned.values[throws].copy()
     values[:, columns] = learned.unscale(KeyRole.PARAMETER, parameters)
-    # Where nothing has moved, the map says nothing better than what was measured.
+    # Where nothing has moved, the map predicts nothing better than what was measured.
     outputs = learned.predict(parameters, context) if noise.any() else learned.outputs[throws]
     return replace(learned, values=values, outputs=outputs, efforts=learned.efforts[throws])

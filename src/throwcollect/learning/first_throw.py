@@ -72,7 +72,7 @@ def find_first_throw(
         lines: What a configuration has of it.
         task: Name of the task.
         engine: Name of the physics engine.
-        say: Is given progress, a line at a time.
+        say: A callback that gets progress, a line at a time.
     """
     return _Search(robot, lines, task, engine, say).run()
 

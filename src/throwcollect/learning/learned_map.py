@@ -248,7 +248,7 @@ def fit_throws(
     minor = sum(axis.role is KeyRole.LATENT for axis in axes)
     errors = _find_medians(cross_validate(inputs, outputs, folds, minor=minor))
     known = [axis.role is not KeyRole.LATENT for axis in axes]
-    # The error of predictions without latents tells whether latents are worth knowing.
+    # The error of predictions without latents shows whether latents are worth knowing.
     blind = None if all(known) else min(_find_medians(cross_validate(inputs[:, known], outputs, folds)).values())
     degree = min(errors, key=errors.__getitem__)
     forward = fit_polynomial(inputs, outputs, degree, minor=minor)

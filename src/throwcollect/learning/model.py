@@ -242,15 +242,15 @@ class Model(ModelCard):
             MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
         onnx = None if self.distilled is None else encode_onnx(self.learned, self.distilled)
-        with new_directory(Path(directory)) as beside:
-            write_file(beside / MODEL, (self.model_dump_json(indent=1) + "\n").encode())
-            write_file(beside / POINTS, encode_table(self.points))
-            write_file(beside / CONFIG, self.config.encode())
-            write_file(beside / CARD, self.describe(None).encode())
+        with new_directory(Path(directory)) as scratch:
+            write_file(scratch / MODEL, (self.model_dump_json(indent=1) + "\n").encode())
+            write_file(scratch / POINTS, encode_table(self.points))
+            write_file(scratch / CONFIG, self.config.encode())
+            write_file(scratch / CARD, self.describe(None).encode())
             if self.source is not None:
-                copy_carried(self.source, beside)
+                copy_carried(self.source, scratch)
             if onnx is not None:
-                write_file(beside / ONNX, onnx)
+                write_file(scratch / ONNX, onnx)
 
     def write_score(self, directory: Path, score: Score) -> None:
         """Write a score into the directory of this model, in place of an earlier one, and into the model's card."""

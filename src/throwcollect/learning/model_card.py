@@ -114,7 +114,7 @@ class ModelCard(ModelEntry):
     distilled: DistilledMap | None = None
 
     def describe(self, score: Score | None) -> str:
-        """README.md of the model; its score is None if nobody has thrown with it."""
+        """README.md of the model; its score is None if it has none."""
         trained, targets = self.trained_on, self.targets
         selected = f" (those with `{trained.selection}`)" if trained.selection else ""
         folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in trained.folds_error.items())

@@ -15,7 +15,7 @@ from throwcollect.units import format_distance, unit_of_name
 from throwcollect.wording import format_count
 
 SCORE_HEAD = ("median", "9 of 10 below", "largest", "throws", "did not succeed")
-"""Head of the table of a score, beside its labels."""
+"""Head of the table of a score, without the column of labels."""
 
 
 class MissStatistics(ModelEntry):
@@ -68,7 +68,7 @@ class Errors(MissStatistics):
         Args:
             seeds: For each seed, ends minus targets of at least one throw, shape ``(n, n_targets)``, NaN where it did
                 not succeed.
-            targets: Names of the targets, which tell their units.
+            targets: Names of the targets, which end with their units.
         """
         units = np.array([unit_of_name(target) for target in targets])
         first, *others = (_sum_up([away[:, units == unit] for away in seeds], unit) for unit in list_units(targets))

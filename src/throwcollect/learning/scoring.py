@@ -44,7 +44,7 @@ class Simulates(Protocol):
     config: Config
 
     def find_refusal(self, values: Mapping[str, float]) -> str | None:
-        """Say why a throw would be refused."""
+        """Return why a throw would be refused; None if it would not."""
         ...
 
     def throw_many(
@@ -203,7 +203,7 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
 
 
 def spread_first(targets: Array) -> Array:
-    """Order targets, ``(n, n_targets)``, so that the first few are far apart and tell most about a world.
+    """Order targets, ``(n, n_targets)``, so that the first few are far apart and show most about a world.
 
     The target nearest to the middle is first, as it is typical of all. Each further one is the target that is farthest
     from all before it.

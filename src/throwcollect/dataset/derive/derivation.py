@@ -185,7 +185,7 @@ def _read(throw: Throw) -> Episode:
         # The copy gets hashes of its own, which would make damage look as if it had been recorded.
         episode.chunk.check_records()
         if episode.digest != throw["digest"]:
-            raise DatasetError(f"digest {episode.digest}", expected=f"{throw['digest']} as throws.parquet says")
+            raise DatasetError(f"digest {episode.digest}", expected=f"{throw['digest']} as in throws.parquet")
         return episode
 
 
@@ -224,8 +224,8 @@ def _describe_sources(sources: Sequence[Dataset]) -> str:
         "",
         "## Sources",
         "",
-        "Derived from other datasets, in whose data cards the provenance of the simulations is; `sources.parquet` says "
-        "which trial and episode of them each trial is.",
+        "Derived from other datasets, in whose data cards the provenance of the simulations is; `sources.parquet` "
+        "has the trial and episode of them that each trial is.",
         "",
         "| dataset | directory | trials taken | digest |",
         "|---|---|---|---|",

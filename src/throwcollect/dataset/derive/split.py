@@ -93,9 +93,9 @@ def split(
     dataset = Dataset.open(directory)
     members = assign(dataset, fractions=fractions, cells=cells, seed=seed)
     parts = {}
-    with new_directory(Path(output)) as beside:
+    with new_directory(Path(output)) as scratch:
         for name, cell_of in members.items():
-            derived = derive([dataset.select(cell_of)], beside / name, offered=len(dataset))
+            derived = derive([dataset.select(cell_of)], scratch / name, offered=len(dataset))
             held = list(cell_of.values())
             parts[name] = SplitPart(derived, len({cell for cell in held if cell is not None}), held.count(None))
     return Split(parts, count_without_episode(dataset))
@@ -136,7 +136,7 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
     if not texts:
         raise refuse_argument("cells", "the list is empty", expected="at least one axis, such as landing_x_m=0.05")
     if texts == SQUARES and "landing_x_m" not in throws.column_names:
-        # Whoever left out the axes has not written this column.
+        # The axes were left out, so the user has not written this column.
         raise refuse_argument(
             "cells",
             "missing, as trials of this task do not land",

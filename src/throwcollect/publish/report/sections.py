@@ -90,7 +90,7 @@ class Report:
     Attributes:
         lead: Sentence on its trials.
         tiles: Key numbers.
-        sections: Sections in the order of the page; a section that has nothing to show says so.
+        sections: Sections in the order of the page; a section that has nothing to show has a sentence about that.
         noun: Word for a trial.
     """
 

@@ -106,13 +106,13 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
         return ()
     misses = summarise_misses(dataset.config, dataset.throws)
     targeted = int((~np.isnan(list(targets.values()))).any(axis=0).sum())
-    said = [
+    medians = [
         "{}: median {}, 9 of 10 below {}".format(name, *each.format_misses(unit_of_name(name))[:2])
         for name, each in misses.items()
         if each.measured
     ]
     text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
-    text += f"{'; '.join(said)}, in simulation." if said else "None of them ended anywhere."
+    text += f"{'; '.join(medians)}, in simulation." if medians else "None of them ended anywhere."
     panels = [
         _show_map(dataset, targets),
         *(

@@ -63,17 +63,17 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     some = throws[:: -(-len(throws) // _MOST_PATHS)]
     config = dataset.config
     robot = draw_robot_of(config)
-    with new_directory(output) as beside:
-        path = beside / RECORDING
+    with new_directory(output) as scratch:
+        path = scratch / RECORDING
         with path.open("wb") as stream:
             recording = ViewRecording(stream, config)
             paths = [throw for throw, _ in _schedule(dataset, some)]
             recording.write(paths, log_progress(_schedule(dataset, throws), len(throws), "throw", "written"))
             summary = recording.finish(RECORDING)
         information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
-        (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
-        (beside / LAYOUT).write_bytes(layout(tuple(config.task.end), config.acted_on))
-        robot.copy_package(beside)
+        (scratch / METADATA).write_text(to_yaml(information), encoding="utf-8")
+        (scratch / LAYOUT).write_bytes(layout(tuple(config.task.end), config.acted_on))
+        robot.copy_package(scratch)
         mesh_bytes = sum(file.stat().st_size for file in robot.meshes.values())
         recording_bytes = path.stat().st_size
     return View(

@@ -1,3 +1,5 @@
+"""Moments of the rows of tables that come in pieces."""
+
 from __future__ import annotations
 
 from functools import reduce

@@ -224,5 +224,5 @@ def test_filtering_an_episode_that_differs_from_its_digest_in_the_table_is_refus
 
     for shard in collection.collect(tmp_path / "other", change=shorter).glob("*.mcap"):
         shutil.copy(shard, dataset / shard.name)
-    with pytest.raises(DatasetError, match=r"trial 0: digest .*\n.* as throws.parquet says"):
+    with pytest.raises(DatasetError, match=r"trial 0: digest .*\n.* as in throws.parquet"):
         filter_trials(dataset, tmp_path / "some", where="trial == 0")

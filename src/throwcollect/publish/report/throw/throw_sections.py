@@ -86,7 +86,7 @@ def _show_landings(
     text += f". {format_count(others, 'further ball')} crossed the {_name_plane(outcomes)}, too." if others else "."
     # A landing is all that a throw is about, but only a part of what other tasks are about.
     figure = draw_map(landings, outcomes, bodies, speed="release speed" if outcomes.success == "landed" else None)
-    notes = [_say_how_many(landings)]
+    notes = [_describe_choice(landings)]
     if len({body.name for body in bodies}) < len(bodies):
         notes.append("Bodies differ from throw to throw; those of a few throws are drawn.")
     above = Panel("map", "Landings from above", figure, " ".join(filter(None, notes)))
@@ -132,11 +132,11 @@ def _show_releases(landings: Points, elevation_deg: NDArray[np.float64], outcome
         scale_title="landing distance [m]",
     )
     figure.update_xaxes(title="release speed [m/s]").update_yaxes(title="release elevation [°]")
-    panel = Panel("map", "Speed and elevation at release", figure.update_layout(height=420), _say_how_many(landings))
+    panel = Panel("map", "Speed and elevation at release", figure.update_layout(height=420), _describe_choice(landings))
     return ReportSection("release", "Release", title, text, ((panel,),))
 
 
-def _say_how_many(landings: Points) -> str:
+def _describe_choice(landings: Points) -> str:
     count = len(landings)
     return f"{MOST_POINTS:,} of {count:,} throws, chosen at random." if count > MOST_POINTS else ""
 
