@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -16,15 +13,13 @@ from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.live import keep_restoring_abandoned
-from throwcollect.serve.live_sensor_routes import make_live_sensor_routes
+from throwcollect.serve.live import restore_speeds_meanwhile
 from throwcollect.serve.models import make_model_routes
 from throwcollect.serve.problem_responses import DESCRIPTION, HANDLERS
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
-from throwcollect.serve.sensor_routes import make_sensor_routes
+from throwcollect.serve.sensor_routes import make_live_sensor_routes, make_sensor_routes
 from throwcollect.serve.sockets import keep_telling
-from throwcollect.serve.state import STATES, ComponentState, WholeState
-from throwcollect.serve.states import States
+from throwcollect.serve.state import STATES, ComponentState, States, WholeState
 from throwcollect.serve.throw_routes import make_throw_routes
 from throwcollect.serve.view_routes import make_view_routes
 from throwcollect.version import __version__
@@ -37,7 +32,7 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
     """Make the application, which belongs behind `access.Access`."""
     app = FastAPI(
         title="throwcollect",
-        lifespan=_restore_speeds_meanwhile,
+        lifespan=restore_speeds_meanwhile,
         version=__version__,
         docs_url=None,
         redoc_url=None,
@@ -61,14 +56,6 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
     # Routes are tried in their order, and this last one takes all other paths.
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
-
-
-@asynccontextmanager
-async def _restore_speeds_meanwhile(_: FastAPI) -> AsyncIterator[None]:
-    """Restore the speed of simulations that nobody watches any more, as long as the application lives."""
-    restoring = asyncio.create_task(keep_restoring_abandoned())
-    yield
-    restoring.cancel()
 
 
 def _make_general_routes(states: States, keys: Keys) -> APIRouter:

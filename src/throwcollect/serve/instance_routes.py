@@ -23,8 +23,7 @@ from throwcollect.errors import NotFoundError
 from throwcollect.files import open_log
 from throwcollect.serve.catalogue import LONGEST_NAME, Catalogue
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.state import InstanceState, describe
-from throwcollect.serve.states import States
+from throwcollect.serve.state import InstanceState, States, describe
 from throwcollect.wording import suggest
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import asyncio
 import fcntl
 import os
-from contextlib import suppress
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,11 +85,18 @@ def slow_down(run: Run, simulation: str) -> Hold:
     return Hold(run, simulation, lock)
 
 
-async def keep_restoring_abandoned() -> None:
-    """Call `restore_abandoned` every few seconds, for simulations whose server was killed or that did not answer."""
-    while True:
-        await asyncio.to_thread(restore_abandoned)
-        await asyncio.sleep(_SWEEP_S)
+@asynccontextmanager
+async def restore_speeds_meanwhile(_: object) -> AsyncIterator[None]:
+    """Call `restore_abandoned` every few seconds: the server of a watcher may be killed, or a simulation be busy."""
+
+    async def keep_restoring() -> None:
+        while True:
+            await asyncio.to_thread(restore_abandoned)
+            await asyncio.sleep(_SWEEP_S)
+
+    restoring = asyncio.create_task(keep_restoring())
+    yield
+    restoring.cancel()
 
 
 def restore_abandoned() -> None:

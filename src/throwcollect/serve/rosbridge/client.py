@@ -1,4 +1,4 @@
-"""One client of a bridge, as those see it that carry out its operations: they send it answers and status messages."""
+"""One client of a bridge: how it is answered, and which topics and parameters are closed to it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from throwcollect.collect.coordinator_node.simulation_client import EPISODE_TOPIC
+from throwcollect.errors import ConfigError
+from throwcollect.plan.lease import LEASES
+from throwcollect.ros.graph_names import absolute_name
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.codec import Frame, encode, fragments
 from throwcollect.serve.rosbridge.operations import LEVELS, Form, Level, Operation, RequestId
@@ -14,6 +18,14 @@ _PLAIN = Form()
 _UNKNOWN = 0
 """Of action_msgs/msg/GoalStatus."""
 _numbers = itertools.count()
+_GUARDED = {
+    EPISODE_TOPIC: "nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up",
+    "parameter_events": "nobody may have this topic, as it tells the signed leases of trials",
+}
+"""Last part of the name of each topic that clients may not have, and why."""
+_PARAMETER_SERVICES = tuple(
+    f"rcl_interfaces/srv/{name}" for name in ("GetParameters", "SetParameters", "SetParametersAtomically")
+)
 
 
 class Client:
@@ -70,3 +82,30 @@ class Client:
                 self.answer({"op": "action_result", "action": fields.get("action"), "status": _UNKNOWN, **failure})
             case _:
                 self.report("error", sentence, number)
+
+
+def is_guarded(topic: str) -> bool:
+    """Whether clients may not have a topic, given by its absolute name."""
+    return topic.rpartition("/")[2] in _GUARDED
+
+
+def open_topic(given: str) -> str:
+    """Absolute name of a topic, given by a client's name for it."""
+    topic = absolute_name(given)
+    if is_guarded(topic):
+        raise ConfigError(f"{topic}: {_GUARDED[topic.rpartition('/')[2]]}")
+    return topic
+
+
+def refuse_leases(parameter: str) -> None:
+    """Refuse to read or set the parameter by which the coordinator leases trials."""
+    if parameter == LEASES:
+        raise ConfigError(f"{LEASES}: nobody but the coordinator may have this parameter, as its leases are signed")
+
+
+def refuse_secrets(type_name: str, request: Any) -> None:
+    """Refuse a request to a service of this type that would read or set the parameter by which trials are leased."""
+    if type_name not in _PARAMETER_SERVICES:
+        return
+    for name in [*getattr(request, "names", ()), *(each.name for each in getattr(request, "parameters", ()))]:
+        refuse_leases(name)

@@ -11,10 +11,8 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, is_hidden
 from throwcollect.ros.message_values import plain
-from throwcollect.serve.rosbridge.calls import Call
-from throwcollect.serve.rosbridge.client import Client
-from throwcollect.serve.rosbridge.guarded import refuse_leases
-from throwcollect.serve.rosbridge.pending import call_service
+from throwcollect.serve.rosbridge.calls import Call, call_service
+from throwcollect.serve.rosbridge.client import refuse_leases
 
 _TIMEOUT_S = 5.0
 _NOT_SET = 0
@@ -24,101 +22,98 @@ _SET = "rcl_interfaces/srv/SetParameters"
 _LIST = "rcl_interfaces/srv/ListParameters"
 
 
-class Parameters:
-    """The services of rosapi for parameters, for one client."""
+def get_parameter(call: Call) -> None:
+    """Answer with the value of a parameter, or the default that the client gives, in JSON or as a string."""
+    asked = call.arguments
 
-    def __init__(self, client: Client) -> None:
-        self._client = client
-
-    def get(self, call: Call) -> None:
-        """Answer with the value of a parameter, or the default that the client gives, in JSON or as a string."""
-        asked = call.arguments
-
-        def answer(value: Any) -> None:
-            if value is not None:
-                call.reply({"value": orjson.dumps(plain(value)).decode()})
-            elif asked.default_value:
-                call.reply({"value": _as_json(asked.default_value)})
-            else:
-                call.fail(f"{asked.name}: there is no such node, or it has no such parameter")
-
-        self._get(call, answer)
-
-    def has(self, call: Call) -> None:
-        """Answer whether there is a parameter."""
-        self._get(call, lambda value: call.reply({"exists": value is not None}))
-
-    def set(self, call: Call) -> None:
-        """Set a parameter."""
-        node, name = _read_name(call)
-        try:
-            wanted = orjson.loads(call.arguments.value)
-            ros.Parameter(name, value=wanted)
-        except (TypeError, ValueError) as error:
-            raise ConfigError(f"{call.asked.name}: value should be that of a parameter in JSON: {error}") from error
-        if not self._is_offered(f"{node}/set_parameters"):
-            raise ConfigError(f"{node}: there is no such node, or it has no services for its parameters")
-
-        def answer(response: Any) -> None:
-            (result,) = response.results
-            if result.successful:
-                call.reply({"successful": True, "reason": result.reason})
-            else:
-                call.fail(f"{node}:{name}: {result.reason}")
-
-        def set_like(current: Any) -> None:
-            # JavaScript writes 1.0 as 1, so numbers for a floating-point parameter are converted.
-            value = _as_floats(wanted) if isinstance(_take_first(current), float) else wanted
-            request = ros.get_service(_SET).Request()
-            request.parameters = [ros.Parameter(name, value=value).to_parameter_msg()]
-            call_service(self._client, f"{node}/set_parameters", _SET, request, answer, call.fail, _TIMEOUT_S)
-
-        self._get(call, set_like)
-
-    def list_all(self, call: Call) -> None:
-        """Answer with the names of the parameters of all nodes that answer in time."""
-        services = sorted(self._client.bridge.node.get_service_names_and_types())
-        waiting = {
-            service.rpartition("/")[0] for service, types in services if _LIST in types and not is_hidden(service)
-        }
-        names: list[str] = []
-
-        def finish(node: str, found: list[str]) -> None:
-            waiting.discard(node)
-            names.extend(f"{node}:{name}" for name in found)
-            if not waiting:
-                call.reply({"names": sorted(names)})
-
-        if not waiting:
-            call.reply({"names": []})
-        for node in sorted(waiting):
-            call_service(
-                self._client,
-                f"{node}/list_parameters",
-                _LIST,
-                ros.get_service(_LIST).Request(),
-                lambda response, node=node: finish(node, response.result.names),  # type: ignore[misc]
-                lambda _, node=node: finish(node, []),  # type: ignore[misc]
-                _TIMEOUT_S,
-            )
-
-    def _get(self, call: Call, answer: Callable[[Any], None]) -> None:
-        """Get the value of a parameter, which is None if there is no such node or parameter."""
-        node, name = _read_name(call)
-        service = f"{node}/get_parameters"
-
-        def take(response: Any) -> None:
-            values = [ros.parameter_value_to_python(each) for each in response.values if each.type != _NOT_SET]
-            answer(values[0] if values else None)
-
-        if self._is_offered(service):
-            request = ros.get_service(_GET).Request(names=[name])
-            call_service(self._client, service, _GET, request, take, call.fail, _TIMEOUT_S)
+    def answer(value: Any) -> None:
+        if value is not None:
+            call.reply({"value": orjson.dumps(plain(value)).decode()})
+        elif asked.default_value:
+            call.reply({"value": _as_json(asked.default_value)})
         else:
-            answer(None)
+            call.fail(f"{asked.name}: there is no such node, or it has no such parameter")
 
-    def _is_offered(self, service: str) -> bool:
-        return service in dict(self._client.bridge.node.get_service_names_and_types())
+    _get(call, answer)
+
+
+def has_parameter(call: Call) -> None:
+    """Answer whether there is a parameter."""
+    _get(call, lambda value: call.reply({"exists": value is not None}))
+
+
+def set_parameter(call: Call) -> None:
+    """Set a parameter."""
+    node, name = _read_name(call)
+    try:
+        wanted = orjson.loads(call.arguments.value)
+        ros.Parameter(name, value=wanted)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"{call.asked.name}: value should be that of a parameter in JSON: {error}") from error
+    if not _is_offered(call, f"{node}/set_parameters"):
+        raise ConfigError(f"{node}: there is no such node, or it has no services for its parameters")
+
+    def answer(response: Any) -> None:
+        (result,) = response.results
+        if result.successful:
+            call.reply({"successful": True, "reason": result.reason})
+        else:
+            call.fail(f"{node}:{name}: {result.reason}")
+
+    def set_like(current: Any) -> None:
+        # JavaScript writes 1.0 as 1, so numbers for a floating-point parameter are converted.
+        value = _as_floats(wanted) if isinstance(_take_first(current), float) else wanted
+        request = ros.get_service(_SET).Request()
+        request.parameters = [ros.Parameter(name, value=value).to_parameter_msg()]
+        call_service(call.client, f"{node}/set_parameters", _SET, request, answer, call.fail, _TIMEOUT_S)
+
+    _get(call, set_like)
+
+
+def list_parameters(call: Call) -> None:
+    """Answer with the names of the parameters of all nodes that answer in time."""
+    services = sorted(call.client.bridge.node.get_service_names_and_types())
+    waiting = {service.rpartition("/")[0] for service, types in services if _LIST in types and not is_hidden(service)}
+    names: list[str] = []
+
+    def finish(node: str, found: list[str]) -> None:
+        waiting.discard(node)
+        names.extend(f"{node}:{name}" for name in found)
+        if not waiting:
+            call.reply({"names": sorted(names)})
+
+    if not waiting:
+        call.reply({"names": []})
+    for node in sorted(waiting):
+        call_service(
+            call.client,
+            f"{node}/list_parameters",
+            _LIST,
+            ros.get_service(_LIST).Request(),
+            lambda response, node=node: finish(node, response.result.names),  # type: ignore[misc]
+            lambda _, node=node: finish(node, []),  # type: ignore[misc]
+            _TIMEOUT_S,
+        )
+
+
+def _get(call: Call, answer: Callable[[Any], None]) -> None:
+    """Get the value of a parameter, which is None if there is no such node or parameter."""
+    node, name = _read_name(call)
+    service = f"{node}/get_parameters"
+
+    def take(response: Any) -> None:
+        values = [ros.parameter_value_to_python(each) for each in response.values if each.type != _NOT_SET]
+        answer(values[0] if values else None)
+
+    if _is_offered(call, service):
+        request = ros.get_service(_GET).Request(names=[name])
+        call_service(call.client, service, _GET, request, take, call.fail, _TIMEOUT_S)
+    else:
+        answer(None)
+
+
+def _is_offered(call: Call, service: str) -> bool:
+    return service in dict(call.client.bridge.node.get_service_names_and_types())
 
 
 def _read_name(call: Call) -> tuple[str, str]:

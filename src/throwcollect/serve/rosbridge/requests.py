@@ -10,11 +10,10 @@ from typing import Any
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.serve.rosbridge.advertised import Advertised
 from throwcollect.serve.rosbridge.bridge import Bridge
-from throwcollect.serve.rosbridge.calls import Call, call_node
+from throwcollect.serve.rosbridge.calls import Call, Goals, call_node
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame, Reassembly, read_frame
 from throwcollect.serve.rosbridge.operations import MAY_READ, CallService, Fragment, Status, read_operation
-from throwcollect.serve.rosbridge.pending import Goals
 from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, make_services
 from throwcollect.serve.rosbridge.topics import Publishers, Subscriptions
 

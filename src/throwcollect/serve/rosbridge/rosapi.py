@@ -17,9 +17,8 @@ from throwcollect.ros.graph_names import absolute_name, find_interface, full_nam
 from throwcollect.ros.message_values import array_parts
 from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.calls import Arguments, Call
-from throwcollect.serve.rosbridge.client import Client
-from throwcollect.serve.rosbridge.guarded import is_guarded
-from throwcollect.serve.rosbridge.parameters import Parameters
+from throwcollect.serve.rosbridge.client import Client, is_guarded
+from throwcollect.serve.rosbridge.parameters import get_parameter, has_parameter, list_parameters, set_parameter
 from throwcollect.units import NS_PER_S
 
 Answer = Callable[[Call], None]
@@ -32,12 +31,12 @@ SET_PARAMETER = "rosapi/set_param"
 
 def make_services(client: Client) -> Mapping[str, Answer]:
     """Functions that answer the calls of a client, by the names of the services without a slash at the beginning."""
-    parameters, graph = Parameters(client), _Graph(client.bridge.node)
+    graph = _Graph(client.bridge.node)
     later: Mapping[str, Answer] = {
-        "get_param": parameters.get,
-        "set_param": parameters.set,
-        "has_param": parameters.has,
-        "get_param_names": parameters.list_all,
+        "get_param": get_parameter,
+        "set_param": set_parameter,
+        "has_param": has_parameter,
+        "get_param_names": list_parameters,
         "delete_param": lambda call: call.fail(f"{call.asked.name}: parameters of nodes cannot be deleted"),
     }
     at_once: Mapping[str, Answer] = {name: partial(_reply, values) for name, values in graph.services().items()}

@@ -6,10 +6,9 @@ from contextlib import aclosing
 
 import pytest
 
-from throwcollect.serve import states as states_module
+from throwcollect.serve import state as state_module
 from throwcollect.serve.catalogue import Catalogue
-from throwcollect.serve.state import ComponentState, WholeState
-from throwcollect.serve.states import States
+from throwcollect.serve.state import ComponentState, States, WholeState
 
 
 class World(States):
@@ -27,8 +26,8 @@ class World(States):
 
 @pytest.fixture(autouse=True)
 def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(states_module, "_LOOK_S", 0.005)
-    monkeypatch.setattr(states_module, "_FRESH_S", 0.05)
+    monkeypatch.setattr(state_module, "_LOOK_S", 0.005)
+    monkeypatch.setattr(state_module, "_FRESH_S", 0.05)
 
 
 def run(scenario: Callable[[World], Awaitable[None]]) -> None:
