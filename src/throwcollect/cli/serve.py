@@ -52,20 +52,15 @@ def serve(
     from throwcollect.serve.access import Keys
     from throwcollect.serve.catalogue import Catalogue
     from throwcollect.serve.instances import Instances
-    from throwcollect.serve.server_process import Tls
     from throwcollect.serve.server_process import serve as serve_all
 
     if (certificate is None) != (key is None):
         raise ConfigError("--tls-cert and --tls-key: should be given together")
-    for option, directory in {"--datasets": datasets, "--models": models}.items():
-        if directory.exists() and not directory.is_dir():
-            raise ConfigError(f"{option} {directory}: should be a directory, is a file")
     if host not in _LOOPBACK and certificate is None and not in_the_clear:
         raise ConfigError(
-            f"--host {host}: anybody on that network could read the token while it is sent",
+            f"--host {host}: others on that network could read the token while it is sent",
             hint="--tls-cert and --tls-key, or --in-the-clear if the network is trusted; ssh -L needs neither",
         )
-    tls = None if certificate is None or key is None else Tls(certificate, key)
 
     def show_address(address: Address, code: str) -> None:
         page = address.page(code)
@@ -78,11 +73,12 @@ def serve(
         models.absolute(),
         host=host,
         port=port,
-        tls=tls,
+        certificate=certificate,
+        key=key,
         origins=frozenset(origins or ()),
         names=frozenset(names or ()),
-        keys=None if token_file is None else Keys.of_file(token_file),
-        tell=show_address,
+        keys=Keys() if token_file is None else Keys.of_file(token_file),
+        on_ready=show_address,
     )
 
 
@@ -103,7 +99,7 @@ def view(run: RunOption = None, json: JsonOption = False) -> None:
 
 
 def write_tunnel(address: Address) -> str:
-    """Write the line that says how another machine reaches the page."""
+    """Write the line on how another machine reaches the page."""
     import socket
 
     port = address.url.rpartition(":")[2]

@@ -1,8 +1,8 @@
 """Checks of every request and every socket: the token, the headers Host and Origin, and the size of the body.
 
-So the page of another site can neither read nor do anything here. The browser sends that site's Origin. If somebody has
-pointed a foreign name at this address (DNS rebinding), that name stands in Host. And there are no cookies, which a
-browser would send by itself.
+So the page of another site can neither read nor do anything here. The browser sends that site's Origin. If a foreign
+name leads to this address (DNS rebinding), that name stands in Host. And there are no cookies, which a browser would
+send with every request.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Rights(Enum):
 
     CHANGE = "full"
     LOOK = "read-only"
-    NONE = "anybody"
+    NONE = "unknown"
 
 
 @dataclass
@@ -73,9 +73,6 @@ class Keys:
         """Take the tokens from a file, with the full one in the first line, so that they outlive a restart.
 
         A file that does not exist is made, with new tokens.
-
-        Raises:
-            ConfigError: If others can read the file, or it does not have two tokens.
         """
         try:
             if not path.exists():

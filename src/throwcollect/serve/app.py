@@ -18,7 +18,7 @@ from throwcollect.serve.models import make_model_routes
 from throwcollect.serve.problem_responses import DESCRIPTION, HANDLERS
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sensor_routes import make_live_sensor_routes, make_sensor_routes
-from throwcollect.serve.sockets import keep_telling
+from throwcollect.serve.sockets import keep_sending
 from throwcollect.serve.state import STATES, ComponentState, States, WholeState
 from throwcollect.serve.throw_routes import make_throw_routes
 from throwcollect.serve.view_routes import make_view_routes
@@ -63,12 +63,12 @@ def _make_general_routes(states: States, keys: Keys) -> APIRouter:
 
     @router.get("/health")
     def health() -> dict[str, str]:
-        """Whether it serves; for anybody."""
+        """Whether it serves; for all clients."""
         return {"status": "ok", "version": __version__}
 
     @router.post("/exchange")
     def exchange(code: Annotated[str, Body(embed=True)]) -> dict[str, str]:
-        """The token for a code that nobody has exchanged yet; for anybody who has one."""
+        """The token for a code that was not exchanged before; for all clients."""
         if (token := keys.exchange(code)) is None:
             raise HTTPException(
                 403, "this code has been exchanged already, or is too old; throwcollect view makes another"
@@ -101,7 +101,7 @@ def _make_general_routes(states: States, keys: Keys) -> APIRouter:
     @router.websocket("/state")
     async def follow(socket: WebSocket) -> None:
         await socket.accept()
-        await keep_telling(socket, _send_states(socket, states))
+        await keep_sending(socket, _send_states(socket, states))
 
     return router
 

@@ -37,7 +37,7 @@ Name = Annotated[str, AfterValidator(_check_name)]
 
 
 class ComponentSection(NodeContainerConfig):
-    """One component; exactly one of `config`, `session` and `image` says what its instances are.
+    """One component; exactly one of `config`, `session` and `image` defines its instances.
 
     Properties of containers are only for components that have an image.
     """

@@ -67,10 +67,7 @@ def publish(address: Address) -> Iterator[None]:
     If there is another server already, programs find that one.
     """
     path = _find_path()
-    try:
-        lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
-    except OSError as error:
-        raise WorkerError(f"{path}: nobody would find this server: {error.strerror}") from error
+    lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
     is_first = False
     # A server holds the lock until it ends, even if it is killed. `is_locked` of a program holds it for a moment.
     deadline = time.monotonic() + _LOCK_S

@@ -154,15 +154,15 @@ def make_log_routes(instances: Instances) -> APIRouter:
     def events(instance: str) -> Response:
         """What has happened in a run, one event in JSON a line."""
         record = instances.get(instance).record
-        told: list[str] = []
+        lines: list[str] = []
         # The file does not exist before the first event.
         with (
             suppress(OSError),
             open(open_log(Path(record.logs) / EVENTS, os.O_RDONLY), encoding="utf-8", errors="replace") as file,
         ):
             # If the run resumes a dataset, the file has the events of earlier runs, too.
-            told += (line for line in file if (event := parse(line)) and event.run == record.run)
-        return Lines("".join(told))
+            lines += (line for line in file if (event := parse(line)) and event.run == record.run)
+        return Lines("".join(lines))
 
     return router
 

@@ -107,8 +107,8 @@ class Instances:
     def stop(self, instance: str, *, force: bool = False) -> None:
         """Ask an instance to finish its running trials and end; by force, end it at once, and forget it.
 
-        Asking again does not hurry the instance. If its launcher died, nobody can be asked, so this ends all nodes that
-        are left, and forgets the instance.
+        Asking again does not hurry the instance. If its launcher died, this ends all nodes that are left, and
+        forgets the instance.
         """
         run = self.get(instance)
         if force or run.status == "died":
@@ -162,7 +162,7 @@ def _conflicts(hint: str | None = None) -> Iterator[None]:
 
 
 def _stop_once(run: Run) -> None:
-    """Ask a run to stop, unless somebody has just done so: a second signal would hurry it.
+    """Ask a run to stop, unless it was just asked: a second signal would hurry it.
 
     The launcher writes into its record that it is stopping when it sees the signal; this waits for that, for a while.
     """

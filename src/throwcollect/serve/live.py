@@ -1,8 +1,8 @@
-"""Simulations that are slowed down to real time as long as somebody watches them live.
+"""Simulations that are slowed down to real time as long as they are watched live.
 
-For each simulation that was watched, there is a file beside the key of the run, which is not empty as long as the
+For each simulation that was watched, there is a file next to the key of the run, which is not empty as long as the
 simulation is slow. Each watcher holds a shared lock of the file, which ends with the server. So any server can find the
-simulations that nobody watches any more, even if the server of their watchers was killed.
+simulations that are no longer watched, even if the server of their watchers was killed.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ async def restore_speeds_meanwhile(_: object) -> AsyncIterator[None]:
 
 
 def restore_abandoned() -> None:
-    """Give simulations that nobody watches any more the speed of their configuration again."""
+    """Give simulations that are no longer watched the speed of their configuration again."""
     # If records cannot be read for a while, a later attempt finds the same files.
     with suppress(ThrowcollectError, OSError):
         for run in Records().all():

@@ -29,11 +29,11 @@ class ModelView(BaseModel):
         throws: Number of throws that it was learned from.
         error: How far throws end from where polynomials predict them that were not fitted to them, median.
         parameters: Keys that aiming chooses.
-        targets: Columns that say where a trial ends.
+        targets: Columns of where a trial ends.
         given: Keys whose values are given with a target, behind it.
         reached: Ends of throws that it was learned from, evenly chosen: values of `targets`.
         adaptation: How it was adapted; None if it was not.
-        score: What throwing at targets has shown; None if nobody has thrown.
+        score: What throwing at targets has shown; None if there was no throw.
     """
 
     name: str

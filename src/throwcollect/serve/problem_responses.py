@@ -87,7 +87,7 @@ async def answer_any(connection: HTTPConnection, error: Exception) -> ProblemRes
         case HTTPException():
             return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
     # Starlette raises the error again after this answer, so that it gets into the log.
-    return problem(500, "internal error", hint="the log of the server says where; please report it")
+    return problem(500, "internal error", hint="the log of the server has the place; please report it")
 
 
 DESCRIPTION: dict[int | str, dict[str, Any]] = {
@@ -96,7 +96,7 @@ DESCRIPTION: dict[int | str, dict[str, Any]] = {
         "content": {ProblemResponse.media_type: {"schema": ProblemFacts.model_json_schema()}},
     }
 }
-"""What the description of the interface tells of errors."""
+"""The part of the description of the interface that is on errors."""
 HANDLERS: dict[int | type[Exception], Any] = dict.fromkeys(
     (ThrowcollectError, RequestValidationError, HTTPException, Exception), answer_any
 )

@@ -185,7 +185,7 @@ def _read_descriptions() -> Sequence[tuple[str, Robot]]:
         try:
             descriptions.append((read_urdf_text(robot.urdf_path), robot))
         except (ConfigError, MemberError):
-            # A run with a broken robot says so itself, and the meshes of all other robots must still be found.
+            # A run with a broken robot reports that, and the meshes of all other robots must still be found.
             if is_own("robots", name):
                 raise
     return descriptions

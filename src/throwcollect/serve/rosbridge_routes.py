@@ -84,13 +84,7 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
 
 
 async def wait_for_end(run: Run, bridge: Bridge | None = None) -> None:
-    """Wait until a run has ended, or its bridge is over, and raise an error then.
-
-    Raises:
-        NotFoundError: If the run has ended, or was forgotten.
-        ConfigError: If its record is damaged.
-        UnreachableError: If the router has gone; the one that comes next needs another bridge.
-    """
+    """Wait until a run has ended, or its bridge is over, and raise an error then."""
     while bridge is None or not bridge.is_over:
         _refuse_ended(await asyncio.to_thread(run.now))
         await asyncio.sleep(_LOOK_S)
@@ -98,7 +92,7 @@ async def wait_for_end(run: Run, bridge: Bridge | None = None) -> None:
 
 
 def _refuse_ended(run: Run) -> None:
-    """Refuse a run that has ended, so that nobody would ever answer."""
+    """Refuse a run that has ended, which has no node that could answer."""
     if run.status == "ended":
         raise NotFoundError(f"run {run.id} has ended")
 

@@ -8,7 +8,6 @@ import os
 import socket
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Literal
@@ -31,25 +30,18 @@ _END_S = 2.5
 """Time within which the process ends after a signal."""
 
 
-@dataclass(frozen=True)
-class Tls:
-    """Files of a certificate and its key, in PEM."""
-
-    certificate: Path
-    key: Path
-
-
 def serve(
     instances: Instances,
     models: Path,
     *,
     host: str = "127.0.0.1",
     port: int | None = None,
-    tls: Tls | None = None,
+    certificate: Path | None = None,
+    key: Path | None = None,
     origins: frozenset[str] = frozenset(),
     names: frozenset[str] = frozenset(),
-    keys: Keys | None = None,
-    tell: Callable[[Address, str], None],
+    keys: Keys,
+    on_ready: Callable[[Address, str], None],
 ) -> None:
     """Serve until a signal asks the process to end.
 
@@ -58,24 +50,24 @@ def serve(
         models: Directory of models.
         host: Address to listen at.
         port: Port to listen at, 0 for any free one; None for 8080, or any free one if 8080 is taken.
-        tls: Certificate and key; None to speak in the clear.
+        certificate: File of a certificate in PEM; None to serve without TLS.
+        key: File of its key in PEM.
         origins: Further origins of pages that may connect.
         names: Host names by which clients know this machine, besides the address.
-        keys: The tokens; None for new ones.
-        tell: Called once, when the server can be reached, with the server's address and a one-time code.
+        keys: The tokens.
+        on_ready: Called once, when the server can be reached, with the server's address and a one-time code.
     """
-    keys = keys or Keys()
     with _listen(host, port) as listener:
         bound = listener.getsockname()[1]
-        scheme = "https" if tls else "http"
+        scheme = "https" if certificate else "http"
         known = {"127.0.0.1", "localhost", "[::1]", _bracket(host), *names}
         hosts = frozenset(f"{name}:{bound}" for name in known)
         if bound in (80, 443):
             # Clients leave the default port of a scheme out of the header Host.
             hosts |= known
         url = f"{scheme}://{_bracket(reach_from_here(host))}:{bound}"
-        certificate = None if tls is None else str(tls.certificate.absolute())
-        address = Address(url, keys.full, keys.read_only, os.getpid(), certificate)
+        pinned = None if certificate is None else str(certificate.absolute())
+        address = Address(url, keys.full, keys.read_only, os.getpid(), pinned)
         app = Access(make_app(instances, models, keys), keys, hosts, origins)
         config = uvicorn.Config(
             app,
@@ -88,14 +80,14 @@ def serve(
             timeout_graceful_shutdown=1,
             # These headers are ignored, because any client could send them.
             proxy_headers=False,
-            ssl_certfile=None if tls is None else tls.certificate,
-            ssl_keyfile=None if tls is None else tls.key,
+            ssl_certfile=certificate,
+            ssl_keyfile=key,
             server_header=False,
         )
         _load(config)
         _write_lines()
         with publish(address):
-            tell(address, keys.new_code())
+            on_ready(address, keys.new_code())
             # uvicorn raises the signal that ended it a second time. For a server, that is the usual end and no error.
             with contextlib.suppress(KeyboardInterrupt):
                 _Server(config).run(sockets=[listener])

@@ -43,9 +43,9 @@ async def close(socket: WebSocket, error: ThrowcollectError) -> None:
         await socket.close(code, reason)
 
 
-async def keep_telling(
+async def keep_sending(
     socket: WebSocket,
-    *telling: Coroutine[Any, Any, object],
+    *sending: Coroutine[Any, Any, object],
     hear: Callable[[Message], Awaitable[None]] | None = None,
 ) -> None:
     """Let coroutines send to a client until the client has left, or one of them has nothing more to send.
@@ -60,7 +60,7 @@ async def keep_telling(
             if hear is not None:
                 await hear(message)
 
-    tasks = [asyncio.create_task(each) for each in (wait_until_gone(), *telling)]
+    tasks = [asyncio.create_task(each) for each in (wait_until_gone(), *sending)]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -77,4 +77,4 @@ async def keep_telling(
                 # The client has left, and sending to a closed socket fails with a RuntimeError, too.
                 if isinstance(error, RuntimeError):
                     continue
-            _logger.error("telling a client failed", exc_info=error)
+            _logger.error("sending to a client failed", exc_info=error)

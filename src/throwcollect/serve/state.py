@@ -59,7 +59,7 @@ class ComponentState:
 
 @dataclass(frozen=True)
 class InstanceState:
-    """A run of this machine, whoever began it.
+    """A run of this machine, begun by a client, a command or a program.
 
     Attributes:
         component: Name of the component that it is an instance of; None if a command or a program began it.
@@ -67,7 +67,7 @@ class InstanceState:
         joins: Id of the run that a container has joined; None if it has joined none.
         status: ``planning`` while a large plan is made, ``starting`` until all nodes run, ``running``, ``ended``, or
             ``died`` if its launcher died before the end.
-        stopping: Whether it ends because somebody has asked for that; running trials are finished.
+        stopping: Whether it ends because it was asked to; running trials are finished.
         exit_code: Exit code of its launcher; None before it ended.
         message: The error with which it ended, in words; empty if there was none.
         nodes: Its nodes; none once it has ended, or died with them.
@@ -121,7 +121,7 @@ STATES: TypeAdapter[WholeState] = TypeAdapter(WholeState)
 
 
 def describe(run: Run, *, is_growing: bool = False) -> InstanceState:
-    """Describe a run for clients; ``is_growing`` says that some run collects into its directory."""
+    """Describe a run for clients; ``is_growing``: whether some run collects into its directory."""
     record = run.record
     shared = {name: value for name, value in vars(record).items() if name in InstanceState.__dataclass_fields__}
     own = {

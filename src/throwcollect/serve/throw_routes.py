@@ -142,14 +142,14 @@ def _read_growing(directory: Path, plan: Plan, names: Sequence[str], first: int)
 
 
 def _read_finished_episode(directory: Path, plan: Plan, trial: int) -> Episode | None:
-    """Read an episode where the table of throws says that it is, with what the page needs of its result."""
+    """Read an episode at its place in the table of throws, with what the page needs of its result."""
     ends = [f"{end}_{axis}_m" for end in plan.config.task.events for axis in "xyz"]
     columns = ("trial", "outcome", "shard", "chunk_offset", "samples", *ends)
     row = find_row(read_parquet(directory / THROWS, columns), trial)
     if row is None or row["shard"] is None:
         return None
     start_ns = plan.config.trial_start_ns(trial - plan.first_of_part(trial))
-    # The table may come from anybody, so it does not choose the file.
+    # The table may come from another person, so it does not choose the file.
     place = EpisodePlace(directory / shard_of(plan, trial), row["chunk_offset"], start_ns, row["samples"])
     return replace(place.read(sensors=True), result=json.dumps(row))
 

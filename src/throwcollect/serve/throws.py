@@ -1,4 +1,4 @@
-"""The newest throws of a run, as the page draws them: received by the bridge of the run as long as somebody watches."""
+"""The newest throws of a run, as the page draws them: received by the bridge of the run while there are watchers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from throwcollect.plan.plan import Plan
 from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.run_key import Signer
 from throwcollect.serve.rosbridge import Bridge
-from throwcollect.serve.rosbridge.feed import Sample
+from throwcollect.serve.rosbridge.bridge import Sample
 from throwcollect.serve.state import simulations_of
 from throwcollect.units import NS_PER_S
 
@@ -31,7 +31,7 @@ _LOOK_S = 0.5
 _FLOAT_BYTES = 4
 _LENGTH = struct.Struct("<I")
 _ENDS = ("landing", "rest")
-"""Instants that say where the object ended; the first one that a result has counts."""
+"""Instants at whose place the object ended; the first one that a result has counts."""
 
 
 def encode_throw(

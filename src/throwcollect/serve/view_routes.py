@@ -21,7 +21,7 @@ from throwcollect.serve.robot_files import (
     scene_of,
 )
 from throwcollect.serve.rosbridge_routes import Bridges, wait_for_end
-from throwcollect.serve.sockets import MAY_NOT, keep_telling
+from throwcollect.serve.sockets import MAY_NOT, keep_sending
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
@@ -78,7 +78,7 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
         run = await asyncio.to_thread(instances.get, instance)
         async with bridges.share(run) as shared, shared.throws.throws() as next_throw:
             await socket.accept()
-            await keep_telling(socket, _send_throws(socket, next_throw), wait_for_end(run, shared.bridge))
+            await keep_sending(socket, _send_throws(socket, next_throw), wait_for_end(run, shared.bridge))
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
@@ -97,7 +97,7 @@ async def _keep_slow(socket: WebSocket, instances: Instances, instance: str, sim
     hold = await asyncio.to_thread(slow_down, run, simulation)
     try:
         await socket.accept()
-        await keep_telling(socket, wait_for_end(run))
+        await keep_sending(socket, wait_for_end(run))
     finally:
         await asyncio.to_thread(hold.restore_speed)
 

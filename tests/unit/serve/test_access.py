@@ -187,12 +187,12 @@ def test_the_log_line_of_a_request_has_no_query_and_no_token(served: Served, cap
         pass
     served.client().get("/api/v1/a%0AGET%20/api/v1/forged%20200%20full")
     assert caplog.messages == [
-        "GET /api/v1/health 200 anybody",
+        "GET /api/v1/health 200 unknown",
         "GET /api/v1/state 200 full",
         "POST /api/v1/codes 403 read-only",
-        "GET /api/v1/state 401 anybody",
+        "GET /api/v1/state 401 unknown",
         "SOCKET /api/v1/state 101 read-only",
-        "SOCKET /api/v1/state 401 anybody",
+        "SOCKET /api/v1/state 401 unknown",
         "GET /api/v1/a%0AGET%20/api/v1/forged%20200%20full 404 full",
     ]
     assert not [line for line in caplog.messages if full in line or read_only in line]

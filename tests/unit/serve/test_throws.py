@@ -23,7 +23,7 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import looks_of
-from throwcollect.serve.rosbridge.feed import Listener
+from throwcollect.serve.rosbridge.bridge import Listener
 from throwcollect.serve.throws import ThrowWatch, describe_trial, encode_throw
 
 

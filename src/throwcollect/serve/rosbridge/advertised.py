@@ -47,7 +47,7 @@ class AdvertisedService:
         if isinstance(answer.values, Mapping) or answer.result:
             fill(response, {} if answer.values is None else answer.values)
         else:
-            # ROS cannot tell a node that a service has failed, and without an answer the node would wait for ever.
+            # ROS cannot report to a node that a service has failed, and without an answer the node would wait for ever.
             self._client.report("warning", f"{answer.name}: a failed request is answered with defaults", answer.id)
         # The request is removed last: if values of a wrong type raise an error above, the client can answer again.
         del self._pending[answer.id]

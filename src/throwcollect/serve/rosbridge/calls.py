@@ -70,7 +70,7 @@ def call_node(call: Call) -> None:
     client, service, arguments = call.client, absolute_name(call.asked.name), call.asked.args
     types = dict(client.bridge.node.get_service_names_and_types()).get(service, [])
     if not types:
-        raise ConfigError(f"nobody offers a service {service}")
+        raise ConfigError(f"no node offers a service {service}")
     named = full_name("srv", call.asked.type)
     type_name = named if named in types else types[0]
     message = find_interface("srv", type_name).Request()
@@ -132,7 +132,7 @@ class PendingCall:
         elif time.monotonic() < deadline:
             self._client.bridge.later(_POLL_S, partial(self._send_when_ready, is_ready, send, deadline))
         else:
-            self.give_up("nobody offers it with this type")
+            self.give_up("no node offers it with this type")
 
     def _watch(self, is_ready: Callable[[], bool]) -> None:
         if not is_ready():
@@ -203,7 +203,7 @@ class _Goal(PendingCall):
                 handle.cancel_goal_async()
 
     def cancel(self) -> None:
-        """Ask the action to cancel the goal; the result says whether it did."""
+        """Ask the action to cancel the goal; the result has its answer."""
         self.is_cancelled = True
         if self.handle is not None:
             self.handle.cancel_goal_async()
@@ -232,7 +232,7 @@ class Goals:
         name, node = absolute_name(asked.name), self._client.bridge.node
         action_type = find_interface("action", asked.action_type)
         if name not in dict(ros.get_action_names_and_types(node)):
-            raise ConfigError(f"nobody offers an action {name}")
+            raise ConfigError(f"no node offers an action {name}")
         message = action_type.Goal()
         fill(message, {} if asked.args is None or asked.args == [] else asked.args)
         self._goals = [each for each in self._goals if each.is_open]

@@ -19,8 +19,8 @@ _UNKNOWN = 0
 """Of action_msgs/msg/GoalStatus."""
 _numbers = itertools.count()
 _GUARDED = {
-    EPISODE_TOPIC: "nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up",
-    "parameter_events": "nobody may have this topic, as it tells the signed leases of trials",
+    EPISODE_TOPIC: "only the coordinator may have this topic, as a slow subscriber would hold the simulation up",
+    "parameter_events": "clients may not have this topic, as it has the signed leases of trials",
 }
 """Last part of the name of each topic that clients may not have, and why."""
 _PARAMETER_SERVICES = tuple(
@@ -47,7 +47,7 @@ class Client:
         self._send = send
 
     def send(self, frame: Frame, fragment_size: int = 0) -> None:
-        """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""
+        """Send a frame, in parts if it is a string longer than ``fragment_size``, unless that is 0."""
         if self.is_closed:
             return
         if isinstance(frame, str) and 0 < fragment_size < len(frame):
@@ -100,7 +100,7 @@ def open_topic(given: str) -> str:
 def refuse_leases(parameter: str) -> None:
     """Refuse to read or set the parameter by which the coordinator leases trials."""
     if parameter == LEASES:
-        raise ConfigError(f"{LEASES}: nobody but the coordinator may have this parameter, as its leases are signed")
+        raise ConfigError(f"{LEASES}: only the coordinator may have this parameter, as its leases are signed")
 
 
 def refuse_secrets(type_name: str, request: Any) -> None:

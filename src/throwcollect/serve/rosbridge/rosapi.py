@@ -49,7 +49,7 @@ def _reply(values: Callable[[Arguments], Values], call: Call) -> None:
 
 
 class _Graph:
-    """What rosapi tells of the graph; it leaves out hidden names, and topics that clients may not have."""
+    """What rosapi reports of the graph; it leaves out hidden names, and topics that clients may not have."""
 
     def __init__(self, node: ros.Node) -> None:
         self._node = node

@@ -10,8 +10,8 @@ from typing import Any
 from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
+from throwcollect.serve.rosbridge.bridge import Sample
 from throwcollect.serve.rosbridge.client import Client, open_topic
-from throwcollect.serve.rosbridge.feed import Sample
 from throwcollect.serve.rosbridge.operations import (
     COMPRESSIONS,
     Publish,

@@ -15,7 +15,7 @@ from starlette.websockets import WebSocket
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.codec import Frame, json_text
 from throwcollect.serve.rosbridge.requests import Requests
-from throwcollect.serve.sockets import keep_telling
+from throwcollect.serve.sockets import keep_sending
 
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20
@@ -40,7 +40,7 @@ class Outbox:
         self._lock = threading.Lock()
         self._frames: deque[Frame] = deque()
         self._bytes = 0
-        self._is_told = False
+        self._is_reported = False
         self._filled = asyncio.Event()
 
     def put(self, frame: Frame) -> None:
@@ -51,8 +51,8 @@ class Outbox:
             # A single frame is kept however long it is.
             while len(self._frames) > MOST_FRAMES or (self._bytes > MOST_BYTES and len(self._frames) > 1):
                 self._bytes -= len(self._frames.popleft())
-                if not self._is_told:
-                    self._is_told = True
+                if not self._is_reported:
+                    self._is_reported = True
                     self._append(_DROPPED)
         # `take` waits only if there is no frame, so only the first frame has to wake it.
         if was_empty:
@@ -89,7 +89,7 @@ async def attend(websocket: WebSocket, bridge: Bridge, *until: Coroutine[Any, An
             await asyncio.sleep(_POLL_S)
 
     try:
-        await keep_telling(websocket, _send_all(websocket, outbox), *until, hear=hear)
+        await keep_sending(websocket, _send_all(websocket, outbox), *until, hear=hear)
     finally:
         requests.close()
 

@@ -68,7 +68,7 @@ def test_a_client_can_cancel_a_goal_and_gets_no_unwanted_feedback(party: Party, 
     ("asked", "said"),
     [
         ({}, "/follow: the goal was rejected, and /rosout has the reason (docs/ros.md)"),
-        ({"action": "/nobody"}, "nobody offers an action /nobody"),
+        ({"action": "/nobody"}, "no node offers an action /nobody"),
     ],
 )
 def test_a_goal_that_cannot_be_sent_fails_with_the_reason(party: Party, arm: Arm, asked: Any, said: str) -> None:

@@ -21,6 +21,7 @@ from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.interfaces.catalog import _JAZZY, DEFINITIONS
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
+from throwcollect.serve.rosbridge.bridge import Sample
 from throwcollect.serve.rosbridge.codec import (
     LONGEST_FRAME,
     Reassembly,
@@ -30,7 +31,6 @@ from throwcollect.serve.rosbridge.codec import (
     plain_values,
     read_frame,
 )
-from throwcollect.serve.rosbridge.feed import Sample
 from throwcollect.serve.rosbridge.operations import Fragment, read_operation
 
 

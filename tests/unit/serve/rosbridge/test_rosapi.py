@@ -131,8 +131,8 @@ def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
     ("service", "arguments", "said"),
     [
         ("get_param", {"name": "/gone:mass"}, "/gone:mass: there is no such node, or it has no such parameter"),
-        ("get_param", {"name": "/other:trial.leases"}, "nobody but the coordinator may have this parameter"),
-        ("set_param", {"name": "/other:trial.leases", "value": "[]"}, "nobody but the coordinator may have this"),
+        ("get_param", {"name": "/other:trial.leases"}, "only the coordinator may have this parameter"),
+        ("set_param", {"name": "/other:trial.leases", "value": "[]"}, "only the coordinator may have this"),
         ("set_param", {"name": "/other:mass", "value": "-1"}, "/other:mass: too light"),
     ],
 )

@@ -35,7 +35,7 @@ def test_roslib_hears_speaks_calls_offers_and_sends_goals(program: Path, url: st
     assert told["none"] == ["Array", [1.5]]
     assert told["cbor"] == ["Float64Array", [1.5]]
     assert told["lamp"] == {"success": True, "message": "switched"}
-    assert told["nobody"] == "nobody offers a service /nobody"
+    assert told["nobody"] == "no node offers a service /nobody"
     assert told["feedback"] == ["a"]
     assert told["result"] == {"error_code": 0, "error_string": "done"}
     assert told["swing"] == {"error_code": 0, "error_string": "swung"}

@@ -34,7 +34,7 @@ def test_roslibpy_hears_speaks_calls_offers_and_sends_goals(ros: Any, robot: Rob
 
     lamp = roslibpy.Service(ros, "/lamp", "std_srvs/SetBool")
     assert lamp.call({"data": True}, timeout=10) == {"success": True, "message": "switched"}
-    with pytest.raises(Exception, match="nobody offers a service /nobody"):
+    with pytest.raises(Exception, match="no node offers a service /nobody"):
         roslibpy.Service(ros, "/nobody", "std_srvs/SetBool").call({}, timeout=10)
 
     def answer(request: Any, response: Any) -> bool:

@@ -53,7 +53,7 @@ def test_a_client_can_neither_read_nor_set_leases(party: Party, node: Node, serv
     party.ask(op="call_service", id="c", service=name, args=arguments)
     answer = party.next(op="service_response", id="c")
     assert answer["result"] is False
-    assert "trial.leases: nobody but the coordinator may have this parameter" in answer["values"]
+    assert "trial.leases: only the coordinator may have this parameter" in answer["values"]
 
 
 def test_a_call_fails_after_its_timeout_or_when_its_service_disappears(party: Party, node: Node) -> None:

@@ -63,8 +63,8 @@ def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
     ("asked", "said"),
     [
         ({"topic": "/rosout", "type": "std_msgs/String"}, "/rosout is no std_msgs/msg/String; expected: rcl_inter"),
-        ({"topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "nobody but the coordinator may have this"),
-        ({"topic": "parameter_events"}, "it tells the signed leases"),
+        ({"topic": "/sim_0/episode", "type": "std_msgs/UInt8MultiArray"}, "only the coordinator may have this"),
+        ({"topic": "parameter_events"}, "it has the signed leases"),
     ],
 )
 def test_an_impossible_subscription_gets_an_error_status(party: Party, node: Node, asked: Any, said: str) -> None:
@@ -193,7 +193,7 @@ def test_a_latched_message_reaches_late_subscribers_until_it_is_withdrawn(party:
     ("asked", "said"),
     [
         ({"op": "publish", "topic": "/t", "msg": {"dat": 1}}, "dat: no such field; did you mean 'data'?"),
-        ({"op": "publish", "topic": "/sim_0/episode", "msg": {}}, "nobody but the coordinator may have this topic"),
+        ({"op": "publish", "topic": "/sim_0/episode", "msg": {}}, "only the coordinator may have this topic"),
     ],
 )
 def test_an_impossible_publication_gets_an_error_status(party: Party, asked: Any, said: str) -> None:
