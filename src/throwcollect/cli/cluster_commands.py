@@ -9,8 +9,7 @@ from typing import Literal
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import show, tell
-from throwcollect.cli.terminal import display
+from throwcollect.cli.printing import display, show, tell
 from throwcollect.wording import command
 
 

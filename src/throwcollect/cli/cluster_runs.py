@@ -1,6 +1,6 @@
 """The commands for runs, applied to a dataset that was submitted to a cluster: `wait`, `logs`, `events`, `stop`, `ps`.
 
-They do the same as for runs of this machine, as far as the queue and the files of the dataset tell.
+They do the same as for runs of this machine, as far as the queue and the files of the dataset allow.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from typing import Any
 import typer
 
 from throwcollect.cli.dataset.info import print_collected
-from throwcollect.cli.printing import tell
+from throwcollect.cli.printing import display, tell
 from throwcollect.cli.streams import has_reader
-from throwcollect.cli.terminal import display
 from throwcollect.collect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesState, follow
 from throwcollect.collect.runtimes.node_logs import Tail
 from throwcollect.dataset.inspect import info

@@ -22,9 +22,8 @@ from throwcollect.cli.options import (
     TrialsOption,
     overrides,
 )
-from throwcollect.cli.printing import show, tell
+from throwcollect.cli.printing import display, show, tell
 from throwcollect.cli.streams import ensure_written
-from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
@@ -283,7 +282,7 @@ def _announce(run: Run, token_file: Path | None, *, view: bool) -> None:
     if token_file is not None:
         write_secret(token_file, f"{run.token}\n".encode())
     elif run.config.run.listen is not None:
-        # The token is a secret, so it is not told to a display, which may write to a log.
+        # The token is a secret, so it is not given to a display, which may write to a log.
         tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")
     if view:
         from throwcollect.cli.serve import write_tunnel

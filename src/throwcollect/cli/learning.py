@@ -45,9 +45,9 @@ def fit(
     """Learn from a dataset where throws end, and which parameters lead to a target.
 
     Options:
-        targets (COLUMN,...): Where a trial ended; by default, as the task says.
+        targets (COLUMN,...): Where a trial ended; by default, those of the task.
         parameters (KEY,...): What aiming chooses; by default, all of task.
-        given (KEY,...): What is given with a target; by default, as the task says.
+        given (KEY,...): What is given with a target; by default, those of the task.
         kind: local, by the nearest throws, too; or polynomial.
         where (CONDITION): Learn only from throws that fulfil it.
         onnx: Write model.onnx, too: target to parameters, for a robot's controller.

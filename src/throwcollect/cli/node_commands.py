@@ -77,7 +77,7 @@ def coordinator(directory: DatasetArgument, *, config: Path | None = None) -> No
     plan = prepare_or_resume(config, directory)
     print(f"plan: {count_trials(plan)}; dataset: {directory}", flush=True)
     try:
-        # Compose alone looks after the simulations, and does not tell when none can be started.
+        # Compose alone looks after the simulations, and does not report when none can be started.
         run(directory, patience_s=plan.config.run.start_timeout_s)
     except LossError:
         # The dataset is finished even so.

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from throwcollect.cli.options import JsonOption, RunOption
-from throwcollect.cli.printing import align, show, tell
+from throwcollect.cli.printing import align, display, show, tell
 from throwcollect.cli.streams import has_reader
-from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.interruption import count_interruptions
 from throwcollect.wording import command, format_count
@@ -47,23 +46,20 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
     queued, server = find_queued(), find_living()
-    if json:
-        documents = [_make_document(run) for run in shown]
-        if queued:
-            from throwcollect.cli.cluster_runs import list_queued, make_document
+    tasks = []
+    if queued:
+        from throwcollect.cli.cluster_runs import list_queued, make_document, make_row
 
-            documents += [make_document(*each) for each in list_queued(queued)]
+        tasks = list_queued(queued)
+    if json:
+        documents = [*map(_make_document, shown), *(make_document(*each) for each in tasks)]
         if server is not None:
             documents.append(
                 {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
             )
         show(documents, json=True)
         return
-    rows = [(_make_row(run), _list_node_lines(run)) for run in shown]
-    if queued:
-        from throwcollect.cli.cluster_runs import list_queued, make_row
-
-        rows += [(make_row(*each), []) for each in list_queued(queued)]
+    rows = [*((_make_row(run), _list_node_lines(run)) for run in shown), *((make_row(*each), []) for each in tasks)]
     if server is not None:
         rows.append(((SERVER, "-", "-", "-", f"running at {server.url}, pid {server.pid}", "-"), []))
     for line in _make_table(rows):

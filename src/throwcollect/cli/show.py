@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import format_number, show, tell
+from throwcollect.cli.printing import display, format_number, show, tell
 from throwcollect.cli.robot_commands import FlangeOption, read_robot, write_robot
-from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.side_by_side import count_cores

@@ -47,7 +47,7 @@ def open_streams() -> None:
 
 
 def has_reader() -> bool:
-    """Find out whether anybody may still read standard output, without writing to it; commands that wait ask this."""
+    """Find out whether standard output may still have a reader, without writing to it; commands that wait ask this."""
     poll = select.poll()
     poll.register(1, 0)
     # A pipe without a reader is reported as POLLERR, whatever events were asked for (poll(2)).

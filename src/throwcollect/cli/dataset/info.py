@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def info(directory: DatasetArgument, *, json: JsonOption = False) -> None:
-    """Say what a dataset holds."""
+    """Print what a dataset holds."""
     from throwcollect.dataset.inspect import check_recordings_are_there, summary
     from throwcollect.dataset.reader import Dataset
 
@@ -69,7 +69,7 @@ def verify(
 
 
 def _describe_replay(dataset: Dataset, replay: int | None) -> str:
-    """Say how many throws were simulated again in a dataset in which nothing is wrong, and how to simulate more."""
+    """Describe how many throws of a dataset without findings were simulated again, and how to simulate more."""
     from throwcollect.config.policy import SESSION
     from throwcollect.replay import count_replayed
 
@@ -130,7 +130,7 @@ def replay(
     if wrong:
         raise DatasetError(
             f"{directory}: {len(wrong)} of {throws} came out differently",
-            hint="its README.md says with which processor and versions it was made",
+            hint="its README.md has the processor and the versions with which it was made",
         )
 
 
@@ -169,7 +169,7 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
 
 
 def describe(found: Info) -> str:
-    """Put the summary of a dataset into words, one fact a line; a run's summary also says if anybody could join it."""
+    """Put the summary of a dataset into words, one fact a line; a run's summary also has whether it was open."""
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     lines = {
         "trials": f"{found.trials}: {outcomes}{_describe_shortage(found)}",
@@ -188,7 +188,7 @@ def describe(found: Info) -> str:
             f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, {factor:.1f} x real time, start of the nodes included"
         )
     if getattr(found, "open", False):  # only the summary of a run has it
-        lines["open"] = "anybody who reached the router could join, read and disturb the run"
+        lines["open"] = "any process that reached the router could join, read and disturb the run"
     width = max(map(len, lines))
     return "\n".join(f"{key:{width}}  {text}" for key, text in lines.items())
 

@@ -45,7 +45,7 @@ def report(
     """Write a page that shows what a dataset holds.
 
     Options:
-        output (--output -o FILE): HTML file to write; DIR.html beside the dataset if not given.
+        output (--output -o FILE): HTML file to write; DIR.html next to the dataset if not given.
         model (MODEL): Also show a model of the dataset, and how it hits.
     """
     from throwcollect.publish.report.sections import write_report
@@ -70,7 +70,7 @@ def view(
     written = write_view(directory, output, None if trials is None else read_trials(trials))
     text = (
         f"{written.recording}: {format_count(written.throws, 'throw')}, {written.duration_s:.0f} s, "
-        f"{written.recording_bytes / 1e6:.1f} MB; meshes beside it: {written.mesh_bytes / 1e6:.1f} MB\n"
+        f"{written.recording_bytes / 1e6:.1f} MB; meshes next to it: {written.mesh_bytes / 1e6:.1f} MB\n"
         f"Foxglove  open {written.recording.name}, then import the layout {written.layout}\n"
         f"Rerun     ROS_PACKAGE_PATH={shlex.quote(str(output.absolute()))} "
         f"rerun {shlex.quote(str(written.recording))}"

@@ -42,7 +42,7 @@ _DEPTH = 100
 """Messages that wait for `hz` to count them."""
 _PERIOD_S = 1.0
 _SHORT = 128
-"""Length at which texts and arrays are cut off, unless the user asks for all of them."""
+"""Length at which strings and arrays are cut off, unless the user asks for all of them."""
 _SERVICE_S = 5.0
 """Longest wait for the parameter services of a node."""
 _STATUSES = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
@@ -89,7 +89,7 @@ def echo(
         str | None, typer.Option("--field", metavar="FIELD", help="Print this field alone, such as pose.pose.position.")
     ] = None,
     full: Annotated[
-        bool, typer.Option("-f", "--full-length", help="Print texts and arrays of more than 128 elements in full.")
+        bool, typer.Option("-f", "--full-length", help="Print strings and arrays of more than 128 elements in full.")
     ] = False,
     run: RunOption = None,
 ) -> None:
@@ -162,14 +162,14 @@ def send_goal(
         require_name("action", name, actions)
         client = ros.ActionClient(session.node, action_type, name)
         if not client.server_is_ready():
-            raise ConfigError(f"nobody offers {name} as {kind}", expected=", ".join(actions[name]))
+            raise ConfigError(f"no node offers {name} as {kind}", expected=", ".join(actions[name]))
         print(f"Sending goal:\n{_indent(message)}", flush=True)
         sent = client.send_goal_async(message, feedback_callback=_show_feedback if feedback else None)
         try:
             handle = session.answer(sent, alive=client.server_is_ready, who=name)
             if not handle.accepted:
                 echo = command("ros", "topic", "echo", "-f", "/rosout", *(("--run", run) if run is not None else ()))
-                raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node says why: {echo}")
+                raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node has the reason: {echo}")
             print(f"Goal accepted with ID: {bytes(bytearray(handle.goal_id.uuid)).hex()}\n", flush=True)
             response = session.answer(handle.get_result_async(), alive=client.server_is_ready, who=name)
         except KeyboardInterrupt:
@@ -262,7 +262,7 @@ def _parse(text: str, what: str) -> Any:
 
 
 def _shorten(value: Any) -> Any:
-    """Cut off the texts and lists in a value that are longer than 128."""
+    """Cut off the strings and lists in a value that are longer than 128."""
     if isinstance(value, dict):
         return {name: _shorten(each) for name, each in value.items()}
     if isinstance(value, list):

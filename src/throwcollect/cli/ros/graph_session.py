@@ -57,16 +57,11 @@ class GraphSession:
                 return
 
     def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
-        """Wait for the answer to a request to a node or service; `alive` tells whether that one still exists."""
+        """Wait for the answer to a request to a node or service; `alive` is whether that one still exists."""
         self.spin_until(lambda: future.done() or not alive())
         if not future.done():
             raise WorkerError(f"{who} is gone and has not answered")
         return future.result()
-
-    def close(self) -> None:
-        """Leave the graph."""
-        self.node.destroy_node()
-        ros.shutdown()
 
 
 def find_run_and_connection(run: str | None) -> tuple[Run, Connection]:
@@ -125,7 +120,8 @@ def join_graph(run: str | None) -> Iterator[GraphSession]:
                 session.wait_for_discovery()
             yield session
         finally:
-            session.close()
+            session.node.destroy_node()
+            ros.shutdown()
     except KeyboardInterrupt:
         raise Interrupted("") from None
 

@@ -223,7 +223,7 @@ def prepare_run(
 def _warn_if_others_may_join(config: Config, middleware: Middleware, reporter: Reporter) -> None:
     """Warn the user if others may join the run."""
     if config.run.open:
-        reporter.warn("run.open: any program that reaches the router may join, read and disturb this run")
+        reporter.warn("run.open: any process that reaches the router may join, read and disturb this run")
     elif middleware.is_fast_dds:
         reporter.warn(
             "on Fast DDS, any program that finds the router may join and disturb this run; episodes are signed"

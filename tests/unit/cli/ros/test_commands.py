@@ -256,7 +256,9 @@ def test_commands_join_a_run_by_its_name_or_directory(
         assert "/robot/states" in say("topic", "list", "--run", named).out.splitlines()
         assert say("env", "--run", named) == (0, line, "")
     rejected = say("action", "send", FOLLOW, FJT.TYPE, "{}", "--run", run.id)
-    assert f"the log of the node says why: throwcollect ros topic echo -f /rosout --run {run.id}\n" in rejected.err
+    assert (
+        f"the log of the node has the reason: throwcollect ros topic echo -f /rosout --run {run.id}\n" in rejected.err
+    )
     run.update(endpoint=None)
     for command in (("topic", "list"), ("env",)):
         assert say(*command, "--run", run.id).code == 3

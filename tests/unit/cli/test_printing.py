@@ -1,6 +1,6 @@
 import pytest
 
-from throwcollect.cli.terminal import display
+from throwcollect.cli.printing import display
 from throwcollect.collect.coordinator.progress import Progress
 
 
