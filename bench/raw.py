@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.plan.plan import Plan
 from throwcollect.robots.description import physics_description, robot_of, start_posture
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.robot import joint_limits
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.sim.world import World
 from throwcollect.tasks.task import task_of
 

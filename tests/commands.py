@@ -42,11 +42,10 @@ from throwcollect.build import build_digest
 from throwcollect.config import shape
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.interruption import die_with_parent
-from throwcollect.own_process import SERIAL_LIBRARIES
+from throwcollect.own_process import SERIAL_LIBRARIES, die_with_parent
 from throwcollect.robots.description import full_description
+from throwcollect.robots.dynamics import ToolMotion
 from throwcollect.robots.feasibility import Feasibility
-from throwcollect.robots.tool_motion import ToolMotion
 
 _spawn = multiprocessing.util.spawnv_passfds
 _MESSAGE_BYTES = 1 << 17

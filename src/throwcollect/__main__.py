@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 
-from throwcollect.interruption import leave_when_stopped
+from throwcollect.own_process import leave_when_stopped
 
 
 def main() -> None:

@@ -59,8 +59,8 @@ def _list_facts(engine: str, **others: str) -> Iterator[str]:
         yield _version_of(package.distribution)
         # Two builds of one version differ in size. Hashing would take each node a second, because Bullet has 140 MB.
         found = find_spec(package.module)
-        beside = Path(found.origin).parent.glob(package.compiled) if found and found.origin else []
-        sizes = [path.stat().st_size for path in sorted(beside)]
+        files = Path(found.origin).parent.glob(package.compiled) if found and found.origin else []
+        sizes = [path.stat().st_size for path in sorted(files)]
         yield f"{package.module} {sizes or 'missing'} bytes"
     for family, name in {"engines": engine, **others}.items():
         yield from list_origins(family, name)

@@ -1,24 +1,28 @@
-"""All errors that throwcollect raises on purpose.
+"""All errors that throwcollect raises on purpose, and checks of arguments of functions that other programs call.
 
 The exit code of a command is that of the class; `throwcollect.extras` has one further error, for a missing package.
 
-A message says, in this order: where the problem is, what is wrong and which value was given; what would be right; the
-evidence; and what to try.
+A message names, in this order: where the problem is, what is wrong and which value was given; what would be right;
+the evidence; and what to try.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
+from operator import index
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from throwcollect.wording import suggest
 
 
 class ThrowcollectError(Exception):
     """Root of all errors raised on purpose.
 
     Args:
-        message: One line that says where the problem is and what it is.
+        message: Place and nature of the problem, in one line.
         expected: What would have been right.
         evidence: What was observed, such as the tail of a log.
         hint: One command or one edit that helps.
@@ -61,7 +65,7 @@ class Problem:
     """One thing that is wrong in a configuration."""
 
     message: str
-    """Says what is wrong, which value was given and what would be right."""
+    """What is wrong, which value was given and what would be right."""
     key: str = ""
     """Dotted path of the key, or the name of an argument."""
     path: Path | None = None
@@ -120,7 +124,7 @@ class DatasetError(ThrowcollectError):
     """A dataset is missing, torn or contradicts itself.
 
     Args:
-        problem: One line that says what is wrong.
+        problem: What is wrong, in one line.
         path: The damaged file or directory; None if only the caller knows it.
         place: Place in that file, such as ``byte 17``; empty for the file as a whole.
     """
@@ -151,7 +155,7 @@ class DatasetError(ThrowcollectError):
     def locate(self, path: Path | None = None, place: str = "") -> DatasetError:
         """Return the same error with file and place, for a caller that knows where the bytes came from.
 
-        `place` says where the bytes are in the file; it comes before the place of the error in the bytes.
+        `place` is that of the bytes in the file; it comes before the place of the error in the bytes.
         """
         # An error makes its message when it is made, so another place needs another error.
         whole = ": ".join(filter(None, (place, self.place)))
@@ -160,7 +164,7 @@ class DatasetError(ThrowcollectError):
 
 
 class ForeignPlanError(DatasetError):
-    """A plan was made for a configuration other than the one beside it."""
+    """A plan was made for a configuration other than the one in its directory."""
 
 
 class OutputError(ThrowcollectError):
@@ -184,7 +188,7 @@ class RequestError(ThrowcollectError):
 
     Args:
         reason: Name of the result code in the interface definitions, such as ``NAME_INVALID``.
-        message: One line that says what was asked for and what is wrong with it.
+        message: What was asked for and what is wrong with it, in one line.
     """
 
     def __init__(self, reason: str, message: str, *, expected: str | None = None, hint: str | None = None) -> None:
@@ -196,3 +200,29 @@ class Interrupted(ThrowcollectError):
     """Stopped by the user; finished episodes are on disk."""
 
     exit_code = 130
+
+
+_Word = TypeVar("_Word", bound=Enum)
+
+
+def refuse_argument(
+    argument: str, problem: str, *, expected: str | None = None, hint: str | None = None
+) -> ConfigError:
+    """Make the error that an argument is wrong."""
+    return ConfigError([Problem(problem, argument)], expected=expected, hint=hint)
+
+
+def check_bounds(argument: str, given: int, *, least: int, most: int | None = None) -> None:
+    """Reject an integer that is not from `least` to `most`; None for no upper bound."""
+    if index(given) < least or (most is not None and given > most):
+        bounds = f"{least} or more" if most is None else f"{least} to {most}"
+        raise refuse_argument(argument, f"got {given}", expected=bounds)
+
+
+def read_word(argument: str, given: str, words: type[_Word]) -> _Word:
+    """Find the member of an enumeration that a word stands for."""
+    try:
+        return words(given)
+    except ValueError:
+        meant = suggest(given, [each.value for each in words])
+        raise refuse_argument(argument, f"{given!r}{meant}") from None

@@ -91,7 +91,7 @@ class MissingExtraError(ThrowcollectError, ImportError):
 
 
 def has_wheel(package: str) -> bool:
-    """Say whether a package can be installed on this Python without a compiler."""
+    """Whether a package can be installed on this Python without a compiler."""
     (first, last), _ = _WHEELS.get(package, (((3, 0), (3, 99)), ""))
     return first <= sys.version_info[:2] <= last
 
@@ -102,7 +102,7 @@ def install_command(extra: str) -> str:
 
 
 def is_installed(package: str) -> bool:
-    """Say whether a package can be imported, without importing it."""
+    """Whether a package can be imported, without importing it."""
     spec = find_spec(package)
     # Any directory of that name has a spec without an origin, such as `docker` if `python -m` runs in a clone.
     return spec is not None and spec.origin is not None
@@ -158,7 +158,7 @@ class _LazyModule:
             except ImportError as error:
                 if ".so" not in str(error):
                     raise
-                # The loader says which library the system lacks, such as libgomp.so.1 of Pinocchio.
+                # The loader names the library the system lacks, such as libgomp.so.1 of Pinocchio.
                 hint = "docs/installing.md names the libraries of the system that are needed"
                 raise ConfigError(f"{self._name} cannot be loaded: {error}", hint=hint) from error
         # This is outside of the block above, because a missing attribute is an error of the caller.

@@ -1,6 +1,6 @@
-"""Writes files that appear whole or not at all, opens them only where they seem to lie, and says what is wrong.
+"""Writes files that appear whole or not at all, opens them only where they seem to lie, and makes errors for both.
 
-A dataset may come from anybody, so a name in its directory may be a symbolic link to any file of the user, or a pipe
+A dataset may come from a stranger, so a name in its directory may be a symbolic link to any file of the user, or a pipe
 that blocks the process that opens it. Nothing here follows such a name: a file is read, written or cut only if it is a
 regular file in the very directory in which it is looked for. The user chooses that directory, so its own path may go
 through links.
@@ -42,12 +42,12 @@ _REASONS = {
 
 
 def unwritable(path: Path, error: OSError) -> DatasetError:
-    """Make the error that says why a path cannot be written."""
+    """Make the error that a path cannot be written."""
     return DatasetError(f"cannot be written: {_find_reason(error)}", path=path, hint=_HINTS.get(error.errno or 0))
 
 
 def unreadable(path: Path, error: OSError) -> DatasetError:
-    """Make the error that says why a path cannot be read."""
+    """Make the error that a path cannot be read."""
     hint = _MOVE_HERE if error.errno in _REASONS else None
     return DatasetError(f"cannot be read: {_find_reason(error)}", path=path, hint=hint)
 
@@ -129,7 +129,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     """
     new = path.with_name(f"{path.name}.new")
     new.unlink(missing_ok=True)
-    # O_EXCL fails if somebody has put a file or a link there since the removal.
+    # O_EXCL fails if another program has put a file or a link there since the removal.
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, mode)
     try:
         try:
@@ -164,11 +164,11 @@ def new_directory(path: Path) -> Iterator[Path]:
     """Make a directory that gets its name if the block ends well, and vanishes if it does not.
 
     What a process that was killed has left of one of the same name vanishes, too. There must be nothing of that name,
-    or only an empty directory. Errors of the block name its files as they would have been called, because nobody else
-    knows the hidden directory.
+    or only an empty directory. Errors of the block name its files as they would have been called, because only
+    this function knows the hidden directory.
 
     Yields:
-        A directory in a hidden one beside `path`, to write into meanwhile.
+        A directory in a hidden one next to `path`, to write into meanwhile.
     """
     try:
         if path.exists() and not (path.is_dir() and not any(path.iterdir())):
@@ -177,15 +177,15 @@ def new_directory(path: Path) -> Iterator[Path]:
         # The hidden directory is on the same file system, so one rename can give it its name.
         hidden = path.with_name(f".{path.name}.unfinished")
         shutil.rmtree(hidden, ignore_errors=True)
-        beside = hidden / path.name
-        beside.mkdir(parents=True)
+        unfinished = hidden / path.name
+        unfinished.mkdir(parents=True)
         try:
-            yield beside
-            os.rename(beside, path)
+            yield unfinished
+            os.rename(unfinished, path)
         except DatasetError as error:
-            if error.path is None or not error.path.is_relative_to(beside):
+            if error.path is None or not error.path.is_relative_to(unfinished):
                 raise
-            raise error.locate(path / error.path.relative_to(beside)) from error
+            raise error.locate(path / error.path.relative_to(unfinished)) from error
         finally:
             shutil.rmtree(hidden, ignore_errors=True)
     except OSError as error:

@@ -23,7 +23,7 @@ from throwcollect.files import StrPath
 from throwcollect.members import names_of
 from throwcollect.publish.view.throw_pictures import Still
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.surroundings import object_of
 from throwcollect.sim.policy import Observation, PolicyLoop, shape_observation, shape_pictures
 from throwcollect.sim.simulator import Simulator

@@ -124,7 +124,7 @@ def load_member(family: str, name: str) -> Any:
 def find_broken(family: str) -> Mapping[str, ThrowcollectError]:
     """Find the members of a family that cannot be loaded, each with its error.
 
-    They come from other packages, and concern nobody who does not name them.
+    They come from other packages, and concern only configurations that name them.
     """
     errors: dict[str, ThrowcollectError] = {}
     for name in names_of(family):

@@ -1,4 +1,4 @@
-"""Logs how far long work has come, so that whoever waits sees that it goes on; commands print what is logged here."""
+"""Logs how far long work has come, so that users who wait see that it goes on; commands print what is logged here."""
 
 from __future__ import annotations
 

@@ -9,7 +9,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from throwcollect.arguments import check_bounds
 from throwcollect.config.values import column_of, with_values
 from throwcollect.dataset.manifest import Finding
 from throwcollect.dataset.provenance import find_versions, read_provenance
@@ -19,7 +18,7 @@ from throwcollect.dataset.verify import verify
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, check_bounds
 from throwcollect.extras import MissingExtraError, require, require_engine
 from throwcollect.files import StrPath
 from throwcollect.members import names_of
@@ -50,11 +49,7 @@ class Comparison:
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
-    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice.
-
-    Raises:
-        DatasetError: If no trial has one.
-    """
+    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice."""
     trials: list[int] = dataset.recorded.throws["trial"].to_pylist()
     if not trials:
         raise DatasetError(f"{dataset.directory}: no trial has an episode")
@@ -263,11 +258,7 @@ class Distribution:
 
 
 def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
-    """Simulate stored throws of a dataset with another engine; deviations come in the given order.
-
-    Raises:
-        ConfigError: If there is no such engine, or the throws are by it themselves.
-    """
+    """Simulate stored throws of a dataset with another engine; deviations come in the given order."""
     own = Dataset.open(directory).config.sim.engine
     others = [name for name in names_of("engines") if name != own]
     if engine == own:

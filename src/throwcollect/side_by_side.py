@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from throwcollect.errors import WorkerError
-from throwcollect.interruption import die_with_parent
+from throwcollect.own_process import die_with_parent
 
 if TYPE_CHECKING:
     from concurrent.futures import Future

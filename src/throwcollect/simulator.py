@@ -9,10 +9,9 @@ from threading import RLock
 
 import numpy as np
 
-from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.collect.coordinator.prepare import feasibility_check
 from throwcollect.config.loader import load
-from throwcollect.config.policy import PolicyConfig
+from throwcollect.config.motion import PolicyConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.task_config import LARGEST_TARGET
@@ -20,13 +19,12 @@ from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable, judge_episode
 from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
+from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem, check_bounds, refuse_argument
 from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.plan.chosen_motions import complete_point
 from throwcollect.plan.plan import Check, make_trials, refusal
-from throwcollect.plan.points import Points
-from throwcollect.plan.trials import Trial
+from throwcollect.plan.trials import Points, Trial
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
 from throwcollect.sim.policy import Policy, check_observation
@@ -124,7 +122,7 @@ class Simulator:
 
         Args:
             policy: Has ``reset(seed, target)`` and ``act(observation)``; see `throwcollect.sim.policy.Policy`.
-            values: As for `throw`; `task.end` only names the joints that move.
+            values: As for `throw`; `task.end` only chooses the joints that move.
             trial: As for `throw`; the seed that the policy gets follows from it.
             target: As for `throw`; the policy gets it, too.
             rate_hz: Commands per simulated second; divides `sim.physics_hz`.
@@ -174,7 +172,7 @@ class Simulator:
         return self._make_throw(config, planned, episode)
 
     def find_refusal(self, values: Point) -> str | None:
-        """Return why the plan of a collection would refuse a throw with these values; None if it would not.
+        """Explain why the plan of a collection would refuse a throw with these values; None if it would not.
 
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
@@ -243,7 +241,7 @@ class Simulator:
 
 
 def find_refusal(config: Config, values: Point, check: Check) -> str | None:
-    """Return why the plan of a collection would refuse a trial with these values; None if it would not.
+    """Explain why the plan of a collection would refuse a trial with these values; None if it would not.
 
     Raises:
         ConfigError: If a key cannot vary, or a value is out of its range.

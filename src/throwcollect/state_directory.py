@@ -30,7 +30,7 @@ def state_directory() -> Path:
     # All users may write to /tmp, so another one may have made the directory first.
     if status.st_uid != os.getuid() or status.st_mode & (0o022 if named else 0o077):
         raise ConfigError(
-            f"{path}: runs cannot be remembered there: it belongs to somebody else, or others may write there",
+            f"{path}: runs cannot be remembered there: it belongs to another user, or others may write there",
             hint=f"name another directory in {STATE_VARIABLE}, or remove it",
         )
     return path

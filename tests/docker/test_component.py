@@ -15,7 +15,7 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import Origin
 from throwcollect.collect.runtimes.docker.container_options import RUN_LABEL
 from throwcollect.collect.runtimes.docker.docker_engine import default_tag
-from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
+from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.docker

@@ -21,7 +21,7 @@ import pytest
 from tests.commands import Command, command, start_command
 from tests.restrictions import FREE, Restrictions
 from throwcollect.cli.main import main
-from throwcollect.interruption import stop_signals
+from throwcollect.own_process import stop_signals
 
 CONFIG = """\
 name: small

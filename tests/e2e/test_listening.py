@@ -95,13 +95,9 @@ def listened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
             ears.listen()
     code, out, err = running.finish()
     assert code == 0, err
-    assert "run.open: any process that reaches the router may join, read and disturb this run
-" in err
-    assert "
-open      any process that reached the router could join, read and disturb the run
-" in out
-    assert "
-| open | any process that reached the router could join" in (directory / "data" / "README.md").read_text()
+    assert "run.open: any process that reaches the router may join, read and disturb this run\n" in err
+    assert "\nopen      any process that reached the router could join, read and disturb the run\n" in out
+    assert "\n| open | any process that reached the router could join" in (directory / "data" / "README.md").read_text()
     return directory / "data", {name: during_trials(messages) for name, messages in ears.heard.items()}
 
 

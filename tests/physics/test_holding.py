@@ -9,8 +9,8 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.robots.description import joint_model, start_posture
+from throwcollect.robots.dynamics import ToolMotion
 from throwcollect.robots.talos import TALOS
-from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sim.world import World
 from throwcollect.tasks.task import task_of

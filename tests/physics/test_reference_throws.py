@@ -12,7 +12,7 @@ import pytest
 from tests.physics.conftest import Thrower
 
 from throwcollect.config.schema import Config
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.talos import TALOS
 
 FINE = {"sim": {"physics_hz": 1000}, "record": {"rate_hz": 1000}}

@@ -2,8 +2,7 @@
 
 import pytest
 
-from throwcollect.arguments import check_bounds
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, check_bounds
 
 
 @pytest.mark.parametrize(("given", "expected"), [(0, "1 to 9"), (10, "1 to 9")])

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.heartbeat import VARIABLE, Heartbeat
+from throwcollect.own_process import HEARTBEAT_VARIABLE, Heartbeat
 
 
 def test_a_loop_that_goes_round_often_touches_its_file_once_a_second(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "alive"
-    monkeypatch.setenv(VARIABLE, str(file))
+    monkeypatch.setenv(HEARTBEAT_VARIABLE, str(file))
     heart = Heartbeat()
     heart.beat()
     file.unlink()
@@ -20,5 +20,5 @@ def test_a_loop_that_goes_round_often_touches_its_file_once_a_second(
 
 
 def test_outside_of_containers_a_heartbeat_writes_no_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.delenv(HEARTBEAT_VARIABLE, raising=False)
     Heartbeat().beat()

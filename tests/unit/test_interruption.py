@@ -7,11 +7,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from throwcollect.interruption import count_interruptions
+from throwcollect.own_process import count_interruptions
 
 CHILD = """
 import os, sys, time
-from throwcollect.interruption import die_with_parent
+from throwcollect.own_process import die_with_parent
 
 parent = os.getpid()
 if os.fork():

@@ -17,7 +17,7 @@ from tests.unit.plan.own_plan import make_plan
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame
 from throwcollect.reproducible_math import add_up, cos, exp, matmul, power, sin, solve
-from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.task import task_of
 
 ROOT = Path(__file__).parents[2]

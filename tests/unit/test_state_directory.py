@@ -22,7 +22,7 @@ def test_the_default_state_directory_is_private_to_the_user(tmp_path: Path, monk
     directory = tmp_path / f"throwcollect-{os.getuid()}"
     assert directory.stat().st_mode & 0o777 == 0o700
     directory.chmod(0o777)
-    with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+    with pytest.raises(ConfigError, match="belongs to another user, or others may write there"):
         state_directory()
 
 
@@ -33,7 +33,7 @@ def test_a_named_state_directory_that_others_can_write_is_refused(state: Path, p
     if taken:
         state_directory()
     else:
-        with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+        with pytest.raises(ConfigError, match="belongs to another user, or others may write there"):
             state_directory()
 
 
@@ -50,5 +50,5 @@ def test_a_link_in_place_of_the_default_state_directory_is_refused(
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     (tmp_path / f"throwcollect-{os.getuid()}").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(ConfigError, match="belongs to somebody else, or others may write there"):
+    with pytest.raises(ConfigError, match="belongs to another user, or others may write there"):
         state_directory()

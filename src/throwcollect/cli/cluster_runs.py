@@ -19,7 +19,7 @@ from throwcollect.collect.cluster.cluster_run import ClusterRun, ProgressOfSlice
 from throwcollect.collect.runtimes.node_logs import Tail
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
-from throwcollect.interruption import count_interruptions
+from throwcollect.own_process import count_interruptions
 from throwcollect.wording import command, format_count
 
 

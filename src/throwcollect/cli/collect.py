@@ -27,7 +27,7 @@ from throwcollect.cli.streams import ensure_written
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
-from throwcollect.interruption import count_interruptions
+from throwcollect.own_process import count_interruptions
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
 

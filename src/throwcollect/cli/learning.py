@@ -303,7 +303,7 @@ def _score_policy(
 ) -> None:
     """Score a policy at targets that a model or a dataset has, in some worlds, each with what `--set` changes."""
     from throwcollect.config.loader import load as load_config
-    from throwcollect.config.policy import PolicyConfig
+    from throwcollect.config.motion import PolicyConfig
     from throwcollect.config.values import with_values
     from throwcollect.learning.fitting import read_ends
     from throwcollect.learning.scoring import score_policy

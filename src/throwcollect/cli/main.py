@@ -19,7 +19,7 @@ from throwcollect.cli.options import describe
 from throwcollect.cli.streams import ensure_written
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.extras import explain_missing
-from throwcollect.interruption import stop_signals
+from throwcollect.own_process import stop_signals
 from throwcollect.version import __version__
 from throwcollect.wording import printable
 

@@ -14,7 +14,7 @@ from throwcollect.cli.options import JsonOption, RunOption
 from throwcollect.cli.printing import align, display, show, tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError, Interrupted
-from throwcollect.interruption import count_interruptions
+from throwcollect.own_process import count_interruptions
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:

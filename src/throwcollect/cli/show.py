@@ -80,7 +80,7 @@ def fit_dmp(path: ConfigArgument = DEFAULT_CONFIG, *, settings: SetOption = None
     """
     from throwcollect.config.loader import dump_yaml, load
     from throwcollect.robots.description import robot_of
-    from throwcollect.robots.quintic_curve import sample_positions
+    from throwcollect.robots.trajectory import sample_positions
     from throwcollect.tasks.dmp import fit_motions
     from throwcollect.tasks.task import trajectory_of
 

@@ -24,5 +24,5 @@ class ControllersConfig(Section):
     """Whether a trajectory on a controller's topic aborts the goal of its action; otherwise the goal stays open and is
     judged on that trajectory (ros2_controllers)."""
     refused_goals: Literal["reject", "abort"] = "reject"
-    """How goals that cannot be executed are answered: they are rejected, and the log alone says why (ros2_controllers);
-    or they are accepted and aborted at once, with error code and reason in the result."""
+    """How goals that cannot be executed are answered: they are rejected, and only the log has the reason
+    (ros2_controllers); or they are accepted and aborted at once, with error code and reason in the result."""

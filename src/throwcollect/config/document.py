@@ -140,7 +140,7 @@ class Document:
 
 @lru_cache(maxsize=8)
 def _compose(text: str) -> Node | None:
-    """Parse a YAML text into a node, which nobody may change; None if the text is empty.
+    """Parse a YAML text into a node, which callers must not change; None if the text is empty.
 
     It remembers the last texts, because one command reads the configuration of a dataset several times.
     """
@@ -186,7 +186,7 @@ def _find_lines(node: Node | None, location: Location) -> list[int]:
 
 
 def explain_yaml_error(error: Exception) -> tuple[str, int | None]:
-    """Say why a text is not valid YAML, and in which line, counted from 1; None if the line is unknown."""
+    """Explain why a text is not valid YAML, and in which line, counted from 1; None if the line is unknown."""
     if isinstance(error, RecursionError):
         return "values are nested too deeply", None
     if isinstance(error, MarkedYAMLError):

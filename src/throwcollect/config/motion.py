@@ -1,4 +1,4 @@
-"""Keys of the families of motions: how joints go from a start to an end."""
+"""Keys of what moves the joints: the families of motions from a start to an end, or a policy step by step."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, PositiveFloat
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Joint
-from throwcollect.config.section import Section, any_of
+from throwcollect.config.section import Joint, Section, any_of
 
 
 class MinimumJerk(Section):
@@ -68,3 +67,26 @@ else:
         {"minimum_jerk": MinimumJerk, "dmp": DynamicMovementPrimitive, "file": MotionFile},
         lambda value: value.get("family", "minimum_jerk") if isinstance(value, dict) else None,
     )
+
+
+SESSION = "session"
+"""`task.policy.use` of a dataset that clients of a session have recorded; nothing can be simulated by it."""
+
+
+class PolicyConfig(Section):
+    """A policy in the loop."""
+
+    use: str
+    """Function that makes the policy: `module:function`, or the name that a package gives it (docs/learning.md)."""
+    rate_hz: Annotated[int, Field(ge=1, le=10000)] = 50
+    """Commands per simulated second; must divide `sim.physics_hz`."""
+    observation: list[str] = []
+    """Arrays that the policy gets; empty for all that there are but pictures."""
+    command: Literal["position", "velocity"] = "position"
+    """What the policy commands for each joint of `task.end`: the position at the next command [rad], or the velocity
+    until then [rad/s]."""
+    timeout_s: Annotated[float, Field(gt=0, le=3600), Key(Effect.RUN)] = 3.0
+    """Real time that one command may take."""
+    reproducible: Annotated[bool, Key(Effect.PLAN)] = True
+    """Whether the policy is a function of its seed and its observations; if not, no trial is simulated again at the
+    end, and the data card states it."""

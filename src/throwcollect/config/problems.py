@@ -8,8 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from throwcollect.config.kinds import ContradictionError
-from throwcollect.config.section import Section
+from throwcollect.config.section import ContradictionError, Section
 from throwcollect.config.shape import root
 from throwcollect.wording import find_near, join_names, suggest
 

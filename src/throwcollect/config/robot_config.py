@@ -8,15 +8,16 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 from typing_extensions import Self
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, Joint, Name
-from throwcollect.config.section import Section, any_of
+from throwcollect.config.section import Angle, Joint, Name, Section, any_of
 from throwcollect.members import import_own, names_of
 from throwcollect.wording import suggest
 
 
 def _require_robot(name: str) -> str:
     if name not in (known := names_of("robots")):
-        raise ValueError(f"no robot {name!r} is installed{suggest(name, known)}; docs/robots.md says how to add one")
+        raise ValueError(
+            f"no robot {name!r} is installed{suggest(name, known)}; docs/robots.md describes how to add one"
+        )
     return name
 
 
@@ -61,7 +62,7 @@ class RobotConfig(Section):
 
     def find(self) -> Any:
         """Find the robot, a `throwcollect.robots.robot.Robot`, which only simulations import when they start."""
-        return import_own("throwcollect.robots.described:find_robot")(self)
+        return import_own("throwcollect.robots.importing:find_robot")(self)
 
 
 class ToolPose(Section):

@@ -8,8 +8,7 @@ from pydantic import Field
 from typing_extensions import Self
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle
-from throwcollect.config.section import Section, any_of
+from throwcollect.config.section import Angle, Section, any_of
 
 BALL = "ball"
 """Name of the ball, as that of a body."""

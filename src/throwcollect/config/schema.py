@@ -12,16 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PositiveInt
 from typing_extensions import Self
 
-from throwcollect.config.cluster import ClusterConfig
-from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import ContradictionError, Name, unknown_joint
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile
 from throwcollect.config.robot_config import AnyRobot, RobotConfig
-from throwcollect.config.run import RunConfig
+from throwcollect.config.run import ClusterConfig, ContainersConfig, RunConfig
 from throwcollect.config.scene import BALL, AnyBody, BallConfig, BodyName, FileBodyConfig, SceneConfig
-from throwcollect.config.section import Section, any_of
+from throwcollect.config.section import ContradictionError, Name, Section, any_of, unknown_joint
 from throwcollect.config.sensors import Sensors
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
 from throwcollect.config.task_config import TaskConfig, UntilConfig
@@ -43,7 +40,7 @@ __all__ = [
 
 
 def _make_section_type(family: str) -> Any:
-    """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
+    """Make the type of a key that holds the section of any member of a family; its key `name` chooses it."""
     sections = {name: load_member(family, name) for name in usable_names(family)}
     broken = find_broken(family)
     default = next(iter(sections))
@@ -61,7 +58,7 @@ def _make_section_type(family: str) -> Any:
 
 
 def _make_until_type() -> Any:
-    """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
+    """Make the type of the key `until`, which holds the section `until` of a task; its only key chooses it."""
     sections: dict[str, type[UntilConfig]] = {}
     for name in usable_names("tasks"):
         until = load_member("tasks", name).until

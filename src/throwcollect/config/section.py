@@ -1,4 +1,4 @@
-"""The base of all sections of a configuration, and keys that hold one of several sections."""
+"""The base of all sections of a configuration, kinds of values that they hold, and keys for one of several sections."""
 
 from __future__ import annotations
 
@@ -11,11 +11,52 @@ from itertools import pairwise
 from operator import or_
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    Tag,
+    model_validator,
+)
 from pydantic_core import CoreSchema
 from typing_extensions import Self
 
-from throwcollect.config.kinds import ContradictionError
+from throwcollect.wording import suggest
+
+
+class ContradictionError(ValueError):
+    """Keys that are right alone and wrong together.
+
+    Args:
+        sentences: What is wrong, by dotted key, relative to the section that raises.
+    """
+
+    def __init__(self, sentences: Mapping[str, str]) -> None:
+        self.sentences = dict(sentences)
+        super().__init__("; ".join(f"{key}: {sentence}" for key, sentence in self.sentences.items()))
+
+
+def unknown_joint(name: str, robot: Any) -> str:
+    """Make the sentence for a name that is no joint of a robot."""
+    return f"{robot.title} has no joint {name!r}{suggest(name, robot.joints)}"
+
+
+Joint = str
+"""Name of a joint; `Config` checks that the robot has it, as any URDF may name other joints."""
+Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
+Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
+
+
+def _make_string(value: object) -> object:
+    # `isinstance` would also take `true`, which is an `int` in Python.
+    return str(value) if type(value) is int else value
+
+
+NUMBER_AS_STRING = BeforeValidator(_make_string)
+"""Lets a string be a single integer without quotes, which YAML reads as a number: the core 0, or 90 minutes."""
 
 
 class Section(BaseModel):
@@ -35,7 +76,7 @@ class Section(BaseModel):
         """List the keys that are right alone and wrong together.
 
         Yields:
-            A dotted key, relative to this section, and a sentence that says what is wrong.
+            A dotted key, relative to this section, and what is wrong with it.
         """
         yield from ()
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from throwcollect.config.key import Key
-from throwcollect.config.kinds import Angle
-from throwcollect.config.section import Section, any_of
+from throwcollect.config.section import Angle, Section, any_of
 
 SensorName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 SensorSections = Mapping[str, object]

@@ -46,7 +46,7 @@ class ValueShape:
 
     @property
     def choices(self) -> list[str]:
-        """The words that are allowed; empty if any text is."""
+        """The words that are allowed; empty if any string is."""
         nodes = [shape.node for shape in self.alternatives]
         return list(dict.fromkeys(word for node in nodes for word in node.get("enum", [node.get("const")]) if word))
 
@@ -70,7 +70,7 @@ class ValueShape:
 
     def _make(self, node: dict[str, Any], unit: str) -> ValueShape:
         if "$ref" in node:
-            # What stands beside a reference belongs to the key, such as its default, and wins.
+            # What stands next to a reference belongs to the key, such as its default, and wins.
             node = {**json_schema(self.section)["$defs"][node["$ref"].rpartition("/")[2]], **node}
         return ValueShape({key: value for key, value in node.items() if key != "$ref"}, self.section, unit)
 

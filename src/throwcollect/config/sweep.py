@@ -114,8 +114,8 @@ class SweepConfig(Section):
     A relative path starts at the directory of the configuration file."""
     feasibility: Literal["actual", "nominal"] = "actual"
     """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which all keys of
-    `tool`, `ball` and `robot` have their defaults, except `posture`, `locked` and `base_height_m`. Somebody who plans
-    motions for a real robot knows only the nominal one."""
+    `tool`, `ball` and `robot` have their defaults, except `posture`, `locked` and `base_height_m`. Users who plan
+    motions for a real robot know only the nominal one."""
     target: TargetConfig | None = None
     """Cells of landings, which `throwcollect cover` fills evenly, and in which reports count throws."""
 

@@ -7,11 +7,9 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, Joint
-from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile, Trajectory
-from throwcollect.config.policy import PolicyConfig
+from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, MotionFile, PolicyConfig, Trajectory
 from throwcollect.config.scene import BALL, AnyBody
-from throwcollect.config.section import Section
+from throwcollect.config.section import Angle, Joint, Section
 from throwcollect.wording import join_names, suggest
 
 Wanted = Annotated[int, Field(ge=1, le=1_000_000)]
@@ -26,7 +24,7 @@ LARGEST_TARGET = 1e6
 
 @dataclass(frozen=True)
 class TargetColumn:
-    """A column of lists and tables that says where a trial should end; the trial itself does not depend on it.
+    """A column of lists and tables: a coordinate of where a trial should end; the trial itself does not depend on it.
 
     Attributes:
         name: Its name, which begins with `TARGET_PREFIX` and ends with its unit.
@@ -150,17 +148,17 @@ class TaskConfig(Section):
         return f"{self.noun}s of " + (f"the task {self.name}" if self.noun == "trial" else f"a {self.object or BALL}")
 
     def find_wrong_targets(self, columns: Collection[str]) -> dict[str, str]:
-        """Say what is wrong with the names of the columns of targets of a list of its trials, or of one trial.
+        """Explain what is wrong with the names of the columns of targets of a list of its trials, or of one trial.
 
         Returns:
-            Sentence that says what is wrong, by column; empty if they are targets of this task, or none at all.
+            What is wrong, by column; empty if they are targets of this task, or none at all.
         """
         known = {each.name: each for each in self.target_columns}
         unknown = f"the task {self.name} has no such target"
         wrong = {name: unknown + suggest(name, known) for name in columns if name not in known}
         if there := [name for name in known if name in columns]:
             missing = (name for name, each in known.items() if each.required and name not in columns)
-            wrong |= {name: f"is missing beside {join_names(there)}" for name in missing}
+            wrong |= {name: f"is missing, as there is {join_names(there)}" for name in missing}
         return wrong
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:

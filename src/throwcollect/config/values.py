@@ -105,16 +105,12 @@ def list_operator_keys() -> tuple[str, ...]:
 
 
 def with_sensors(config: Config, sensors: SensorSections) -> Config:
-    """Make a copy of a configuration with other sensors: sections by name, as they are in YAML.
-
-    Raises:
-        ConfigError: If a section is wrong.
-    """
+    """Make a copy of a configuration with other sensors: sections by name, as they are in YAML."""
     return _validate(type(config), {**config.__dict__, "sensors": dict(sensors)}, (), strict=False)
 
 
 def reason_not_sweepable(config: Config, key: str) -> str | None:
-    """Say why a sweep may not vary a key; None when it may.
+    """Explain why a sweep may not vary a key; None when it may.
 
     Numbers of the task's motion, of the ball, the scene and the motors may vary from trial to trial. The world is built
     and the recording is set up only once, so their other keys may not.
@@ -136,7 +132,7 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
     if not leaf.key.swept:
         return "cannot vary from trial to trial"
     if isinstance(leaf.value, int) and not isinstance(leaf.value, bool):
-        return "cannot be swept, as it is a whole number; the values of a sweep have decimals"
+        return "cannot be swept, as it is an integer; the values of a sweep have decimals"
     # The number of a motion in a file may be null. In the world, null means that something is not there.
     is_chosen_later = leaf.value is None and leaf.key.effect is Effect.TASK
     if not (isinstance(leaf.value, float) or is_chosen_later):
@@ -177,7 +173,7 @@ def _change(section: AnySection, changes: Mapping[str, Any], location: Location)
         if part not in values:
             raise _make_unknown_key_error((*location, part), list(values))
         values[part] = _replace(values[part], change, (*location, part))
-    # Strictly, so that a text in quotes is not taken for a number.
+    # Strictly, so that a string in quotes is not taken for a number.
     return _validate(type(section), values, location, strict=True)
 
 

@@ -16,7 +16,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.point_file import encode_points
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 from throwcollect.wording import command
 
 

@@ -6,7 +6,7 @@ import math
 
 import pyarrow as pa
 
-from throwcollect.config.policy import SESSION
+from throwcollect.config.motion import SESSION
 from throwcollect.config.schema import MOTIONS, Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.config.values import keys_by_column

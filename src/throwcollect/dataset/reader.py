@@ -13,8 +13,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.schema import Config
+from throwcollect.config.section import unknown_joint
 from throwcollect.dataset.bag import find_next_command, read_bag_metadata
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS, list_shards, path_of_part

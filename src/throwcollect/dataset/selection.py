@@ -14,8 +14,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from throwcollect.arguments import refuse_argument
-from throwcollect.errors import DatasetError
+from throwcollect.errors import DatasetError, refuse_argument
 from throwcollect.wording import suggest
 
 _EXAMPLE = "such as: outcome == 'landed' and landing_x_m > 1.5"

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from throwcollect.config.policy import SESSION, PolicyConfig
+from throwcollect.config.motion import SESSION, PolicyConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import SweepConfig
 from throwcollect.config.values import with_values
@@ -37,7 +37,7 @@ from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import remove, unwritable
 from throwcollect.plan.plan import Plan, make_trials
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 from throwcollect.robots.description import full_description
 from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.tasks.result import Result

@@ -27,9 +27,8 @@ from throwcollect.plan.parquet_file import read_parquet
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.trials import Trial
 from throwcollect.robots.description import robot_of
-from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import REFUSED, Result
-from throwcollect.tasks.result_columns import BodyColumns
+from throwcollect.tasks.result_columns import BodyColumns, ObjectState
 from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.units import ascii_unit, unit_of_name
 

@@ -42,7 +42,7 @@ from throwcollect.files import read_text
 from throwcollect.plan.digest import trial_digests
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.point_file import read_points
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.body_files import files_of
 from throwcollect.robots.description import is_available as robot_is_available

@@ -77,7 +77,7 @@ class FrameTree:
     Attributes:
         fixed: Frames that never move; the first is the robot's root in `WORLD`.
         moving: Frames that joints move.
-        links: Names of all links, in the order of the description.
+        links: Names of all links: the root first, and the others in the order of the description.
     """
 
     fixed: tuple[Frame, ...]

@@ -215,7 +215,7 @@ def label_names(links: Sequence[str], acted_on: str, bodies: Iterable[str]) -> t
     """List what the numbers of a segmentation mean.
 
     Args:
-        links: The links in the order of the robot's description.
+        links: The links: the root first, and the others in the order of the robot's description.
         acted_on: The object.
         bodies: The bodies of the world, with or without the object.
     """

@@ -27,8 +27,8 @@ from throwcollect.learning.learned_map import (
     scale_values,
 )
 from throwcollect.learning.polynomial import Array
-from throwcollect.plan.points import Points
 from throwcollect.plan.samplers import spread
+from throwcollect.plan.trials import Points
 
 Cells = NDArray[np.int64]
 

@@ -22,8 +22,7 @@ from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.plan.trials import Trial
 from throwcollect.robots.derived import Postures
 from throwcollect.robots.feasibility import Feasibility
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.robot import Robot
+from throwcollect.robots.robot import Robot, joint_limits
 from throwcollect.sim.simulator import Simulator
 from throwcollect.tasks.starter import Beginning
 from throwcollect.tasks.task import trajectory_of

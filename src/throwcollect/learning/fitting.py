@@ -9,7 +9,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from throwcollect.arguments import read_word, refuse_argument
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TaskConfig
@@ -17,7 +16,7 @@ from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.carried_robot import config_text
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, read_word, refuse_argument
 from throwcollect.files import StrPath
 from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, LearnedMap, count_needed_throws, fit_throws
 from throwcollect.learning.model import MODEL, Model, load_model

@@ -10,11 +10,10 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import Field, ValidationError
 
-from throwcollect.arguments import check_bounds, read_word, refuse_argument
 from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.dataset.carried_robot import copy_carried
 from throwcollect.dataset.directory import has_files
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, check_bounds, read_word, refuse_argument
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
 from throwcollect.learning.adapting import Adaptation, Method, adapt, refuse_far_throws

@@ -8,7 +8,7 @@ import numpy as np
 
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 
 
 def count_motions(config: Config) -> int:

@@ -30,7 +30,7 @@ _DIFFERENCES = (
 
 
 def explain_difference(used: str, expected: str) -> str | None:
-    """Say why an episode under these conditions is not the one that was asked for; None if it is."""
+    """Explain why an episode under these conditions is not the one that was asked for; None if it is."""
     if used == expected:
         return None
     lines = zip(_DIFFERENCES, used.split("\n"), expected.split("\n"), strict=False)

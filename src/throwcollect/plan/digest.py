@@ -15,14 +15,14 @@ from throwcollect.config.key import Effect, key_of_field
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section
 from throwcollect.config.values import leaves
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 
 _FORMAT = "throwcollect trial 1"
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
 def is_digest(value: object) -> bool:
-    """Say whether a value is a digest in hexadecimal."""
+    """Whether a value is a digest in hexadecimal."""
     return isinstance(value, str) and bool(_DIGEST.fullmatch(value))
 
 

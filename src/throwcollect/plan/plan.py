@@ -18,9 +18,8 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Pla
 from throwcollect.files import write_file
 from throwcollect.plan.digest import config_digest, trial_digests
 from throwcollect.plan.parquet_file import encode_table, open_parquet
-from throwcollect.plan.points import Points
 from throwcollect.plan.slice import Slice
-from throwcollect.plan.trials import DIGEST_BYTES, Trial, Trials
+from throwcollect.plan.trials import DIGEST_BYTES, Points, Trial, Trials
 from throwcollect.wording import blank_numbers, format_count
 
 _FORMAT = "1"

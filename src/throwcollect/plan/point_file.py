@@ -19,7 +19,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import suggest_path
 from throwcollect.plan.chosen_motions import add_motions
 from throwcollect.plan.parquet_file import encode_table
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -44,11 +44,7 @@ class BodyFile(NamedTuple):
 
 
 def complete(section: FileBodyConfig) -> FileBodyConfig:
-    """Complete the section of a body, whose file is read, unless it has a digest: that of a dataset's own file.
-
-    Raises:
-        ConfigError: If the file cannot be read, or describes no solid body.
-    """
+    """Complete the section of a body, whose file is read, unless it has a digest: that of a dataset's own file."""
     if section.sha256 is not None:
         return section
     found = _read(type(section), section.file)
@@ -89,7 +85,7 @@ def inertia_of(section: FileBodyConfig, mass_kg: float) -> LinkInertia:
 
 @lru_cache(maxsize=64)
 def _spread_evenly(shapes: tuple[LinkShape, ...], _sha256: str | None) -> LinkInertia:
-    """Compute the inertia of shapes of 1 kg/m³; the digest tells files apart that had the same name."""
+    """Compute the inertia of shapes of 1 kg/m³; the digest distinguishes files that had the same name."""
     whole = pinocchio.Inertia.Zero()
     for shape in shapes:
         if shape.mesh is not None:
@@ -181,11 +177,7 @@ def _to_spatial(inertia: LinkInertia) -> pinocchio.Inertia:
 
 
 def read_spawned(urdf: str) -> SceneBody:
-    """Make the one rigid body of a URDF text, which moves if it has a mass there; other keys have their defaults.
-
-    Raises:
-        ConfigError: If it is not one rigid body, or has meshes.
-    """
+    """Make the one rigid body of a URDF text, which moves if it has a mass there; other keys have their defaults."""
     link = _read_body(parse_xml(urdf, str(_SPAWNED)), _SPAWNED, _refuse_mesh).link
     moves = link.inertia is not None and link.inertia.mass_kg > 0
     if link.inertia is not None and moves:

@@ -46,9 +46,6 @@ class Cleaning:
     Attributes:
         notes: Where each key of the complete section comes from.
         files: Contents of the meshes, by the names of the files.
-
-    Raises:
-        ConfigError: If something in the URDF or the section is wrong.
     """
 
     def __init__(self, section: DescribedRobotConfig, path: Path) -> None:

@@ -49,9 +49,6 @@ class Clearance:
     Shapes are the convex hulls of the collision meshes, as the physics loads them, and the boxes of the tool. Pairs
     that the SRDF excludes are not checked, nor are links of one gripper (their mimic joints are rigid in the model),
     nor the tool with the hand and forearm that hold it, where the handle reaches into the fingers.
-
-    Raises:
-        ConfigError: If the robot's meshes cannot be read.
     """
 
     def __init__(
@@ -89,7 +86,7 @@ class Clearance:
             configurations: In the order of the model [rad], shape ``(n, n_joints)``.
         """
         for index, posture in enumerate(configurations):
-            # The tree tells quickly whether any links are too close, but the message has to say which links.
+            # The tree finds quickly whether any links are too close, but the message has to name the links.
             if pinocchio.computeCollisions(self._model, self._data, self._broadphase, posture, True):
                 pinocchio.computeDistances(self._model, self._data, self.geometry, self._distances, posture)
                 distances = [result.min_distance for result in self._distances.distanceResults]
@@ -204,10 +201,10 @@ def find_overlap(bodies: tuple[SceneBody, ...]) -> str | None:
     """Explain which two bodies, of which one moves, overlap; None if none do."""
     solids = [(body, solid) for body in bodies for solid in _make_objects(body)]
     request, result = pinocchio.coal.DistanceRequest(), pinocchio.coal.DistanceResult()
-    for (one, solid), (other, beside) in combinations(solids, 2):
+    for (one, solid), (other, second) in combinations(solids, 2):
         if one is not other and (one.moves or other.moves):
             result.clear()
-            if (depth_m := -pinocchio.coal.distance(solid, beside, request, result)) > _TOUCHING_M:
+            if (depth_m := -pinocchio.coal.distance(solid, second, request, result)) > _TOUCHING_M:
                 return f"{one.link.name} and {other.link.name} overlap by {depth_m * 1000:.3g} mm at the start"
     return None
 

@@ -21,7 +21,7 @@ from throwcollect.engines.body import (
 from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError, MemberError, Problem
 from throwcollect.extras import MissingExtraError, is_installed
-from throwcollect.robots.described import find_robot
+from throwcollect.robots.importing import find_robot
 from throwcollect.robots.joint_model import describe_inertia, joint_model, lock_joints, mount_of, placement_of, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.tools.tool import Tool, tool_of

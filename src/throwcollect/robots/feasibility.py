@@ -26,11 +26,10 @@ from throwcollect.robots.description import (
 )
 from throwcollect.robots.dynamics import Dynamics
 from throwcollect.robots.joint_model import joint_model, mount_of
-from throwcollect.robots.limits import joint_limits, shares_of
-from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.robot import joint_limits, shares_of
 from throwcollect.robots.surroundings import bodies_of, object_of, starts_in_tool
 from throwcollect.robots.tools.tool import Tool, tool_of
-from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.robots.trajectory import JointTrajectory, sample_quintic
 
 _CHECKED_HZ = 100
 _CHECKED_LEAST = 100
@@ -54,9 +53,6 @@ class Feasibility:
 
     One object serves all trials of a collection: each check sets posture, masses, gravity and limits of its trial. Only
     a trial with another tool takes longer, because pairs of shapes are built anew.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read, or lack something.
     """
 
     def __init__(self, config: Config) -> None:
@@ -96,7 +92,7 @@ class Feasibility:
         Returns:
             None if the trial is feasible. Otherwise one sentence with joint or links, instant, value and limit, about
             the first of these checks that fails: position, velocity, effort, collision, a tool that has to move, a ball
-            that has to stay. For limits, it tells the worst violation; for collisions, the first one.
+            that has to stay. For limits, it has the worst violation; for collisions, the first one.
         """
         posture = np.array(list(start_posture(config).values())) + joint_offsets(config)
         joints, tool = self._robot.joints, self._tool_of(config)
@@ -286,9 +282,9 @@ class Feasibility:
             hand = self._data.oMi[self._hand] * self._hand_placement * mount_of(self._robot, tool)
             x, y, z = hand.act(np.array(tool.ball_seat(thing.radius_m))).tolist()
             thing = replace(thing, placement=Placement((x, y, z + config.robot.base_height_m)))
-        elif beside := self._find_around(config, tool, (thing,)):
+        elif around := self._find_around(config, tool, (thing,)):
             # Later, the robot may touch the object.
-            approach = beside.first_approach(start)
+            approach = around.first_approach(start)
             if approach is not None and approach.distance_m < 0:
                 return f"{' and '.join(approach.links)} overlap at the start"
         return find_overlap((thing, *bodies))

@@ -118,11 +118,7 @@ def list_shares(package: str) -> Iterator[Path]:
 
 
 def find_mesh(filename: str, urdf: Path, packages: Mapping[str, str] | None = None) -> Path:
-    """Find the mesh that a URDF names; packages lie in given directories, above it, or in ROS.
-
-    Raises:
-        ConfigError: If there is no such file, or it is too large.
-    """
+    """Find the mesh that a URDF names; packages lie in given directories, above it, or in ROS."""
     if filename.startswith(PACKAGE):
         package, _, rest = filename.removeprefix(PACKAGE).lstrip("/").partition("/")
         places = [Path(given) for name, given in (packages or {}).items() if name == package]

@@ -1,8 +1,8 @@
-"""Imports a robot from its URDF: cleans it, derives what it does not say, and keeps the result as a directory.
+"""Finds the robot of a configuration, and imports one that a URDF describes: cleans the URDF, derives what it lacks.
 
-The directory has a URDF of the joints that controllers command, an SRDF with the posture at rest and the links that may
-overlap, meshes by the digests of their contents, and ``robot.yaml``: a section `robot` in which every key has its
-value, with a comment on where it came from.
+The result is a directory. It has a URDF of the joints that controllers command, an SRDF with the posture at rest and
+the links that may overlap, meshes by the digests of their contents, and ``robot.yaml``: a section `robot` in which
+every key has its value, with a comment on where it came from.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from pathlib import Path
 
 from throwcollect.config.document import Document
 from throwcollect.config.loader import value_as_yaml
-from throwcollect.config.robot_config import DescribedRobotConfig
+from throwcollect.config.robot_config import DescribedRobotConfig, RobotConfig
 from throwcollect.errors import ConfigError
 from throwcollect.files import suggest_path
+from throwcollect.members import load_member
 from throwcollect.robots.imported import (
     SRDF,
     URDF,
@@ -31,20 +32,42 @@ from throwcollect.robots.imported import (
     make_error,
     make_robot,
 )
+from throwcollect.robots.robot import Robot
 from throwcollect.robots.urdf import PACKAGE, read_xml
 from throwcollect.state_directory import state_directory
 from throwcollect.version import __version__
+
+
+def find_robot(of: RobotConfig | str) -> Robot:
+    """Find the robot of a section, or of the name of an installed robot."""
+    section = complete(of)
+    if isinstance(section, DescribedRobotConfig):
+        return make_robot(section)
+    robot: Robot = load_member("robots", section.name)
+    return robot
+
+
+def complete(of: RobotConfig | str) -> RobotConfig:
+    """Import the robot of a section that only names it or its URDF: all keys get their values, and paths are absolute.
+
+    Sections that are complete, and those of robots that are no URDF alone, are returned as they are.
+    """
+    section = RobotConfig.model_construct(name=of) if isinstance(of, str) else of
+    if not isinstance(section, DescribedRobotConfig):
+        member = load_member("robots", section.name)
+        if isinstance(member, Robot):
+            return section
+        own = {name: getattr(section, name) for name in section.model_fields_set - {"name"}}
+        section = member.model_copy(update=own)
+    return section if section.sha256 is not None else import_robot(section)
+
 
 SECTION = "robot.yaml"
 _EXAMPLES = "example-robot-data:"
 
 
 def import_robot(section: DescribedRobotConfig) -> DescribedRobotConfig:
-    """Import a robot, unless it has been imported before, and complete its section.
-
-    Raises:
-        ConfigError: If a file cannot be read, or something in it or in the section is wrong.
-    """
+    """Import a robot, unless it has been imported before, and complete its section."""
     path = find_urdf(section.urdf)
     directory = _find_cache(section, path)
     if not _is_whole(directory):

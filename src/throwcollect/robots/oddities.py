@@ -8,8 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from throwcollect.robots.derived import Postures
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.robot import Robot
+from throwcollect.robots.robot import Robot, joint_limits
 
 _FEW = 3
 _DRAWS = 300

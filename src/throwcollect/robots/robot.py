@@ -1,4 +1,4 @@
-"""The kind of part `Robot`: its joints, the controllers that command them, and the place of its description."""
+"""The kind of part `Robot`: its joints and their limits, the controllers that command them, and its description."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
 
 from throwcollect.engines.body import HERE, Placement
 from throwcollect.errors import ConfigError
@@ -25,14 +28,14 @@ class Robot:
         name: Name of the robot in configurations, such as ``talos``.
         title: Name of the robot in sentences, such as ``Talos``.
         kind: Words before the title where a text first mentions the robot, such as ``the humanoid robot``; empty if
-            the title says enough.
+            the title is enough.
         controllers: Joint trajectory controller of each limb and its joints, in order; each joint has one. Their
             names are such as ROS allows for nodes.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings this directory is not installed.
         package: Package of ``package://`` paths whose files lie in that directory itself.
         urdf: Path of the URDF in that directory, or an absolute path.
-        srdf: Path of the SRDF in that directory, or an absolute path. The SRDF says which links may overlap, and holds
+        srdf: Path of the SRDF in that directory, or an absolute path. The SRDF lists links that may overlap, and holds
             the posture at rest.
         rest: Name of the SRDF's posture that joints have unless a configuration says otherwise.
         hand: Link that the tool is fixed to: the spoon's handle lies along -z of `tool_pose` in it, and the cup opens
@@ -83,11 +86,7 @@ class Robot:
         return f"{self.kind} {self.title}".lstrip()
 
     def controller_of(self, joint: str) -> str:
-        """Return the name of the controller that commands a joint.
-
-        Raises:
-            KeyError: If the robot has no such joint.
-        """
+        """Return the name of the controller that commands a joint."""
         for controller, joints in self.controllers.items():
             if joint in joints:
                 return controller
@@ -98,15 +97,11 @@ class Robot:
         return "m" if joint in self.sliding else "rad"
 
     def holds(self, link: str) -> bool:
-        """Say whether a link holds the tool."""
+        """Whether a link holds the tool."""
         return any(link == each or (each.endswith("_") and link.startswith(each)) for each in self.holding)
 
     def locate(self, url: str) -> Path:
-        """Find the file of a mesh by its path or URL in the URDF.
-
-        Raises:
-            ConfigError: If it is a URL of another scheme than ``file`` and ``package``.
-        """
+        """Find the file of a mesh by its path or URL in the URDF."""
         if self.package and url.startswith(own := f"{PACKAGE}{self.package}/"):
             return self.directory / url.removeprefix(own)
         return locate_mesh(url, self.urdf_path.parent, self.directory)
@@ -117,31 +112,18 @@ class Robot:
 
     @property
     def directory(self) -> Path:
-        """Directory that `share` returns.
-
-        Raises:
-            ConfigError: If the description is not installed.
-            MemberError: If the robot comes from another package, and its function fails.
-        """
+        """Directory that `share` returns."""
         with explain_failure("robots", self.name, "find its files"):
             return self.share()
 
     @property
     def urdf_path(self) -> Path:
-        """Path of the URDF.
-
-        Raises:
-            ConfigError: If the description is not installed.
-        """
+        """Path of the URDF."""
         return self.directory / self.urdf
 
     @property
     def srdf_path(self) -> Path:
-        """Path of the SRDF.
-
-        Raises:
-            ConfigError: If the description is not installed.
-        """
+        """Path of the SRDF."""
         return self.directory / self.srdf
 
     @cached_property
@@ -211,3 +193,43 @@ class Robot:
         if wrong := [name for name, angle in posture.items() if not math.isfinite(angle)]:
             raise ConfigError(f"{path}: group_state {self.rest}: the angle of {wrong[0]} is not finite")
         return MappingProxyType(posture)
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits and damping of the joints of a robot, each of shape ``(n_joints,)`` in the order of `Robot.joints`.
+
+    Attributes:
+        lower: Lowest position [rad].
+        upper: Highest position [rad].
+        velocity: Highest speed [rad/s].
+        effort: Highest torque [Nm].
+        damping: Viscous friction [Nms/rad].
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    effort: NDArray[np.float64]
+    damping: NDArray[np.float64]
+
+
+@cache
+def joint_limits(robot: Robot) -> JointLimits:
+    """Read the limits of the joints of a robot."""
+    joints = [robot.description.joints[name] for name in robot.joints]
+    table = np.array([(*joint.limits, joint.damping) for joint in joints if joint.limits is not None])
+    # The result is cached, so all callers have the same arrays, and none may write to them.
+    table.flags.writeable = False
+    return JointLimits(*table.T)
+
+
+def shares_of(values: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compute magnitudes over their limits [-], of the shape of the values, ``(..., n_joints)``.
+
+    A limit may be 0, because a URDF may have such limits for joints that never move. Then the share of a value of 0 is
+    0, and the share of any other value is infinite.
+    """
+    with np.errstate(divide="ignore", over="ignore"):
+        shares: NDArray[np.float64] = np.divide(np.abs(values), limits, out=np.zeros_like(values), where=values != 0)
+    return shares

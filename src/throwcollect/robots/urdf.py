@@ -68,9 +68,6 @@ def parse_xml(content: str | bytes, name: str) -> ElementTree.Element:
     Args:
         content: The text, or the bytes of a file.
         name: The file, or what stands for it in messages.
-
-    Raises:
-        ConfigError: If it is not well-formed, or its entities grow beyond reason, which the parser itself watches.
     """
     try:
         return ElementTree.fromstring(content)  # noqa: S314 - expat limits the growth of entities since 2.4
@@ -84,11 +81,7 @@ def parse_xml(content: str | bytes, name: str) -> ElementTree.Element:
 
 
 def read_xml(path: Path) -> ElementTree.Element:
-    """Read the XML of a file of a robot's description.
-
-    Raises:
-        ConfigError: If it cannot be read.
-    """
+    """Read the XML of a file of a robot's description."""
     try:
         if (size := path.stat().st_size) > _LARGEST_BYTES:
             raise ConfigError(
@@ -107,28 +100,17 @@ def read_urdf(root: ElementTree.Element, name: str, *, find_mesh: Callable[[str]
         root: Its XML.
         name: The file, or what stands for it in messages.
         find_mesh: Finds the file of a collision mesh by its ``filename``.
-
-    Raises:
-        ConfigError: If the description is no URDF or contradicts itself; or whatever `find_mesh` raises.
     """
     return _Reader(root, name, find_mesh).read()
 
 
 def read_visual(link: ElementTree.Element, visual: ElementTree.Element) -> LinkShape:
-    """Read a shape for viewers; the file of a mesh is not looked for.
-
-    Raises:
-        ConfigError: If it cannot be read.
-    """
+    """Read a shape for viewers; the file of a mesh is not looked for."""
     return _Reader(link, "robot description", Path).read_shape(visual, of=link)
 
 
 def locate_mesh(filename: str, directory: Path, packages: Path) -> Path:
-    """Find the file that a description in a directory means by a path or a URL; packages are directories of `packages`.
-
-    Raises:
-        ConfigError: If it is a URL of another scheme than ``file`` and ``package``.
-    """
+    """Find the file that a description in a directory means by a path or a URL; `packages` holds all packages."""
     if "://" not in filename:
         return directory / filename
     parts = urlsplit(filename)

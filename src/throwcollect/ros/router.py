@@ -26,8 +26,7 @@ import zenoh
 
 from rclzenoh.session_config import OPEN, PROTECTED, describe, router_config
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
-from throwcollect.heartbeat import Heartbeat
-from throwcollect.interruption import die_with_parent, stop_signals
+from throwcollect.own_process import Heartbeat, die_with_parent, stop_signals
 from throwcollect.ros.connection import zenoh_errors
 from throwcollect.ros.fast_dds import server_profile, write_temporarily
 from throwcollect.ros.middleware import Middleware

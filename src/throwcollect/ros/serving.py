@@ -8,7 +8,7 @@ from collections.abc import Callable
 from types import FrameType
 
 from throwcollect import ros
-from throwcollect.interruption import stop_signals
+from throwcollect.own_process import stop_signals
 
 
 def begin_to_serve(*nodes: ros.Node) -> tuple[ros.Executor, Callable[[], int]]:

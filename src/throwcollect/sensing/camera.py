@@ -69,19 +69,11 @@ class Camera:
         return focal_length(self.height, self.vertical_fov_rad)
 
     def find_optical(self, placed: PlacedScene) -> Pose:
-        """Find the pose in world of the optical frame: x right, y down, z forward.
-
-        Raises:
-            ConfigError: If there is no such link.
-        """
+        """Find the pose in world of the optical frame: x right, y down, z forward."""
         return placed.find(self.link) * self.pose * OPTICAL
 
     def render(self, placed: PlacedScene, *, color: bool = True) -> Frame:
-        """Take a picture of a scene in one state.
-
-        Raises:
-            ConfigError: If the camera's link does not exist.
-        """
+        """Take a picture of a scene in one state."""
         optical = self.find_optical(placed)
         seen = self._look(placed, optical)
         labels = seen.find_labels(placed.scene).reshape(self.height, self.width)

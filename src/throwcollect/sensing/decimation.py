@@ -16,9 +16,9 @@ _SHARE = 0.15
 """Share of edges that a round looks at: the cheapest."""
 _ROUNDS = 80
 _FLATTEST = 0.2
-"""A triangle may turn so far, as a cosine, when an edge beside it collapses."""
+"""A triangle may turn so far, as a cosine, when an edge next to it collapses."""
 _TINY_M = 0.004
-"""A triangle with edges of less than this may turn over, as nobody sees it."""
+"""A triangle with edges of less than this may turn over, as it is too small to be seen."""
 _REGULARITY = 1e-3
 """Share of the squared length of an edge in its cost, so that flat regions keep triangles of one size."""
 

@@ -72,11 +72,7 @@ class Lidar:
         return np.concatenate([turns[order], turns[order] + 4]), order, sin(up) / cos(up)
 
     def scan(self, placed: PlacedScene) -> Ranges:
-        """Measure a scene in one state.
-
-        Raises:
-            ConfigError: If the lidar's link does not exist.
-        """
+        """Measure a scene in one state."""
         pose = placed.find(self.link) * self.pose
         shape, directions = self.directions.shape[1:], self.directions.reshape(3, -1)
         view = View.of(placed, pose, self._may_see)

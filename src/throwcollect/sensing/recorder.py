@@ -39,9 +39,6 @@ class SensorRecorder:
 
         Returns:
             Chunks of at most 4 MiB with their message indexes, sensor by sensor in the order of names.
-
-        Raises:
-            ConfigError: If a sensor is on a link that does not exist.
         """
         if not self._topics:
             return ()

@@ -79,9 +79,6 @@ class Scene:
             bodies: Shapes of the bodies, in the frame of the world, or of a body that moves.
             moving: Names of the bodies that move, the object first.
             triangles: Largest number of triangles of all meshes together; those of files are made coarser.
-
-        Raises:
-            ConfigError: If a mesh cannot be read.
         """
         tree = read_frames(robot.urdf, base_height=base_height_m)
         self._joints: list[Joint] = []
@@ -113,10 +110,6 @@ class Scene:
             description: URDF text of the robot with its tool as it was recorded; written anew by default, which needs
                 Pinocchio.
             triangles: Largest number of triangles of all meshes together.
-
-        Raises:
-            ConfigError: If a mesh cannot be read.
-            MissingExtraError: If a file of the robot needs a package that is not installed.
         """
         robot, bodies, moving = draw_robot_of(config, description), draw_bodies_of(config), moving_bodies_of(config)
         joints, base_height_m = robot_of(config).joints, config.robot.base_height_m
@@ -200,11 +193,7 @@ class PlacedScene:
     poses: tuple[Pose, ...]
 
     def find(self, link: str) -> Pose:
-        """Find the pose in world of a link, a body that moves, or the world itself.
-
-        Raises:
-            ConfigError: If there is no such link.
-        """
+        """Find the pose in world of a link, a body that moves, or the world itself."""
         if link not in self.scene.links:
             raise ConfigError(f"link: there is no link {link}", expected=" or ".join(self.scene.links))
         part, within = self.scene.links[link]

@@ -47,11 +47,7 @@ class Sensor(ABC):
 
 
 def make_sensor(name: str, config: Config, scene: Scene, trial: int) -> Sensor:
-    """Make a sensor of a trial, given its number.
-
-    Raises:
-        ConfigError: If the sensor is on a link that does not exist.
-    """
+    """Make a sensor of a trial, given its number."""
     section = config.sensors[name]
     if section.link not in scene.links:
         sentence = f"there is no link {section.link!r}{suggest(section.link, scene.links)}"
@@ -62,11 +58,7 @@ def make_sensor(name: str, config: Config, scene: Scene, trial: int) -> Sensor:
 
 
 def check_sensors(config: Config) -> None:
-    """Check that the sensors of a configuration can be made, and that nothing else has their names.
-
-    Raises:
-        ConfigError: If a name is taken, a link does not exist, or a mesh that sensors see cannot be read.
-    """
+    """Check that the sensors of a configuration can be made, and that nothing else has their names."""
     if not config.sensors:
         return
     scene, channels = Scene.of(config), Channels(config, full_description(config))

@@ -92,10 +92,6 @@ def surfaces_of(shapes: Sequence[DrawnShape], files: Mapping[str, Path], most: i
         shapes: The shapes.
         files: Files of meshes, by their paths or URLs in the description.
         most: Largest number of triangles of all meshes together.
-
-    Raises:
-        ConfigError: If a mesh cannot be read.
-        MissingExtraError: If a mesh is in COLLADA, and the library that reads it is not installed.
     """
     uses = [(files[each.mesh], _size_of(each)) for each in shapes if each.kind == "mesh"]
     meshes = dict(zip(dict.fromkeys(uses), _read_meshes(tuple(uses), most), strict=True))

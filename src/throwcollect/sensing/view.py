@@ -37,7 +37,7 @@ class View:
         Args:
             placed: The scene.
             sensor: Pose of the sensor in world.
-            sees: Says whether the sensor may see something in a ball of some centre and radius, in its frame [m].
+            sees: Whether the sensor may see something in a ball of some centre and radius, in its frame [m].
             parallel: Whether all rays are along the z of the sensor, and do not begin at its origin.
         """
         scene, back = placed.scene, sensor.inverse()

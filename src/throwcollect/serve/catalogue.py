@@ -11,11 +11,10 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
 from throwcollect.collect.runs.run_record import Kind
-from throwcollect.config.containers import ContainerSpec, Mount, NodeContainerConfig
 from throwcollect.config.document import Document
-from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.loader import load
-from throwcollect.config.section import Section
+from throwcollect.config.run import ContainerSpec, Mount, NodeContainerConfig
+from throwcollect.config.section import ContradictionError, Section
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.wording import suggest

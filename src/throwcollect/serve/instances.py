@@ -19,8 +19,8 @@ from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import Origin
 from throwcollect.collect.runs.run_selection import require_living, require_simulations
-from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
+from throwcollect.config.run import ContainerSpec
 from throwcollect.config.values import list_operator_keys
 from throwcollect.dataset.creation import refuse_taken
 from throwcollect.dataset.directory import config_path

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.policy import SESSION
+from throwcollect.config.motion import SESSION
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import PictureConfig
 from throwcollect.config.values import column_of
@@ -20,7 +20,7 @@ from throwcollect.engines.pose import Pose
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.members import explain_failure, load_member, load_part, names_of
 from throwcollect.robots.description import joint_offsets, robot_of, start_posture
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.sensing.scene import Scene
 from throwcollect.sensing.sensor import CameraSensor, make_sensor

@@ -9,7 +9,7 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import Physics, Scene, ToolLink
 from throwcollect.robots.description import Description, robot_of
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.surroundings import bodies_of, object_of, starts_in_tool
 from throwcollect.robots.tools.tool import tool_of
 

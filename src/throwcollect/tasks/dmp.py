@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from throwcollect.config.motion import DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import exp, matmul
-from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.robots.trajectory import JointTrajectory, sample_quintic
 from throwcollect.wording import join_names
 
 _SETTLED_RAD = 1e-3

@@ -13,11 +13,10 @@ from throwcollect.config.schema import Config
 from throwcollect.control import GoalStatus
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.limits import joint_limits, shares_of
-from throwcollect.robots.quintic_curve import sample_positions
-from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.measures import Peak
+from throwcollect.robots.robot import joint_limits, shares_of
+from throwcollect.robots.trajectory import JointTrajectory, sample_positions
 from throwcollect.tasks.result import AnyResult, Result
+from throwcollect.tasks.result_columns import Peak
 
 _SLACK = 1e-3
 _AT_LIMIT = 1 - _SLACK

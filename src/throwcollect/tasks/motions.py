@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.kinds import unknown_joint
 from throwcollect.config.motion import MotionFile
+from throwcollect.config.section import unknown_joint
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory

@@ -12,8 +12,16 @@ from typing import Any, Generic, TypeVar
 
 from throwcollect.config.scene import BALL
 from throwcollect.errors import DatasetError
-from throwcollect.tasks.measures import Peak
-from throwcollect.tasks.result_columns import Column, Columns, JointColumns, Number, PeakColumns, columns_of, measured
+from throwcollect.tasks.result_columns import (
+    Column,
+    Columns,
+    JointColumns,
+    Number,
+    Peak,
+    PeakColumns,
+    columns_of,
+    measured,
+)
 from throwcollect.units import name_sliding
 
 LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lost"
@@ -109,12 +117,7 @@ class ResultColumns(Generic[AnyResult]):
         return values
 
     def to_json(self, result: AnyResult) -> str:
-        """Write in JSON what `write` makes of a result.
-
-        Raises:
-            TypeError: If a value is not of the kind of its column.
-            ValueError: If a number is not finite.
-        """
+        """Write in JSON what `write` makes of a result."""
         values = self.write(result)
         for column in self.columns:
             if not isinstance(value := values[column.name], (*_KINDS[column.kind], NoneType)):

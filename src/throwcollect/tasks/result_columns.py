@@ -1,4 +1,4 @@
-"""Columns of the table of throws: each field of a result declares its columns once, for writing and for reading.
+"""Measures of a result and their columns: each field declares its columns once, for writing and for reading.
 
 A field of a result declares its columns by the function that makes it::
 
@@ -14,7 +14,36 @@ from collections.abc import Callable, Sequence
 from dataclasses import Field, dataclass, field
 from typing import Any, Literal
 
-from throwcollect.tasks.measures import ObjectState, Peak
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ObjectState:
+    """The object at one instant; world frame.
+
+    Attributes:
+        time_s: Time since the start of the trial [s].
+        position: Its centre [m].
+        velocity: Its velocity [m/s].
+    """
+
+    time_s: float
+    position: Vector
+    velocity: Vector
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Largest value of one quantity, of all joints during a trial.
+
+    Attributes:
+        joint: Joint that had the value.
+        share: Value over limit [-]; 1 is at the limit.
+    """
+
+    joint: str
+    share: float
+
 
 _DECLARED = "columns"
 
@@ -25,7 +54,7 @@ class Column:
 
     Attributes:
         name: Name of the column.
-        kind: Kind of its values: numbers, whole numbers, or text; null where nothing was measured.
+        kind: Kind of its values: numbers, integers, or strings; null where nothing was measured.
         description: One sentence, with units.
     """
 
@@ -75,7 +104,7 @@ class Number(Columns):
 
 
 class Count(Columns):
-    """A whole number, in a column that has the field's name; the description is one sentence."""
+    """An integer, in a column that has the field's name; the description is one sentence."""
 
     def __init__(self, description: str) -> None:
         super().__init__([Column("{field}", "count", description)])

@@ -18,13 +18,13 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.extras import has_wheel
 from throwcollect.members import load_member, names_of
-from throwcollect.robots.described import find_robot
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.importing import find_robot
+from throwcollect.robots.robot import joint_limits
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.wording import find_near, suggest
 
 POINTS = "throws.csv"
-"""The list of points that the sampler `list` reads, beside the configuration."""
+"""The list of points that the sampler `list` reads, in the directory of the configuration."""
 
 _NARROW_RAD = 0.2
 """The last angle of a joint is swept by this angle to either side, but by no more than half of the joint's motion."""
@@ -110,7 +110,7 @@ def begin_at_default(robot: str, task: str) -> Beginning | None:
 def _write_lines(task: str, sampler: str, beginning: Beginning) -> Iterator[str]:
     start, end, duration_s, ranges = beginning.start, beginning.end, beginning.duration_s, beginning.ranges
     yield "# What is collected. Angles are in radians, times in seconds; docs/configuration.md lists every key, and"
-    yield "# `throwcollect config` prints all of them. `throwcollect plan` says which trials the robot could not do."
+    yield "# `throwcollect config` prints all of them. `throwcollect plan` lists trials that the robot cannot do."
     yield "name: throws # of the dataset: datasets/throws"
     yield f"trials: {'3' if sampler == 'list' else '200'}"
     yield "seed: 1 # everything that is random follows from it"

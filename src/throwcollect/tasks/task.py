@@ -20,7 +20,6 @@ from throwcollect.robots.surroundings import object_of
 from throwcollect.robots.trajectory import JointTrajectory, rest_at
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
-from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
 from throwcollect.tasks.motions import file_trajectory
 from throwcollect.tasks.result import (
@@ -32,6 +31,7 @@ from throwcollect.tasks.result import (
     ResultColumns,
     with_policy,
 )
+from throwcollect.tasks.result_columns import ObjectState
 
 EndRule = Callable[[Sequence[float], Sequence[float], Collection[str]], EndReason | None]
 """Gets the object in one sample and in the next one, each as the last numbers of an engine's `Sample`, and the names of

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, Joint
+from throwcollect.config.section import Angle, Joint
 from throwcollect.config.task_config import TaskConfig, UntilConfig, Wanted
 
 

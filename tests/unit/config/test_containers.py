@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 from docker.models import containers as sdk
 
-from throwcollect.config.containers import ContainerOptions, ContainersConfig
 from throwcollect.config.loader import dump_yaml, load
+from throwcollect.config.run import ContainerOptions, ContainersConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 

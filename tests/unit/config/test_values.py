@@ -80,7 +80,7 @@ def test_keys_that_may_vary_between_trials_can_be_swept(key):
         ("task.durations_s", "unknown key; did you mean 'task.duration_s'?"),
         (
             "task.trajectory.basis_functions",
-            "cannot be swept, as it is a whole number; the values of a sweep have decimals",
+            "cannot be swept, as it is an integer; the values of a sweep have decimals",
         ),
         ("seed", "cannot vary from trial to trial"),
     ],

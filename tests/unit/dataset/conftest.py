@@ -21,10 +21,10 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.plan.plan import Plan
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 from throwcollect.robots.description import full_description, start_posture
-from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_result import ThrowResult

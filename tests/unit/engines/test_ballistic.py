@@ -14,7 +14,7 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.ballistic.tool_path import ToolPath
 from throwcollect.engines.engine import Scene, ToolLink
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.tool_motion import ToolMotion
+from throwcollect.robots.dynamics import ToolMotion
 from throwcollect.robots.urdf import parse_xml, read_urdf
 from throwcollect.sim.world import World
 

@@ -16,7 +16,7 @@ from throwcollect.engines.grip import carry
 from throwcollect.extras import ENGINE_PACKAGES
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import physics_description, robot_of
-from throwcollect.robots.tool_motion import ToolMotion
+from throwcollect.robots.dynamics import ToolMotion
 from throwcollect.sim.scene import scene_of
 
 CONFIG = Config.model_validate({"tool": {"name": "claw"}, "scene": {"landing_height_m": 0.5}})

@@ -13,8 +13,8 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.covering import Grid, choose_throws
-from throwcollect.plan.points import Points
 from throwcollect.plan.samplers import draw_points
+from throwcollect.plan.trials import Points
 
 PARAMETERS = {
     "task.duration_s": {"min": 0.5, "max": 2.0},

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from throwcollect.plan.points import Points
-from throwcollect.plan.trials import DIGEST_BYTES, Trial, Trials
+from throwcollect.plan.trials import DIGEST_BYTES, Points, Trial, Trials
 
 
 def in_columns(trials: Iterable[Trial]) -> Trials:

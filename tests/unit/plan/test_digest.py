@@ -4,15 +4,13 @@ import json
 import numpy as np
 import pytest
 
-from throwcollect.config.cluster import ClusterConfig
-from throwcollect.config.containers import ContainersConfig, NodeContainerConfig
 from throwcollect.config.controllers import ControllersConfig
-from throwcollect.config.run import RunConfig
+from throwcollect.config.run import ClusterConfig, ContainersConfig, NodeContainerConfig, RunConfig
 from throwcollect.config.schema import Config, Range, SweepConfig
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.config.values import values_by_key, with_values
 from throwcollect.plan.digest import config_digest, trial_digests
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 from throwcollect.tasks.throw.throw_config import UntilLanded
 
 WITHOUT_EFFECT = {

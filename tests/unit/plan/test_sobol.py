@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from throwcollect.plan.sobol import MOST_DIMENSIONS, draw_sobol
+from throwcollect.plan.samplers import MOST_DIMENSIONS, draw_sobol
 
 
 @pytest.mark.parametrize(("dimensions", "count"), [(1, 1), (1, 2), (2, 3), (5, 200), (40, 4096), (MOST_DIMENSIONS, 64)])

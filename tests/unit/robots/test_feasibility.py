@@ -9,10 +9,10 @@ from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import joint_model
 from throwcollect.robots.dynamics import Dynamics
 from throwcollect.robots.feasibility import Feasibility
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.talos import TALOS
 from throwcollect.robots.tools.tool import tool_of
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.task import task_of
 
 JOINTS = TALOS.joints

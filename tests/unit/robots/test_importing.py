@@ -18,13 +18,11 @@ from throwcollect.episode.frames import read_frames
 from throwcollect.errors import ConfigError
 from throwcollect.members import load_member
 from throwcollect.robots.derived import Postures
-from throwcollect.robots.described import find_robot
 from throwcollect.robots.description import full_description
 from throwcollect.robots.imported import hash_files
-from throwcollect.robots.importing import find_urdf, import_robot
+from throwcollect.robots.importing import find_robot, find_urdf, import_robot
 from throwcollect.robots.joint_model import joint_model
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.robot import Robot
+from throwcollect.robots.robot import Robot, joint_limits
 from throwcollect.robots.urdf import read_xml
 from throwcollect.state_directory import STATE_VARIABLE
 from throwcollect.tasks.task import task_of

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
-from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.robots.trajectory import JointTrajectory, sample_positions, sample_quintic
 
 
 def rest_to_rest(start=1.1, end=2.1, duration=1.0):

@@ -11,10 +11,9 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.members import names_of
 from throwcollect.robots.clearance import Clearance
-from throwcollect.robots.described import find_robot
+from throwcollect.robots.importing import find_robot
 from throwcollect.robots.joint_model import joint_model
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.robot import Robot
+from throwcollect.robots.robot import Robot, joint_limits
 from throwcollect.robots.tools.tool import tool_of
 
 sys.path.append(str(Path(__file__).parents[2] / "plugins"))

@@ -3,9 +3,9 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import start_posture
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.dynamics import ToolMotion
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.talos import TALOS
-from throwcollect.robots.tool_motion import ToolMotion
 
 
 def test_the_velocity_of_the_tool_agrees_with_finite_differences():

@@ -9,7 +9,7 @@ from rclzenoh import context
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 from throwcollect import ros
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.heartbeat import VARIABLE
+from throwcollect.own_process import HEARTBEAT_VARIABLE
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 
@@ -73,7 +73,7 @@ def test_the_router_command_makes_a_missing_key_and_keeps_an_existing_one(tmp_pa
 
 def test_a_running_router_keeps_renewing_its_heartbeat(tmp_path, monkeypatch):
     file = tmp_path / "alive"
-    monkeypatch.setenv(VARIABLE, str(file))
+    monkeypatch.setenv(HEARTBEAT_VARIABLE, str(file))
     with subprocess.Popen([*COMMAND, "tcp/127.0.0.1:0"], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline()

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from tests.unit.serve.conftest import CONFIG
 
-from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
+from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.errors import ConfigError, NotFoundError
 from throwcollect.serve.catalogue import Catalogue
 

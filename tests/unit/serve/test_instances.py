@@ -14,7 +14,7 @@ from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import Origin, RunFailure
 from throwcollect.collect.runtimes.runtime import NodeState
-from throwcollect.config.containers import ContainerSpec
+from throwcollect.config.run import ContainerSpec
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.catalogue import Catalogue
 

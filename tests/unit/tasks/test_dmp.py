@@ -5,7 +5,7 @@ import pytest
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
-from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.dmp import basis, dmp_trajectory, fit_motions, roll_out
 from throwcollect.tasks.task import task_of
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from throwcollect.config.schema import MinimumJerk
-from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory, point_times
 
 START, END = {"a": -1.9, "b": 0.3, "c": 9.0}, {"b": -0.2, "a": -0.5}

@@ -13,7 +13,7 @@ from tests.pages import find_blocks, read_section
 
 from throwcollect.collect.coordinator.prepare import draw_plan
 from throwcollect.config.loader import load
-from throwcollect.robots.quintic_curve import sample_positions
+from throwcollect.robots.trajectory import sample_positions
 from throwcollect.tasks.task import trajectory_of
 
 ROOT = Path(__file__).parents[3]

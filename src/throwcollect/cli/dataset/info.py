@@ -69,8 +69,8 @@ def verify(
 
 
 def _describe_replay(dataset: Dataset, replay: int | None) -> str:
-    """Describe how many throws of a dataset without findings were simulated again, and how to simulate more."""
-    from throwcollect.config.policy import SESSION
+    """Say how many throws were simulated again in a dataset in which nothing is wrong, and how to simulate more."""
+    from throwcollect.config.motion import SESSION
     from throwcollect.replay import count_replayed
 
     if (policy := dataset.config.task.policy) is not None and policy.use == SESSION:

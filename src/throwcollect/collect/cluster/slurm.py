@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.document import Document
+from throwcollect.config.run import ClusterConfig
 from throwcollect.errors import ConfigError, WorkerError
 
 MARK = "throwcollect:"

@@ -21,8 +21,8 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.plan.plan import Check, Plan, check_some_left, make_trials, refusal
 from throwcollect.plan.point_file import read_points
-from throwcollect.plan.points import Points
 from throwcollect.plan.samplers import draw_points
+from throwcollect.plan.trials import Points
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.robots.oddities import find_placeholders

@@ -13,7 +13,7 @@ import numpy as np
 from throwcollect.collect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
 from throwcollect.collect.coordinator.reporter import SILENT, Reporter
 from throwcollect.config.loader import load, load_locating_errors
-from throwcollect.config.policy import SESSION
+from throwcollect.config.motion import SESSION
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
@@ -34,7 +34,7 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Pro
 from throwcollect.files import check_regular, remove, write_file
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.point_file import encode_points
-from throwcollect.plan.points import Points
+from throwcollect.plan.trials import Points
 from throwcollect.robots.description import is_available
 from throwcollect.tasks.result import LOST, REFUSED, Result
 from throwcollect.wording import command

@@ -16,7 +16,7 @@ from throwcollect.collect.coordinator_node.preview import PROGRESS_QOS, PROGRESS
 from throwcollect.collect.coordinator_node.simulation_client import EPISODE_TOPIC, SimulationClient
 from throwcollect.episode.episode_message import TrialRefusal, unpack
 from throwcollect.errors import DatasetError, WorkerError
-from throwcollect.heartbeat import Heartbeat
+from throwcollect.own_process import Heartbeat
 from throwcollect.plan.lease import Lease
 from throwcollect.ros import Node, graph_changes
 from throwcollect.ros.msg import String

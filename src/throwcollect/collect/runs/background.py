@@ -31,15 +31,15 @@ from throwcollect.collect.runs.run_record import Origin, Planning, RunFailure, R
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
 from throwcollect.collect.runtimes.runtime import choose, get_runtime
-from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load, load_locating_errors
+from throwcollect.config.run import ContainerSpec
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.dataset.carried_robot import write_config
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
-from throwcollect.interruption import stop_signals
+from throwcollect.own_process import stop_signals
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.side_by_side import count_cores
 

@@ -14,7 +14,7 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import Origin
 from throwcollect.collect.runs.run_selection import require_living
 from throwcollect.collect.runtimes.runtime import Host, RunContext, get_runtime
-from throwcollect.config.containers import ContainerSpec
+from throwcollect.config.run import ContainerSpec
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
 

@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.arguments import check_bounds
 from throwcollect.collect.coordinator.reporter import SILENT, Reporter
 from throwcollect.collect.runs.launcher import launch
 from throwcollect.collect.runs.records import Records
@@ -23,7 +22,7 @@ from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import reading_config
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.errors import ThrowcollectError, WorkerError
+from throwcollect.errors import ThrowcollectError, WorkerError, check_bounds
 from throwcollect.members import find_modules
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import reserve_port

@@ -23,8 +23,7 @@ from throwcollect.collect.runtimes.runtime import NodeState, RunContext, find_ru
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, NotFoundError, WorkerError
 from throwcollect.files import beside, open_log, write_all
-from throwcollect.interruption import count_interruptions
-from throwcollect.own_process import make_command
+from throwcollect.own_process import count_interruptions, make_command
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.router_endpoint import format_endpoint, reach_from_elsewhere, split_address
 from throwcollect.run_key import RunKey

@@ -34,8 +34,7 @@ from throwcollect.collect.runtimes.nodes import (
 from throwcollect.collect.runtimes.runtime import RunContext, Runtime, Session
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
-from throwcollect.interruption import die_with_parent
-from throwcollect.own_process import make_command
+from throwcollect.own_process import die_with_parent, make_command
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import VARIABLE
 from throwcollect.ros.router_endpoint import format_endpoint, reach_from_here, reserve_port

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
-from throwcollect.heartbeat import ready_line
+from throwcollect.own_process import ready_line
 
 _TAIL_LINES = 40
 _ORDER = {"launcher": 0, "router": 1, "coordinator": 2}

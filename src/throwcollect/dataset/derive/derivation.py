@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.config.schema import Config
 from throwcollect.config.sensors import SensorSections
 from throwcollect.config.values import column_of, reason_not_sweepable, with_sensors
@@ -33,7 +32,7 @@ from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import Row, ThrowsTable, make_field
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, DatasetError, Problem
+from throwcollect.errors import ConfigError, DatasetError, Problem, check_bounds, refuse_argument
 from throwcollect.files import StrPath, new_directory, replacing, write_all, write_file
 from throwcollect.plan.parquet_file import encode_table
 from throwcollect.plan.plan import Plan

@@ -13,8 +13,7 @@ from throwcollect.config.values import leaves, reason_not_sweepable
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.plan.plan import Plan
-from throwcollect.plan.points import Points
-from throwcollect.plan.trials import Trials
+from throwcollect.plan.trials import Points, Trials
 
 _ABSENT = object()
 

@@ -19,11 +19,11 @@ from pathlib import Path
 import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.arguments import check_bounds, refuse_argument
-from throwcollect.config.kinds import Name
+from throwcollect.config.section import Name
 from throwcollect.dataset.derive.derivation import Derived, count_without_episode, derive
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import compute
+from throwcollect.errors import check_bounds, refuse_argument
 from throwcollect.files import StrPath, new_directory
 
 SQUARES = ("landing_x_m=0.05", "landing_y_m=0.05")

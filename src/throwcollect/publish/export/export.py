@@ -6,10 +6,10 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.carried_robot import carry_robot
 from throwcollect.dataset.directory import CARD, CONFIG, TRIALS
 from throwcollect.dataset.reader import Dataset
+from throwcollect.errors import refuse_argument
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, write_file
 from throwcollect.members import explain_failure, load_member, names_of

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import check_bounds, refuse_argument
 from throwcollect.dataset.reader import Dataset, load
 from throwcollect.dataset.sensors import FRAMES, Frames
+from throwcollect.errors import check_bounds, refuse_argument
 from throwcollect.files import StrPath
 from throwcollect.publish.export.throw_source import ExportSource, choose_streams
 from throwcollect.wording import suggest

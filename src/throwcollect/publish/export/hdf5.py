@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
-from throwcollect.interruption import count_interruptions
+from throwcollect.own_process import count_interruptions
 from throwcollect.publish.export.exporter import Exporter, Layout, tabulate_signals
 from throwcollect.publish.export.npz import to_array
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource, Signal, ThrowSeries, read_metadata

@@ -14,8 +14,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import refuse_argument
 from throwcollect.config.sensors import PictureConfig
+from throwcollect.errors import refuse_argument
 from throwcollect.extras import lazily
 from throwcollect.publish.export.parquet import FILES_PER_CHUNK
 

@@ -13,18 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import refuse_argument
 from throwcollect.config.schema import DynamicMovementPrimitive
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import DatasetError
+from throwcollect.errors import DatasetError, refuse_argument
 from throwcollect.extras import lazily
 from throwcollect.progress_log import log_progress
 from throwcollect.publish.export.exporter import Exporter, Layout, list_joints
 from throwcollect.publish.export.npz import to_array
 from throwcollect.publish.export.throw_source import ExportSource, ThrowSeries, read_metadata
-from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.robots.trajectory import JointTrajectory, sample_quintic
 from throwcollect.tasks.dmp import FIT_POINTS, fit_motions, kernels, roll_out
 
 scipy_io = lazily("scipy.io", extra="export")

@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
+from throwcollect.errors import refuse_argument
 from throwcollect.publish.export.exporter import Exporter, Layout, tabulate_signals
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource
 

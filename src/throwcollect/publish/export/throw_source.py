@@ -14,7 +14,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from throwcollect.arguments import refuse_argument
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TargetColumn
 from throwcollect.dataset.reader import Dataset
@@ -23,13 +22,12 @@ from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import BODY_COMPONENTS
 from throwcollect.episode.record import Samples
 from throwcollect.episode.sensor_topics import sensor_topics
-from throwcollect.errors import DatasetError
+from throwcollect.errors import DatasetError, refuse_argument
 from throwcollect.extras import lazily
 from throwcollect.progress_log import ProgressLog
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
 from throwcollect.robots.surroundings import moving_bodies_of
-from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.robots.trajectory import JointTrajectory, sample_positions, sample_quintic
 from throwcollect.tasks.task import commanded_trajectory
 from throwcollect.units import NS_PER_S, ascii_unit, name_sliding, unit_of_name
 

@@ -33,8 +33,7 @@ from throwcollect.episode.topics import (
 )
 from throwcollect.publish.view.markers import ShownThrow, all_markers, path_cloud, shape_markers, throw_markers
 from throwcollect.robots.description import full_description, robot_of
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.robot import Robot
+from throwcollect.robots.robot import Robot, joint_limits
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sensing.drawn_robot import draw_object_of, draw_robot_of

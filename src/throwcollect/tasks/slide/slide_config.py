@@ -6,9 +6,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, Joint
 from throwcollect.config.scene import AnyBody, BoxConfig, CylinderConfig
-from throwcollect.config.section import Section
+from throwcollect.config.section import Angle, Joint, Section
 from throwcollect.config.task_config import TargetColumn, TaskConfig, UntilConfig, Wanted, target_place
 
 PUCK, TABLE = "puck", "table"

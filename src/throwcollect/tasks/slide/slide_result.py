@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import Outcome, Result
-from throwcollect.tasks.result_columns import BodyColumns, Count, Number, measured
+from throwcollect.tasks.result_columns import BodyColumns, Count, Number, ObjectState, measured
 
 
 class SlideOutcome(Outcome):

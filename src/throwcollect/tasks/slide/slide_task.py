@@ -12,7 +12,7 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EndReason, EpisodeHeader, Samples
-from throwcollect.tasks.measures import ObjectState
+from throwcollect.tasks.result_columns import ObjectState
 from throwcollect.tasks.slide.slide_config import SlideConfig
 from throwcollect.tasks.slide.slide_result import SlideOutcome, SlideResult
 from throwcollect.tasks.task import HEIGHT, EndRule, Failure, Task

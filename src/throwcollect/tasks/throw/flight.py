@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.free_flight import ballistic_positions
-from throwcollect.tasks.measures import ObjectState, Vector
+from throwcollect.tasks.result_columns import ObjectState, Vector
 from throwcollect.tasks.throw.throw_config import SwingConfig
 from throwcollect.units import NS_PER_S
 
@@ -79,7 +79,7 @@ class Flight:
         """Find the highest point of the first `knots` knots, at least one, and between them."""
         top = int(np.argmax(self.positions[:knots, 2]))
         speeds = self.velocities[:, 2]
-        # The highest point lies beside the highest knot, on the side on which the ball changes from rising to falling.
+        # The highest point lies next to the highest knot, on the side on which the ball changes from rising to falling.
         for knot in (top - 1, top):
             if 0 <= knot < len(self.times) - 1 and speeds[knot] > 0 > speeds[knot + 1]:
                 share = speeds[knot] / (speeds[knot] - speeds[knot + 1])

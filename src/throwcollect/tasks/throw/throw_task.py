@@ -14,11 +14,11 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.engine import GROUND
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.reproducible_math import add_up
+from throwcollect.robots.dynamics import ToolMotion
 from throwcollect.robots.surroundings import object_of
-from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.robots.tools.tool import tool_of
-from throwcollect.tasks.measures import ObjectState
 from throwcollect.tasks.result import Outcome
+from throwcollect.tasks.result_columns import ObjectState
 from throwcollect.tasks.task import Failure, Task
 from throwcollect.tasks.throw.flight import (
     Flight,

@@ -12,7 +12,7 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.robots.surroundings import object_of
-from throwcollect.tasks.measures import ObjectState
+from throwcollect.tasks.result_columns import ObjectState
 from throwcollect.tasks.task import Failure
 from throwcollect.tasks.throw.flight import Flight
 from throwcollect.tasks.throw.throw_result import ThrowResult

@@ -39,7 +39,7 @@ from throwcollect.cli.main import main
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import RunRecord
-from throwcollect.interruption import stop_signals
+from throwcollect.own_process import stop_signals
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from throwcollect.collect.cluster.script import BatchScripts
-from throwcollect.config.cluster import ClusterConfig
+from throwcollect.config.run import ClusterConfig
 from throwcollect.config.schema import Config
 
 

@@ -20,7 +20,7 @@ from throwcollect.collect.runs.run_record import Kind, Origin, RunRecord
 from throwcollect.collect.runtimes.docker import component, containers
 from throwcollect.collect.runtimes.docker.component import find_join_options
 from throwcollect.collect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
-from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
+from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.errors import WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from throwcollect.collect.runtimes.node_logs import NodeLogs, Tail
-from throwcollect.heartbeat import ready_line
+from throwcollect.own_process import ready_line
 
 
 def test_logs_leave_out_what_an_earlier_run_printed(tmp_path: Path) -> None:

@@ -13,8 +13,7 @@ from throwcollect.collect.runtimes.docker import docker_engine as docker_image
 from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 from throwcollect.collect.runtimes.image_sources import SOURCES_LABEL
 from throwcollect.collect.runtimes.runtime import choose as choose_runtime
-from throwcollect.config.containers import ContainersConfig
-from throwcollect.config.run import RunConfig
+from throwcollect.config.run import ContainersConfig, RunConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
 from throwcollect.ros.middleware import Middleware

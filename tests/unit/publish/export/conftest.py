@@ -16,8 +16,8 @@ from throwcollect import runs
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.publish.export.export import export
-from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.task import task_of
 
 FORMATS = ("parquet", "npz", "lerobot", "hdf5", "mat")

@@ -22,7 +22,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.publish.view.viewer_directory import View, view
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.talos import TALOS
 from throwcollect.sensing.drawn_robot import draw_robot_of
 

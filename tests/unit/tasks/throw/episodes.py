@@ -6,8 +6,8 @@ import numpy as np
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, GoalOutcome, Samples
-from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
+from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.task import task_of
 
 START_NS = 7_000_000_000

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, GoalOutcome
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.dynamics import ToolMotion
+from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.talos import TALOS
-from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_result import ThrowOutcome

@@ -13,7 +13,7 @@ from docker.client import DockerClient
 from throwcollect.collect.runtimes.docker.address import engine_address
 from throwcollect.collect.runtimes.docker.container_options import image
 from throwcollect.collect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors, find_image
-from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
+from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.state_directory import state_directory

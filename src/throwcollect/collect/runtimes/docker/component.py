@@ -25,7 +25,7 @@ from throwcollect.collect.runtimes.docker.docker_nodes import describe_container
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import ROUTER
 from throwcollect.collect.runtimes.runtime import NodeState, RunContext, Session
-from throwcollect.config.containers import ContainerSpec
+from throwcollect.config.run import ContainerSpec
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE

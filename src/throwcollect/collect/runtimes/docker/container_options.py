@@ -20,7 +20,7 @@ from throwcollect.collect.runtimes.nodes import (
     protocol_of,
 )
 from throwcollect.collect.runtimes.runtime import RunContext
-from throwcollect.config.containers import NodeContainerConfig
+from throwcollect.config.run import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE
 from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE

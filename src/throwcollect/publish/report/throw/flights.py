@@ -28,8 +28,8 @@ from throwcollect.publish.report.figures import (
 )
 from throwcollect.publish.report.measured import Outcomes, describe
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.surroundings import BodyLook
+from throwcollect.robots.trajectory import sample_positions
 from throwcollect.tasks.task import commanded_trajectory
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M, flight_residual
 

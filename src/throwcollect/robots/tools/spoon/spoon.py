@@ -94,7 +94,7 @@ class Spoon(Tool):
         steepness = math.tan(math.asin(min(sine, 1.0))) * math.cos(math.pi / config.cup_walls)
         along, across, sideways = map(float, up)
         # One way out leads along each edge between two walls. Its direction has the lengths `steepness` along the axis
-        # and 1 across it, so its component along `up` tells by how much it climbs.
+        # and 1 across it, so its component along `up` is the slope by which it climbs.
         climbs = []
         for number in range(config.cup_walls):
             turn = math.pi * (2 * number + 1) / config.cup_walls

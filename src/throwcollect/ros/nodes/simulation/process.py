@@ -11,7 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import ConfigError
-from throwcollect.heartbeat import Heartbeat, ready_line
+from throwcollect.own_process import Heartbeat, ready_line
 from throwcollect.robots.description import full_description, physics_description
 from throwcollect.ros.nodes import descriptors
 from throwcollect.ros.nodes.sensors.node import SensorProcess
