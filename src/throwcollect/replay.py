@@ -49,7 +49,11 @@ class Comparison:
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
-    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice."""
+    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice.
+
+    Raises:
+        DatasetError: If no trial has one.
+    """
     trials: list[int] = dataset.recorded.throws["trial"].to_pylist()
     if not trials:
         raise DatasetError(f"{dataset.directory}: no trial has an episode")
@@ -258,7 +262,11 @@ class Distribution:
 
 
 def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
-    """Simulate stored throws of a dataset with another engine; deviations come in the given order."""
+    """Simulate stored throws of a dataset with another engine; deviations come in the given order.
+
+    Raises:
+        ConfigError: If there is no such engine, or the throws are by it themselves.
+    """
     own = Dataset.open(directory).config.sim.engine
     others = [name for name in names_of("engines") if name != own]
     if engine == own:

@@ -52,7 +52,11 @@ def load(path: StrPath, overrides: Sequence[str] = ()) -> Config:
 
 @contextmanager
 def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[Config]:
-    """Read a configuration file as `load` does, and add lines of the file to a `ConfigError` that the block raises."""
+    """Read a configuration file as `load` does, and add lines of the file to a `ConfigError` that the block raises.
+
+    Raises:
+        ConfigError: If the file cannot be read or anything in it is wrong, or the block raises one.
+    """
     document = Document(path)
     for override in overrides:
         document.override(override, find_default=partial(_find_default, document.values))
@@ -68,7 +72,11 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
 
 @contextmanager
 def load_sensors(path: Path) -> Iterator[Mapping[str, AnySensor]]:
-    """Read a file with the section `sensors` alone, and add its lines to a `ConfigError` of the block."""
+    """Read a file with the section `sensors` alone, and add its lines to a `ConfigError` of the block.
+
+    Raises:
+        ConfigError: If the file cannot be read or anything in it is wrong, or the block raises one.
+    """
     document = Document(path)
     sensors = document.validate(_SensorsOnly).sensors
     try:
@@ -187,7 +195,11 @@ def _find_bodies(document: Document, directory: Path) -> None:
 
 
 def read_robot_section(path: Path | None, overrides: Sequence[str] = ()) -> RobotConfig:
-    """Read and complete the section `robot` of a file, or the one that overrides alone make."""
+    """Read and complete the section `robot` of a file, or the one that overrides alone make.
+
+    Raises:
+        ConfigError: If the file cannot be read, the section is wrong, or its robot cannot be imported.
+    """
     document = Document(path)
     for override in overrides:
         document.override(override)

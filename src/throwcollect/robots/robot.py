@@ -86,7 +86,11 @@ class Robot:
         return f"{self.kind} {self.title}".lstrip()
 
     def controller_of(self, joint: str) -> str:
-        """Return the name of the controller that commands a joint."""
+        """Return the name of the controller that commands a joint.
+
+        Raises:
+            KeyError: If the robot has no such joint.
+        """
         for controller, joints in self.controllers.items():
             if joint in joints:
                 return controller
@@ -101,7 +105,11 @@ class Robot:
         return any(link == each or (each.endswith("_") and link.startswith(each)) for each in self.holding)
 
     def locate(self, url: str) -> Path:
-        """Find the file of a mesh by its path or URL in the URDF."""
+        """Find the file of a mesh by its path or URL in the URDF.
+
+        Raises:
+            ConfigError: If it is a URL of another scheme than ``file`` and ``package``.
+        """
         if self.package and url.startswith(own := f"{PACKAGE}{self.package}/"):
             return self.directory / url.removeprefix(own)
         return locate_mesh(url, self.urdf_path.parent, self.directory)
@@ -112,18 +120,31 @@ class Robot:
 
     @property
     def directory(self) -> Path:
-        """Directory that `share` returns."""
+        """Directory that `share` returns.
+
+        Raises:
+            ConfigError: If the description is not installed.
+            MemberError: If the robot comes from another package, and its function fails.
+        """
         with explain_failure("robots", self.name, "find its files"):
             return self.share()
 
     @property
     def urdf_path(self) -> Path:
-        """Path of the URDF."""
+        """Path of the URDF.
+
+        Raises:
+            ConfigError: If the description is not installed.
+        """
         return self.directory / self.urdf
 
     @property
     def srdf_path(self) -> Path:
-        """Path of the SRDF."""
+        """Path of the SRDF.
+
+        Raises:
+            ConfigError: If the description is not installed.
+        """
         return self.directory / self.srdf
 
     @cached_property

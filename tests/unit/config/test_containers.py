@@ -1,3 +1,5 @@
+"""Keys of containers, and what their patterns accept."""
+
 from pathlib import Path
 
 import pytest

@@ -1,3 +1,5 @@
+"""Points of Sobol sequences, compared with those of SciPy."""
+
 import math
 
 import numpy as np

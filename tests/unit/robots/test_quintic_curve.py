@@ -1,3 +1,5 @@
+"""The quintic curve between the points of a trajectory."""
+
 from __future__ import annotations
 
 import numpy as np
