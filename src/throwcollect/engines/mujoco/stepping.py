@@ -147,18 +147,36 @@ def take_steps(
         if reached == due:
             due += stride
             sample = write_sample(qpos, qvel, qfrc_applied, order, joints, bodies, samples, sample)
-            for number in range(joints + 7 * bodies):
-                states[state] = qpos[number]
-                state += 1
-            for number in range(joints + 6 * bodies):
-                states[state], states[state + 1] = qvel[number], qacc_warmstart[number]
-                states[state + 2], states[state + 3] = qfrc_constraint[number], qfrc_applied[number]
-                state += 4
+            state = write_state(
+                qpos, qvel, qacc_warmstart, qfrc_constraint, qfrc_applied, joints, bodies, states, state
+            )
             was_above, is_above = is_above, qpos[joints + 2] >= plane_m
             if was_above and not is_above:
                 break
     changes[0] = count
     return reached
+
+
+def write_state(
+    qpos: Floats,
+    qvel: Floats,
+    qacc_warmstart: Floats,
+    qfrc_constraint: Floats,
+    qfrc_applied: Floats,
+    joints: int,
+    bodies: int,
+    states: Floats,
+    at: int,
+) -> int:
+    """Write what the world would go on from, from number `at` on; return the number behind it."""
+    for number in range(joints + 7 * bodies):
+        states[at] = qpos[number]
+        at += 1
+    for number in range(joints + 6 * bodies):
+        states[at], states[at + 1] = qvel[number], qacc_warmstart[number]
+        states[at + 2], states[at + 3] = qfrc_constraint[number], qfrc_applied[number]
+        at += 4
+    return at
 
 
 def note_presses(
