@@ -126,16 +126,15 @@ def take_steps(
                 mj_step1(model, data)
         for joint in range(joints):
             # Bullet's motor accelerates by hz (gain (target - position) + share (target velocity - velocity)).
-            pull, brake = motors[4 * joint], motors[4 * joint + 1]
-            qacc[joint] = wanted[step * joints + joint] - qpos[joint] * pull - qvel[joint] * brake
+            pull = wanted[step * joints + joint] - qpos[joint] * motors[4 * joint]
+            qacc[joint] = pull - qvel[joint] * motors[4 * joint + 1]
         mj_rne(model, data, 1, qfrc_inverse)
         for joint in range(joints):
             # Joint damping acts on the velocity after the step.
             lag, most = motors[4 * joint + 2], motors[4 * joint + 3]
             torque = qacc[joint] * lag - qfrc_passive[joint] - qfrc_constraint[joint] + qfrc_inverse[joint]
             qfrc_applied[joint] = most if torque > most else -most if torque < -most else torque
-        contacts = data_ints[NCON]
-        if contacts:
+        if contacts := data_ints[NCON]:
             aim_contacts(data_ints, data_words, arena, arena_ints, origin, bounces, hz)
         if drag_kgpm:
             factor = -drag_kgpm * measure_length(qvel[joints], qvel[joints + 1], qvel[joints + 2])
