@@ -28,8 +28,7 @@ from throwcollect.state_directory import state_directory
 
 _HELPERS = (
     *(stepping.turn, stepping.square_exactly, stepping.measure_length),
-    *(stepping.note_presses, stepping.find_gap, stepping.aim_contacts, stepping.write_sample),
-    stepping.write_state,
+    *(stepping.note_presses, stepping.find_gap, stepping.aim_contacts, stepping.write_sample, stepping.copy),
 )
 """What `stepping.take_steps` calls, each behind those that it calls itself."""
 

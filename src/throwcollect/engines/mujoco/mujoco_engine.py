@@ -225,8 +225,8 @@ class MujocoEngine(Engine):
     def _go_back(self, place: int) -> None:
         """Put the world back to where it was at a sample of the last steps."""
         data, state = self._data, self._states[place]
-        data.qpos[:], rest = state[: len(data.qpos)], state[len(data.qpos) :].reshape(-1, 4)
-        data.qvel[:], data.qacc_warmstart[:], data.qfrc_constraint[:], data.qfrc_applied[:] = rest.T
+        data.qpos[:], rest = state[: len(data.qpos)], state[len(data.qpos) :].reshape(4, -1)
+        data.qvel[:], data.qacc_warmstart[:], data.qfrc_constraint[:], data.qfrc_applied[:] = rest
 
     def place(self, number: int, state: BodyState) -> None:
         """Set pose and velocity of a body."""

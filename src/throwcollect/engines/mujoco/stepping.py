@@ -105,9 +105,8 @@ def take_steps(
     position, velocity and, for its damping, acceleration of each joint are multiplied, and its effort; `wanted` its
     acceleration in each step, at position and velocity 0; `bounces` the restitution of each shape; `order` the place of
     each joint of a sample. The object may touch the first `watched` bodies, within `reach_m` of its centre; `bodies`
-    move, with the object. From step `due` on, `samples` gets samples, and `states` what the world would go on from;
-    `changes` gets how often that changes, and what presses on the object after steps in which it is not as in
-    `pressing` any more. A sample in which the object has fallen through the height `plane_m` is the last one.
+    move, with the object. From step `due` on, `samples` gets samples until the object falls through the height
+    `plane_m`, and `states` what the world would go on from; `changes` gets their number, and what presses then.
 
     Returns:
         Number of steps up to the last one.
@@ -126,15 +125,16 @@ def take_steps(
                 mj_step1(model, data)
         for joint in range(joints):
             # Bullet's motor accelerates by hz (gain (target - position) + share (target velocity - velocity)).
-            pull = wanted[step * joints + joint] - qpos[joint] * motors[4 * joint]
-            qacc[joint] = pull - qvel[joint] * motors[4 * joint + 1]
+            pull, brake = motors[4 * joint], motors[4 * joint + 1]
+            qacc[joint] = wanted[step * joints + joint] - qpos[joint] * pull - qvel[joint] * brake
         mj_rne(model, data, 1, qfrc_inverse)
         for joint in range(joints):
             # Joint damping acts on the velocity after the step.
             lag, most = motors[4 * joint + 2], motors[4 * joint + 3]
             torque = qacc[joint] * lag - qfrc_passive[joint] - qfrc_constraint[joint] + qfrc_inverse[joint]
             qfrc_applied[joint] = most if torque > most else -most if torque < -most else torque
-        if contacts := data_ints[NCON]:
+        contacts = data_ints[NCON]
+        if contacts:
             aim_contacts(data_ints, data_words, arena, arena_ints, origin, bounces, hz)
         if drag_kgpm:
             factor = -drag_kgpm * measure_length(qvel[joints], qvel[joints + 1], qvel[joints + 2])
@@ -146,36 +146,14 @@ def take_steps(
         if reached == due:
             due += stride
             sample = write_sample(qpos, qvel, qfrc_applied, order, joints, bodies, samples, sample)
-            state = write_state(
-                qpos, qvel, qacc_warmstart, qfrc_constraint, qfrc_applied, joints, bodies, states, state
-            )
+            state = copy(qpos, joints + 7 * bodies, states, state)
+            for field in (qvel, qacc_warmstart, qfrc_constraint, qfrc_applied):
+                state = copy(field, joints + 6 * bodies, states, state)
             was_above, is_above = is_above, qpos[joints + 2] >= plane_m
             if was_above and not is_above:
                 break
     changes[0] = count
     return reached
-
-
-def write_state(
-    qpos: Floats,
-    qvel: Floats,
-    qacc_warmstart: Floats,
-    qfrc_constraint: Floats,
-    qfrc_applied: Floats,
-    joints: int,
-    bodies: int,
-    states: Floats,
-    at: int,
-) -> int:
-    """Write what the world would go on from, from number `at` on; return the number behind it."""
-    for number in range(joints + 7 * bodies):
-        states[at] = qpos[number]
-        at += 1
-    for number in range(joints + 6 * bodies):
-        states[at], states[at + 1] = qvel[number], qacc_warmstart[number]
-        states[at + 2], states[at + 3] = qfrc_constraint[number], qfrc_applied[number]
-        at += 4
-    return at
 
 
 def note_presses(
@@ -262,6 +240,13 @@ def write_sample(
         samples[at + 3], samples[at + 4], samples[at + 5], samples[at + 6] = x, y, z, w
         at += 13
     return at
+
+
+def copy(field: Floats, count: int, states: Floats, at: int) -> int:
+    """Write the first numbers of a field from number `at` on, and return the number behind them."""
+    for number in range(count):
+        states[at + number] = field[number]
+    return at + count
 
 
 def turn(x: float, y: float, z: float, w: float, a: float, b: float, c: float) -> tuple[float, float, float]:
