@@ -137,7 +137,7 @@ def _let_messages_arrive(session: zenoh.Session, domain_id: int) -> None:
 
     When a session closes, Zenoh 1.10 breaks off the message that it is writing, and then writes the messages that
     withdraw tokens, whose bytes a subscriber takes for the end of the broken message. The router reads a query after
-    all messages that were sent before it, and answers this query itself, as nobody else has its key.
+    all messages that were sent before it, and answers this query itself, as no other process has its key.
     """
     with suppress(zenoh.ZError):
         list(session.get(f"{domain_id}/@arrived", timeout=_ARRIVAL_S))

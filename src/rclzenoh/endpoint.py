@@ -88,7 +88,7 @@ class Endpoint:
             )
 
     def complain(self, problem: object) -> None:
-        """Log a problem with something that was received; only the first one, as anybody may send garbage."""
+        """Log a problem with something that was received; only the first one, as any process may send garbage."""
         if not self._has_complained:
             self._has_complained = True
             self.node.get_logger().warning(f"{self.name}: ignored (this is logged once): {problem}")

@@ -12,7 +12,7 @@ class ConfigurationError(RclzenohError):
 
 
 class NoRouterError(RclzenohError):
-    """There is no router at the endpoints, which are JSON; the reason is what Zenoh says."""
+    """There is no router at the endpoints, which are JSON; the reason is that of Zenoh."""
 
     def __init__(self, endpoints: str, seconds: float, reason: str) -> None:
         self.reason = reason

@@ -27,7 +27,7 @@ _HISTORY_TIMEOUT_S = 10.0
 class Graph:
     """Nodes and endpoints of one domain.
 
-    It learns of each kind, or of a part of it, when somebody first asks: of endpoints with one name; of all those below
+    It learns of each kind, or of a part of it, when a node first asks: of endpoints with one name; of all those below
     ``/sim_0``, when those of ``/sim_0/a`` are counted; of those of all nodes in one namespace.
     """
 
@@ -51,7 +51,7 @@ class Graph:
         if (kind, None, None) in self._followed or (kind, namespace, name) in self._followed:
             return
         with self._asking:
-            # Whoever asks about ever new names, such as a client of rosapi, must not leave a subscriber for each.
+            # A client that asks about ever new names, such as a client of rosapi, must not leave a subscriber for each.
             if sum(followed is kind for followed, *_ in self._followed) >= _MOST_PARTS:
                 namespace = name = None
             # Another thread may have asked meanwhile.
@@ -65,7 +65,7 @@ class Graph:
 
     def catch_up(self) -> None:
         """Wait until what exists is known to the subscribers and clients that were declared before."""
-        # Nobody answers this query, but the router ends it only after it has sent what they have asked for. A
+        # No node answers this query, but the router ends it only after it has sent what they have asked for. A
         # liveliness query would not do: with a subscriber to the same tokens, it does not end (Zenoh 1.10).
         asked = f"{PREFIX}/{self._domain}/{self._session.zid()}"
         list(self._session.get(asked, timeout=_HISTORY_TIMEOUT_S))

@@ -89,7 +89,7 @@ def token_keys(domain: int, kind: EntityKind, namespace: str | None = None, name
 
 
 def parse_token(key: str) -> Token | None:
-    """Token from its key expression; None if that is malformed, as anybody may declare one.
+    """Token from its key expression; None if that is malformed, as any process may declare one.
 
     Chunks that later versions of rmw_zenoh_cpp append are ignored.
     """

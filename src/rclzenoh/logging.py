@@ -31,7 +31,7 @@ class Logger:
 
     Attributes:
         name: Name of the logger.
-        sink: Gets each message after it was written to standard error; None if nobody else gets messages.
+        sink: Gets each message after it was written to standard error; None if there is none.
     """
 
     def __init__(self, name: str) -> None:

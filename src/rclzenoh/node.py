@@ -57,7 +57,7 @@ class Node(NodeEndpoints, NodeParameters):
             offer_parameters(self, self)
         if is_taken:
             self._logger.warning(
-                f"there is another node {self.get_fully_qualified_name()}: both work, but whoever calls one by its "
+                f"there is another node {self.get_fully_qualified_name()}: both work, but who calls one by its "
                 "name, to set a parameter for example, calls both"
             )
 
@@ -85,7 +85,7 @@ class Node(NodeEndpoints, NodeParameters):
         """Set the clock by the topic ``/clock`` while the parameter ``use_sim_time`` is true."""
         for parameter in parameters:
             active = bool(parameter.value)
-            # A node that sets its clock itself goes on if it is told what it does already.
+            # A node that sets its clock itself goes on if it is asked for what it does already.
             if parameter.name != _USE_SIM_TIME or active == (self._clock_subscription is not None):
                 continue
             self._clock.activate(active)

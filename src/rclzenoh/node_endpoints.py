@@ -41,7 +41,7 @@ class NodeEndpoints(NodeBase):
         """Make a subscription, with a profile or only a depth.
 
         The callback may be a coroutine function. It gets the message (with ``raw`` its CDR bytes) and, if it takes two
-        arguments, a dictionary that says when the message was sent.
+        arguments, a dictionary with the time at which the message was sent.
         """
         return self._keep(Subscription(self, msg_type, topic, callback, _make_profile(qos_profile), raw=raw))
 

@@ -115,7 +115,7 @@ class NodeParameters:
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
-        """Set parameters all at once, or none of them; the result says why not."""
+        """Set parameters all at once, or none of them; the result has the reason."""
         for parameter in parameter_list:
             self.describe_parameter(parameter.name)
         return self._set(list(parameter_list), None)

@@ -131,7 +131,7 @@ class Client(Endpoint, Receiver):
         self.announce(self._querier)
 
     def service_is_ready(self) -> bool:
-        """Whether somebody offers the service."""
+        """Whether a node offers the service."""
         matching = self._querier is not None and self._querier.matching_status.matching
         if not (matching or self._was_asked):
             self._was_asked = True
@@ -140,7 +140,7 @@ class Client(Endpoint, Receiver):
         return bool(matching)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the service, for at most ``timeout_sec``; return whether somebody does.
+        """Wait until a node offers the service, for at most ``timeout_sec``; return whether one does.
 
         None or a negative time is no limit.
         """
@@ -148,7 +148,7 @@ class Client(Endpoint, Receiver):
         return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
 
     def call_async(self, request: Message, convert: Callable[[Any], Any] = lambda response: response) -> Future:
-        """Send a request; the future of the response stays pending if nobody answers.
+        """Send a request; the future of the response stays pending if no service answers.
 
         The result of the future is what ``convert`` makes of the response, by default the response itself.
         """

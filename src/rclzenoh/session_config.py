@@ -27,9 +27,9 @@ DEFAULT_ENDPOINT = "tcp/localhost:7447"
 CONFIG_FILE_VARIABLE = "ZENOH_SESSION_CONFIG_URI"
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
 OPEN = "tcp/"
-"""Beginning of the endpoints whose router lets anybody in."""
+"""Beginning of the endpoints whose router lets every process in."""
 PROTECTED = "tls/"
-"""Beginning of the endpoints whose router lets nobody in without a key."""
+"""Beginning of the endpoints whose router rejects processes without a key."""
 _TLS = "transport/link/tls"
 _SETTINGS = {
     "scouting/multicast/enabled": False,
@@ -94,7 +94,7 @@ def connect_endpoint() -> str | None:
 
 
 def is_protected() -> bool:
-    """Whether the environment leads to a router that lets nobody in without a key, and opens no other way in.
+    """Whether the environment leads to a router that rejects processes without a key, and opens no other way in.
 
     Sessions listen by default, on rmw_zenoh_cpp even clients, so the environment has to set where: `client_override`
     does. Lists for single modes of sessions count as not set.
@@ -112,7 +112,7 @@ def client_override(endpoint: str, key: Key | None = None) -> str:
 
 
 def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
-    """Configuration of a router that listens on one endpoint; at ``tls/...`` it lets nobody in without the key."""
+    """Configuration of a router that listens on one endpoint; at ``tls/...`` it rejects processes without the key."""
     config = zenoh.Config()
     _apply(config, {"mode": "router", "listen/endpoints": [endpoint], **_SETTINGS}, "listen endpoint")
     if endpoint.startswith(PROTECTED) and key is not None:

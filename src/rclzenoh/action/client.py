@@ -53,13 +53,13 @@ class ActionClient:
     """Sends goals.
 
     A client subscribes to feedback when it first gets a callback for feedback, and to the status when a goal's status
-    is first read, so that servers need not send messages that nobody uses.
+    is first read, so that servers need not send messages that are not used.
     """
 
     def __init__(self, node: NodeEndpoints, action_type: type[Action], action_name: str) -> None:
         self._node = node
         self._action_type = action_type
-        # The references are weak, because the status of a goal is needed only as long as somebody holds its handle.
+        # The references are weak, because the status of a goal is needed only as long as its handle is held.
         self._handles: weakref.WeakValueDictionary[bytes, ClientGoalHandle] = weakref.WeakValueDictionary()
         self._feedback_callbacks: dict[bytes, FeedbackCallback] = {}
         protocol, prefix = action_type.Impl, f"{action_name}/_action"
@@ -75,7 +75,7 @@ class ActionClient:
         ]
 
     def server_is_ready(self) -> bool:
-        """Whether somebody offers the action, with all its services and topics."""
+        """Whether a node offers the action, with all its services and topics."""
         clients = (self._goal_client, self.cancel_client, self._result_client)
         graph = self._node.context.graph
         return all(client.service_is_ready() for client in clients) and all(
@@ -83,7 +83,7 @@ class ActionClient:
         )
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the action, for at most ``timeout_sec``; return whether somebody does.
+        """Wait until a node offers the action, for at most ``timeout_sec``; return whether one does.
 
         None or a negative time is no limit.
         """
@@ -162,7 +162,7 @@ class ActionClient:
 
 
 def get_action_names_and_types(node: NodeBase) -> NamesAndTypes:
-    """All actions that somebody offers or uses."""
+    """All actions that a node offers or uses."""
     return _list_actions(node.get_topic_names_and_types())
 
 

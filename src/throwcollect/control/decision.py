@@ -55,7 +55,7 @@ class Judge:
     def updates_to_skip(self, motion: Motion, *, goal: bool) -> int | None:
         """Count the updates that can pass without anything to decide; None if there will never be anything.
 
-        `goal` tells whether a goal waits for the end of the motion.
+        `goal` is whether a goal waits for the end of the motion.
         """
         tolerances = self.tolerances
         if tolerances.path.any() and not motion.past_end:

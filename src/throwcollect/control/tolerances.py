@@ -54,7 +54,7 @@ def goal_tolerances(
 ) -> Tolerances:
     """Find the tolerances of one goal: its own where it has any, the defaults elsewhere.
 
-    One illegal number or unknown joint makes the whole goal fall back to the defaults; the log says so.
+    One illegal number or unknown joint makes the whole goal fall back to the defaults; the log has the reason.
     """
     try:
         path = _merge(goal.path_tolerance, defaults.path, joints, "path_tolerance")

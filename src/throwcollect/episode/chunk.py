@@ -89,7 +89,7 @@ class Chunk:
         crc: CRC-32 of the records.
         start_ns: Time of the first message [ns].
         end_ns: Time of the last message [ns].
-        records_sha256: SHA-256 of the records in hexadecimal, as it is written beside the chunk; empty if it is not.
+        records_sha256: SHA-256 of the records in hexadecimal, as it is written with the chunk; empty if it is not.
         indexes: MCAP Message Index records by channel, as they came with the chunk; empty if they did not.
     """
 
@@ -112,7 +112,7 @@ class Chunk:
         return self.decompress()
 
     def check_records(self) -> None:
-        """Hash the records and compare the hash with the one that was written beside them."""
+        """Hash the records and compare the hash with the one that was written with them."""
         actual = hashlib.sha256(self.contents).hexdigest()
         if actual != self.records_sha256:
             raise DatasetError(f"chunk: SHA-256 of its records is {actual}", expected=self.records_sha256)

@@ -37,7 +37,7 @@ class Robot:
         urdf: Path of the URDF in that directory, or an absolute path.
         srdf: Path of the SRDF in that directory, or an absolute path. The SRDF lists links that may overlap, and holds
             the posture at rest.
-        rest: Name of the SRDF's posture that joints have unless a configuration says otherwise.
+        rest: Name of the SRDF's posture that joints have unless a configuration has another one.
         hand: Link that the tool is fixed to: the spoon's handle lies along -z of `tool_pose` in it, and the cup opens
             along +x.
         open_hand: Prefix of the names of links that have no collision shapes, because the tool reaches into them.

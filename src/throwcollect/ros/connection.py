@@ -25,7 +25,7 @@ class Connection:
 
     Attributes:
         endpoint: Endpoint of the router, such as ``tls/127.0.0.1:7447``.
-        key: Key of the run; a router at ``tls/...`` lets nobody in without it.
+        key: Key of the run; a router at ``tls/...`` rejects processes without it.
         domain_id: ROS domain.
         middleware: The middleware that carries the messages of the run.
     """

@@ -28,7 +28,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
 
 
 def joins_protected() -> bool:
-    """Whether nodes of this process join a graph that lets nobody in without a key."""
+    """Whether nodes of this process join a graph that rejects processes without a key."""
     with zenoh_errors():
         return is_protected()
 

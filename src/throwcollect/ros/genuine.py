@@ -155,7 +155,7 @@ def let_callbacks_wait(node: Node) -> None:
 
 
 def joins_protected() -> bool:
-    """Whether nodes of this process join a graph that lets nobody in without a key: other RMWs know of no key."""
+    """Whether nodes of this process join a graph that rejects processes without a key: other RMWs know of no key."""
     if not Middleware("rclpy", rclpy.get_rmw_implementation_identifier()).keeps_others_out:
         return False
     with zenoh_errors():

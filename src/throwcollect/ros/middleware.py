@@ -70,7 +70,7 @@ class Middleware:
         return {VARIABLE: self.backend, RMW_VARIABLE: self.rmw}
 
     def settle(self) -> None:
-        """Make this the middleware of the process, whatever its environment says.
+        """Make this the middleware of the process, whatever its environment names.
 
         Call it before the first name is taken from `throwcollect.ros`, as a process has one backend.
         """

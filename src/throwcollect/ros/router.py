@@ -68,7 +68,7 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
         if endpoint.startswith(PROTECTED) and key is None:
             raise ConfigError(
                 f"the router cannot listen on {endpoint}: no key is named",
-                expected="--key DIR, where a new key is made if there is none; or tcp/..., which lets anybody in",
+                expected="--key DIR, where a new key is made if there is none; or tcp/..., which lets every process in",
             )
         try:
             return zenoh.open(config), endpoint
@@ -98,17 +98,19 @@ def _choose_port(listen: str) -> str:
 
 
 def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> None:
-    """Run a router until SIGTERM, SIGINT or SIGHUP, after printing one line that says where it listens.
+    """Run a router until SIGTERM, SIGINT or SIGHUP, after printing one line with its endpoint.
 
     Args:
         listen: Endpoint to listen on; port 0 takes a free one.
-        key_directory: Directory of the key; at an endpoint ``tls/...``, the router lets nobody in without this key. If
+        key_directory: Directory of the key; at ``tls/...``, the router rejects processes without this key. If
             the directory holds no key, one is made. None for the key that the environment names.
     """
     if key_directory is None:
         key = RunKey.of_environment()
     elif not listen.startswith(PROTECTED):
-        raise ConfigError(f"--key: {listen} lets anybody in, whatever key there is", expected="tls/..., or no --key")
+        raise ConfigError(
+            f"--key: {listen} lets any process in, whatever key there is", expected="tls/..., or no --key"
+        )
     else:
         key = RunKey(key_directory.absolute())
         if not key.exists:
@@ -155,7 +157,7 @@ def discovery_server(listen: str) -> Iterator[str]:
     command = [_find_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
     with (
         _accept_connections(endpoint),
-        # The output goes to a file and not to a pipe: nobody reads it later, and a full pipe would stop the server.
+        # The output goes to a file and not to a pipe: it is never read, and a full pipe would stop the server.
         TemporaryFile() as output,
         subprocess.Popen(
             command,
@@ -178,7 +180,7 @@ def discovery_server(listen: str) -> Iterator[str]:
 
 @contextmanager
 def _accept_connections(endpoint: str) -> Iterator[None]:
-    """Accept TCP connections and close them, because a UDP port does not show whether somebody listens."""
+    """Accept TCP connections and close them, because a UDP port does not show whether a process listens."""
     try:
         server = socket.create_server(split_address(endpoint))
     except OSError as error:
@@ -218,7 +220,7 @@ def _wait_until_it_runs(process: subprocess.Popen[bytes], output: IO[bytes], end
 
 
 def _find_program() -> str:
-    # If ROS is installed by pip, the program lies beside this Python, in a directory that PATH may not contain.
+    # If ROS is installed by pip, the program lies next to this Python, in a directory that PATH may not contain.
     beside_python = Path(sys.prefix, "bin", _PROGRAM)
     program = str(beside_python) if beside_python.is_file() else shutil.which(_PROGRAM)
     if program is None:

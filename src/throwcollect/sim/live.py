@@ -204,7 +204,7 @@ class LiveSimulator(Simulator):
         return refusal
 
     def advance(self, *, watched: bool) -> None:
-        """Run for a stretch of time, or until the run ends; with a real-time factor, take as much time as it says.
+        """Run for a stretch of time, or until the run ends; with a real-time factor, take as much time as it asks for.
 
         The stretch has to be short if a client listens (`watched`).
         """

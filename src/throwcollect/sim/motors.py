@@ -39,7 +39,7 @@ class Motors:
         return target
 
     def plan(self, commands: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Work out targets and velocities of the next steps (see `Steps`); `advance` then says how many were taken.
+        """Work out targets and velocities of the next steps (see `Steps`); `advance` then gets how many were taken.
 
         Args:
             commands: Position wanted at the end of each step [rad], before the delay, shape ``(n_steps, n_moving)``.

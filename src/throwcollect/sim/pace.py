@@ -47,7 +47,7 @@ def stretch_steps(factor: float, hz: int, period: int, phase: int) -> int:
 
 
 def long_stretch_steps(factor: float, hz: int, most_s: float) -> int:
-    """Count the physics steps of one stretch while nobody listens, so that no message has to leave on time.
+    """Count the physics steps of one stretch while no topic has a subscriber, so that no message has to leave on time.
 
     Args:
         factor: Simulated over real time [-].

@@ -106,7 +106,7 @@ def _make_compiled() -> Loop:
     library = ctypes.CDLL(str(path))
     for name in ("mj_step1", "mj_step2", "mj_rne", "sqrt"):
         binding.add_symbol(name, ctypes.cast(getattr(library, name), ctypes.c_void_p).value)
-    # MuJoCo would look at the clock a dozen times in each step, for statistics that nobody reads.
+    # MuJoCo would look at the clock a dozen times in each step, for statistics that are never read.
     ctypes.c_void_p.in_dll(library, "mjcb_time").value = None
     # No processor is named, so that another one of this kind can use the result.
     machine = binding.Target.from_default_triple().create_target_machine(opt=3)

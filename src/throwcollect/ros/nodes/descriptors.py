@@ -1,4 +1,4 @@
-"""Makes descriptors of ROS parameters, which editors of parameters show, from what the configuration says of its keys.
+"""Makes descriptors of ROS parameters, which editors of parameters show, from what the configuration has of its keys.
 
 A range in ROS includes its bounds. Where a bound itself is not allowed, or bounds depend on each other, the constraints
 in words say so, and the node refuses the value.

@@ -8,7 +8,7 @@ from throwcollect.ros import Node, Parameter, SetParametersResult, provide_time
 def make_own_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``.
 
-    The node refuses `use_sim_time`, with which it would show the time of whoever publishes ``/clock``, and the time of
+    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``, and the time of
     the system afterwards.
     """
     provide_time(node)

@@ -110,7 +110,7 @@ def _list_declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any,
     yield "open_loop_control", False, "Old name", True
     yield "speed_scaling.initial_scaling_factor", 1.0, "Speed at the start", True
     yield "speed_scaling.state_interface", "", "Where the hardware tells its speed", True
-    yield "speed_scaling.command_interface", "", "Where the hardware is told its speed", True
+    yield "speed_scaling.command_interface", "", "Where the hardware gets its speed", True
     yield "constraints.goal_time", constraints.goal_time, "How late a goal may be reached [s]; 0 for any time", False
     stopped = "Largest velocity at the end [rad/s]; without effect where positions alone are commanded"
     yield "constraints.stopped_velocity_tolerance", constraints.stopped_velocity_tolerance, stopped, False

@@ -39,7 +39,7 @@ def run(config: Path, *, name: str, namespace: str | None = None, record: Path |
     Args:
         config: YAML file of the collection.
         name: Name of the node.
-        namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
+        namespace: Namespace of the node; None for the root if `run.root_namespace` is set, otherwise ``/<name>``.
         record: Directory of the dataset that clients may record into; None if they may not.
     """
     heartbeat = Heartbeat()
