@@ -64,7 +64,7 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         load(tab)
         assert tab.evaluate("location.hash") == "", "the code is still in the address"
         # Smooth edges take software longer than the rest of a picture, and would slow down simulations.
-        assert tab.evaluate("throwcollect.publish.view.renderer.getContextAttributes().antialias") is False
+        assert tab.evaluate("throwcollect.view.renderer.getContextAttributes().antialias") is False
         assert "Nothing runs" in tab.evaluate("document.querySelector('#empty').textContent")
         tab.evaluate("document.querySelector('#components input').value = '2'")
         press(tab, "Start Throws")
@@ -170,18 +170,18 @@ def test_a_landing_of_a_run_that_has_ended_is_clicked_and_its_throw_is_replayed(
     with browse(f"{address}&run={over[1]}", width=390, height=800) as tab:
         load(tab)
         replayed = "throwcollect.playback.at('replay')?.shown.trial"
-        tab.wait_for(f"{replayed} === 0 && throwcollect.publish.view.stations.get('replay').robot?.isWhole")
+        tab.wait_for(f"{replayed} === 0 && throwcollect.view.stations.get('replay').robot?.isWhole")
         assert tab.evaluate(f"{_CLICK_LANDING}(2)"), "no landing of trial 2 can be clicked"
         tab.wait_for(f"{replayed} === 2")
         landing = tab.evaluate("throwcollect.playback.at('replay').shown.landing")
         assert landing == throws[2].events.landing.position.tolist()
         assert tab.evaluate("location.hash") == f"#run={over[1]}&trial=2"
         tab.evaluate("document.querySelector('#compare').click(); document.querySelector('#stored-after').click()")
-        tab.wait_for(f"{replayed} === 3 && throwcollect.publish.view.stations.get('replay').trails.count === 2")
+        tab.wait_for(f"{replayed} === 3 && throwcollect.view.stations.get('replay').trails.count === 2")
         # The address opens the same two throws again.
         tab.ask("Page.reload")
         load(tab)
-        tab.wait_for(f"{replayed} === 3 && throwcollect.publish.view.stations.get('replay').trails.count === 2")
+        tab.wait_for(f"{replayed} === 3 && throwcollect.view.stations.get('replay').trails.count === 2")
         assert tab.evaluate("document.querySelector('#time').value").endswith(
             "trial 3, landed; transparent: trial 2, landed"
         )
@@ -215,7 +215,7 @@ def test_the_page_shows_what_sensors_saw_and_what_another_camera_sees(
         f"{address}&run={over[1]}", width=390, height=800, features={"prefers-reduced-motion": "reduce"}
     ) as tab:
         load(tab)
-        station, strip = "throwcollect.publish.view.stations.get('replay')", "throwcollect.strip"
+        station, strip = "throwcollect.view.stations.get('replay')", "throwcollect.strip"
         tab.wait_for(f"throwcollect.playback.at('replay') && {station}.robot?.isWhole && {strip}.strands.length === 4")
         tab.evaluate("throwcollect.playback.seek(0.6)")
         tab.wait_for(f"{strip}.strands.every(({{ shown }}) => shown === 1)")

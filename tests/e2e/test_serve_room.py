@@ -42,7 +42,7 @@ _DEVICE = """
   window.device = new IWER.XRDevice(IWER.metaQuest3);
   device.installRuntime({forceInstall: true});
   window.someFrames = async () => {
-    const { render } = throwcollect.publish.view.renderer.info;
+    const { render } = throwcollect.view.renderer.info;
     const until = render.frame + 4;
     while (render.frame < until) await new Promise((resolve) => setTimeout(resolve, 20));
   };
@@ -146,7 +146,7 @@ class Ears:
 
 def enter(tab: Tab) -> None:
     tab.evaluate(_ENTER)
-    tab.wait_for("throwcollect.room.isEntered && throwcollect.publish.view.renderer.xr.isPresenting")
+    tab.wait_for("throwcollect.room.isEntered && throwcollect.view.renderer.xr.isPresenting")
 
 
 def leave(tab: Tab) -> None:
@@ -175,7 +175,7 @@ def test_a_hand_can_set_a_target(server: dict[str, Any], emulator: str) -> None:
         load(tab)
         tab.evaluate("document.querySelector('#components input').value = '2'")
         press(tab, "Start Throws")
-        tab.wait_for("throwcollect.publish.view.stations.get('sim_0')?.robot?.isWhole", within_s=120, every_s=1)
+        tab.wait_for("throwcollect.view.stations.get('sim_0')?.robot?.isWhole", within_s=120, every_s=1)
         run = tab.evaluate("throwcollect.watching.id")
         with Ears(run) as ears:
             set_by_hand(tab, ears)
@@ -191,7 +191,7 @@ def set_by_hand(tab: Tab, ears: Ears) -> None:
 
     before = tab.evaluate(_PAGE)
     enter(tab)
-    tab.wait_for("throwcollect.publish.view.world.visible")
+    tab.wait_for("throwcollect.view.world.visible")
     assert tab.evaluate(_PAGE) != before
     # The robot stands 2 m ahead and throws to the right; the user sees its left side.
     hold(tab, 0.3, 0.9, -1.2)
@@ -210,9 +210,9 @@ def set_by_hand(tab: Tab, ears: Ears) -> None:
     tab.evaluate(f"device.quaternion.set({turn(math.pi / 2, -math.pi / 4)})")
     enter(tab)
     tab.wait_for("throwcollect.room.reticle.visible")
-    assert not tab.evaluate("throwcollect.publish.view.world.visible")
+    assert not tab.evaluate("throwcollect.view.world.visible")
     tab.evaluate("pull()")
-    assert tab.evaluate("throwcollect.publish.view.world.visible")
+    assert tab.evaluate("throwcollect.view.world.visible")
     hold(tab, -0.4, 0.5, -1.4)
     tab.evaluate("pull()")
     assert ears.hear() == pytest.approx((1.4, -0.2, 0.5), abs=_MM)
@@ -224,7 +224,7 @@ def test_a_sensor_of_a_session_is_added_and_placed_by_hand(server: dict[str, Any
         load(tab)
         start = "document.querySelector('button[aria-label=\"Start Hands\"]')"
         tab.evaluate(f"{start}.form.querySelector('input').value = '1'; {start}.click()")
-        robot = "throwcollect.publish.view.stations.get('sim_0')?.robot?.isWhole"
+        robot = "throwcollect.view.stations.get('sim_0')?.robot?.isWhole"
         tab.wait_for(f"throwcollect.live.simulations.size && {robot}", within_s=120, every_s=1)
         try:
             place_by_hand(tab)
@@ -235,7 +235,7 @@ def test_a_sensor_of_a_session_is_added_and_placed_by_hand(server: dict[str, Any
 
 
 def place_by_hand(tab: Tab) -> None:
-    marks, strip = "throwcollect.publish.view.stations.get('sim_0').sensors.object.children", "throwcollect.strip"
+    marks, strip = "throwcollect.view.stations.get('sim_0').sensors.object.children", "throwcollect.strip"
 
     def read(key: str) -> Any:
         """What the simulation says of its camera."""
@@ -254,7 +254,7 @@ def place_by_hand(tab: Tab) -> None:
 
     # It stands 1 m behind the user and 1 m to the right. The hand takes it, turns to the left and lets it go.
     enter(tab)
-    tab.wait_for(f"throwcollect.publish.view.world.visible && {marks}[2].visible")
+    tab.wait_for(f"throwcollect.view.world.visible && {marks}[2].visible")
     boards = "throwcollect.room.sensors.boards"
     assert tab.evaluate(f"{boards}.length === 1 && {boards}[0].mesh.visible")
     assert tab.evaluate(f"{boards}[0].mesh.position.toArray()") == pytest.approx([1, 1.82, 1], abs=_MM)
@@ -268,7 +268,7 @@ def place_by_hand(tab: Tab) -> None:
     yaw = math.atan2(3, -0.4) + math.pi / 2 - math.tau
     assert read("rpy_rad") == pytest.approx([0, math.atan2(0.5, math.hypot(3, 0.4)), yaw], abs=_MM)
     # It was no trigger for a target.
-    assert not tab.evaluate("throwcollect.publish.view.stations.get('sim_0').target.visible")
+    assert not tab.evaluate("throwcollect.view.stations.get('sim_0').target.visible")
     leave(tab)
     assert not tab.evaluate(f"{marks}[2].visible")
 

@@ -202,7 +202,7 @@ try:
 except ImportError as error:
     print(type(error).__name__, error.extra)
 try:
-    throwcollect.collect.runs.find("first")
+    throwcollect.runs.find("first")
 except throwcollect.MissingExtraError as error:
     print(type(error).__name__, error.extra)
 """

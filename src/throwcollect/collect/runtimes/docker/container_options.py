@@ -163,7 +163,7 @@ def container_options(
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _join_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
-        "volumes": [*mounts, *section.mounts],
+        "volumes": dict(map(_read_mount, [*mounts, *section.mounts])),
         "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
         "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
         "mem_limit": section.memory,
@@ -171,6 +171,12 @@ def container_options(
         "memswap_limit": section.memory,
         "cpuset_cpus": section.cpuset,
     }
+
+
+def _read_mount(mount: str) -> tuple[str, dict[str, str]]:
+    # The client takes a list of strings, too, but makes a volume of each whose mode it does not know.
+    source, target, mode = f"{mount}:rw".split(":")[:3]
+    return source, {"bind": target, "mode": mode}
 
 
 def _join_tmpfs(own: Mapping[str, str], chosen: Mapping[str, str]) -> dict[str, str]:

@@ -57,15 +57,15 @@ def test_a_container_gets_the_name_of_its_node_and_the_address_of_the_router() -
 
 
 def test_only_the_coordinator_can_write_the_dataset_and_simulations_can_read_it() -> None:
-    assert options("coordinator")["volumes"][1:] == ["/home/me/data set:/data:rw,z"]
-    assert options("sim_0")["volumes"][1:] == ["/home/me/data set:/data:ro,z"]
-    assert options("router")["volumes"][1:] == []
+    assert options("coordinator")["volumes"]["/home/me/data set"] == {"bind": "/data", "mode": "rw,z"}
+    assert options("sim_0")["volumes"]["/home/me/data set"] == {"bind": "/data", "mode": "ro,z"}
+    assert options("router")["volumes"].keys() == {"/state/key"}
 
 
 def test_every_node_gets_the_key_of_the_run_in_a_read_only_mount() -> None:
     for name in ("router", "sim_0", "coordinator"):
         made = options(name)
-        assert made["volumes"][0] == "/state/key:/key:ro,z"
+        assert made["volumes"]["/state/key"] == {"bind": "/key", "mode": "ro,z"}
         assert made["environment"]["THROWCOLLECT_KEY"] == "/key"
         assert 'connect_private_key="/key/key.pem"' in made["environment"]["ZENOH_CONFIG_OVERRIDE"]
 
@@ -93,8 +93,12 @@ def test_container_options_of_simulations_do_not_apply_to_other_nodes() -> None:
 
 
 def test_mounts_of_the_configuration_are_added_to_that_of_the_dataset() -> None:
-    mounts = ["/a b:/c:ro", "/d:/e:Z"]
-    assert options("sim_0", sim={"mounts": mounts})["volumes"][2:] == mounts
+    made = options("sim_0", sim={"mounts": ["/a b:/c:ro", "/d:/e:Z", "/f:/g"]})["volumes"]
+    assert {source: made[source] for source in ("/a b", "/d", "/f")} == {
+        "/a b": {"bind": "/c", "mode": "ro"},
+        "/d": {"bind": "/e", "mode": "Z"},
+        "/f": {"bind": "/g", "mode": "rw"},
+    }
 
 
 def test_ports_are_published_on_the_loopback_interface() -> None:
