@@ -24,6 +24,7 @@ from throwcollect.config.run import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE
 from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE
+from throwcollect.errors import ConfigError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import LOOPBACK
@@ -163,7 +164,7 @@ def container_options(
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _join_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
-        "volumes": dict(map(_read_mount, [*mounts, *section.mounts])),
+        "volumes": _read_mounts([*mounts, *section.mounts]),
         "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
         "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
         "mem_limit": section.memory,
@@ -173,10 +174,15 @@ def container_options(
     }
 
 
-def _read_mount(mount: str) -> tuple[str, dict[str, str]]:
+def _read_mounts(mounts: Sequence[str]) -> dict[str, dict[str, str]]:
     # The client takes a list of strings, too, but makes a volume of each whose mode it does not know.
-    source, target, mode = f"{mount}:rw".split(":")[:3]
-    return source, {"bind": target, "mode": mode}
+    volumes: dict[str, dict[str, str]] = {}
+    for mount in mounts:
+        source, target, mode = f"{mount}:rw".split(":")[:3]
+        if source in volumes:
+            raise ConfigError(f"{source}: is mounted twice, at {volumes[source]['bind']} and {target}")
+        volumes[source] = {"bind": target, "mode": mode}
+    return volumes
 
 
 def _join_tmpfs(own: Mapping[str, str], chosen: Mapping[str, str]) -> dict[str, str]:

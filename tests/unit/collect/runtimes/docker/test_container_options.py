@@ -12,6 +12,7 @@ from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 from throwcollect.collect.runtimes.nodes import NodeRole, NodeSpec
 from throwcollect.collect.runtimes.runtime import RunContext
 from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 
@@ -99,6 +100,12 @@ def test_mounts_of_the_configuration_are_added_to_that_of_the_dataset() -> None:
         "/d": {"bind": "/e", "mode": "Z"},
         "/f": {"bind": "/g", "mode": "rw"},
     }
+
+
+@pytest.mark.parametrize("source", ["/a b", "/home/me/data set"])
+def test_no_mount_is_lost_that_has_the_source_of_another(source: str) -> None:
+    with pytest.raises(ConfigError, match="is mounted twice, at /"):
+        options("sim_0", sim={"mounts": [f"{source}:/c", "/a b:/d"]})
 
 
 def test_ports_are_published_on_the_loopback_interface() -> None:
