@@ -225,8 +225,8 @@ def test_the_page_shows_what_sensors_saw_and_what_another_camera_sees(
         assert not tab.evaluate(f"{lines}.visible")
         tab.evaluate("document.querySelector('#frustum').click(); document.querySelector('#add-camera').click()")
         drawn = f"{strip}.strands.find(({{ key }}) => key === 'camera/color')?.drawn"
-        tab.wait_for(f"{lines}.visible && {drawn}")
-        # The camera of the frustum is at the head of the robot.
+        tab.wait_for(f"{lines}.visible && {lines}.matrix.elements[14] > 0 && {drawn}")
+        # The camera of the frustum is at the head of the robot, from the first frame that is drawn with it on.
         assert 1.3 < tab.evaluate(f"{lines}.matrix.elements[14]") < 2
         assert tab.evaluate(f"{station}.sensors.object.children.length") == 6
         # A slider moves the camera; what is recorded cannot be changed.
