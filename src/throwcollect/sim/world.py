@@ -80,6 +80,8 @@ class World(Observer):
 
     steps: int
     end_reason: EndReason | None
+    may_rest: bool
+    _sampled_object: Sequence[float]
     _ends: EndRule
     touching: frozenset[str]
     _sampled_target: Sequence[float] | NDArray[np.float64]
@@ -202,29 +204,36 @@ class World(Observer):
 
     def on_sample(self, step: int, sample: Sample) -> bool:
         """Record a sample after a step of the present `run`, and tell whether the run is over."""
-        self._check_due(step)
+        end = self._find_end((step,), (sample[-BODY_NUMBERS:],))
         self._log.append(sample)
-        return self._is_over(step, sample[-BODY_NUMBERS:])
+        return end is not None
 
     def on_samples(self, steps: range, samples: NDArray[np.float64]) -> int | None:
         """Record samples after steps of the present `run`, and tell with which one it is over."""
-        self._check_due(steps[0])
-        objects = zip(steps, samples[:, -BODY_NUMBERS:].tolist(), strict=True)
-        end = next((number for number, now in enumerate(objects) if self._is_over(*now)), None)
+        end = self._find_end(steps, samples[:, -BODY_NUMBERS:].tolist())
         self._log.extend(samples if end is None else samples[: end + 1])
         return end
 
-    def _check_due(self, step: int) -> None:
-        """Refuse the sample after a step if another one is due, as stamps are computed from numbers of samples."""
-        if (got := self._first_step + step) != (due := len(self._log) * self._stride):
+    def _find_end(self, steps: Sequence[int], objects: Iterable[Sequence[float]]) -> int | None:
+        """Judge the object in samples, between which nothing else presses on it; find the one that ends the run."""
+        first, ends, bodies, last_step = self._first_step, self._ends, self._contacts.bodies, self._last_step
+        # As stamps are computed from numbers of samples, no other sample than the one that is due may be recorded.
+        if (got := first + steps[0]) != (due := len(self._log) * self._stride):
             raise ValueError(f"sample {len(self._log)} should be of step {due}, not {got}")
-
-    def _is_over(self, step: int, now: Sequence[float]) -> bool:
-        """Judge the object in a sample, and tell whether the run is over."""
-        self.steps = self._first_step + step
-        reason = self._judge(now, stands_still=next(self._still))
-        self._sampled_object, self.end_reason = now, self.end_reason or reason
-        return self._stops_at_end and self.end_reason is not None
+        before = self._sampled_object
+        for number, (step, now, stands_still) in enumerate(zip(steps, objects, self._still, strict=False)):
+            self.steps = taken = first + step
+            self._has_moved |= not stands_still
+            if not (stands_still and bodies and math.hypot(*now[OBJECT_LINEAR_VELOCITY]) < REST_SPEED_MPS):
+                self._resting_since = taken
+            reason = ends(before, now, bodies)
+            if reason is None and self._has_moved and stands_still and self.rests and not self.may_rest:
+                reason = "rest"
+            self.end_reason = self.end_reason or reason or ("timeout" if taken >= last_step else None)
+            self._sampled_object = before = now
+            if self._stops_at_end and self.end_reason is not None:
+                return number
+        return None
 
     def samples(self, first: int = 0) -> Samples:
         """Return recorded samples as arrays, from number `first` on; forgotten samples are left out."""
@@ -383,15 +392,3 @@ class World(Observer):
 
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * NS_PER_S // self.physics_hz
-
-    def _judge(self, now: Sequence[float], *, stands_still: bool) -> EndReason | None:
-        """Find the reason for which the trial ends with a sample of the object; None if the trial goes on."""
-        self._has_moved |= not stands_still
-        lies = stands_still and self.touching
-        if not (lies and math.hypot(*now[OBJECT_LINEAR_VELOCITY]) < REST_SPEED_MPS):
-            self._resting_since = self.steps
-        if (reason := self._ends(self._sampled_object, now, self._contacts.bodies)) is not None:
-            return reason
-        if self._has_moved and self.rests and not self.may_rest:
-            return "rest"
-        return "timeout" if self.steps >= self._last_step else None
