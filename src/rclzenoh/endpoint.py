@@ -47,11 +47,11 @@ class Endpoint:
             node_id=node.token.node_id,
             entity_id=node.context.next_id(),
             kind=kind,
-            namespace=node.get_namespace(),
-            node=node.get_name(),
+            node_namespace=node.get_namespace(),
+            node_name=node.get_name(),
             name=self.name,
             type=self.type,
-            type_hash=hashed,
+            topic_type_hash=hashed,
             qos=encode(qos_profile),
         )
         self.gid = self.token.gid

@@ -78,7 +78,7 @@ class Graph:
                 # A token may be announced more than once: after a lost connection to the router, or because two
                 # subscribers follow it, that of its kind and that of a part.
                 _note(self._tokens, (token.kind, token.name), key, token if appeared else None)
-                _note(self._of_nodes, (token.namespace, token.node), key, token if appeared else None)
+                _note(self._of_nodes, (token.node_namespace, token.node_name), key, token if appeared else None)
         self.note_change()
 
     def note_change(self, _status: object = None) -> None:
@@ -111,7 +111,7 @@ class Graph:
 
     def names_and_types(self, *kinds: EntityKind, node: tuple[str, str] | None = None) -> list[tuple[str, list[str]]]:
         """Names and ROS types of endpoints, sorted, of all nodes or of one, given by its namespace and name."""
-        return group_types((token.name, token.ros_type) for token in self.tokens(*kinds, node=node))
+        return group_types((token.name, token.topic_type) for token in self.tokens(*kinds, node=node))
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
         """Wait until a condition is true of the graph; return whether it is.

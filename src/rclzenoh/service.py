@@ -18,7 +18,7 @@ from rclzenoh.keys import EntityKind
 from rclzenoh.mailbox import Receiver
 from rclzenoh.node_base import NodeBase
 from rclzenoh.qos import QoSProfile
-from rclzenoh.task import Future, start
+from rclzenoh.task import Future, call
 
 _PATIENT_SERVICE = "/_action/get_result"
 _ENDLESS_S = 1e9
@@ -60,7 +60,7 @@ class Service(Endpoint, Receiver):
             _refuse(item, str(error))
             return
         self._open.add(item)
-        start(self.mailbox, self._serve(item, attachment, request))
+        call(self.mailbox, self._serve, item, attachment, request)
 
     async def _serve(self, query: zenoh.Query, received: Attachment, request: Message) -> None:
         try:
@@ -190,9 +190,7 @@ class Client(Endpoint, Receiver):
             self.complain("unexpected response; there may be more than one server of this name")
             return
         future, convert = self._pending.pop(attachment.sequence)
-        future.call_back_through(self.mailbox)
-        if not future.cancelled():
-            future.set_result(convert(response))
+        future.set_result(convert(response))
 
     def destroy(self) -> None:
         """Withdraw the client; pending futures stay pending. See `Node.destroy_client`."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import threading
 import time
 from collections.abc import Callable
@@ -121,8 +120,6 @@ class Subscription(Endpoint, Receiver):
         self.msg_type = msg_type
         self.raw = raw
         self.callback = callback
-        # As in rclpy, a callback whose second argument is optional gets the message alone.
-        self._wants_info = _takes(callback, 2) and not _takes(callback, 1)
         # `handle` may be called with earlier messages before `_declare` returns, so it must not use anything set below.
         self.announce(self._declare())
 
@@ -144,32 +141,15 @@ class Subscription(Endpoint, Receiver):
         """Decode a sample and call back."""
         try:
             self.check_key(item.encoding)
-            attachment = unpack(item.attachment)
+            unpack(item.attachment)
             data = item.payload.to_bytes()
             message = data if self.raw else deserialize(data, self.msg_type)
         except ValueError as error:
             self.complain(error)
             return
-        if not self._wants_info:
-            call(self.mailbox, self.callback, message)
-            return
-        info = {
-            "source_timestamp": attachment.source_timestamp,
-            "received_timestamp": time.time_ns(),
-            "publication_sequence_number": attachment.sequence,
-            "reception_sequence_number": None,
-        }
-        call(self.mailbox, self.callback, message, info)
+        call(self.mailbox, self.callback, message)
 
     def destroy(self) -> None:
         """Withdraw the subscription; see `Node.destroy_subscription`."""
         super().destroy()
         self.take_all()
-
-
-def _takes(callback: Callable[..., Any], count: int) -> bool:
-    try:
-        inspect.signature(callback).bind(*range(count))
-    except TypeError:
-        return False
-    return True

@@ -140,6 +140,7 @@ def test_malformed_tokens_are_ignored(rig):
     node, other = rig.node("a"), rig.context()
     domain = node.context.get_domain_id()
     odd = ["x", "1a/x/2/NN/%/%/b", "1a/0/0/ZZ/%/%/b", "1a/0/0/MP/%/%/b/%t", "1a/0/0/MP/%/%/b/%t/type/hash/nonsense"]
+    odd.append("1a/0/0/MP/%/%/b/%t/type/hash/::,1:,:,:,,/of a later version")
     tokens = [other.session.liveliness().declare_token(f"@ros2_lv/{domain}/{key}") for key in odd]
     assert rig.spin(lambda: node.count_publishers("/t") == 1)
     assert [name for name, _ in node.get_node_names_and_namespaces()] == ["a"]

@@ -7,8 +7,6 @@ and the embedded one. When the first name is taken from here, the backend is cho
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rclzenoh.api import *  # noqa: F403
-    from throwcollect.ros.embedded import init as init
-    from throwcollect.ros.embedded import joins_protected as joins_protected
+    from throwcollect.ros.embedded import *  # noqa: F403
 else:
     from throwcollect.ros.backend_names import __getattr__ as __getattr__

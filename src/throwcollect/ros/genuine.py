@@ -1,4 +1,4 @@
-"""The backend on genuine rclpy, with any RMW: it has the names of `rclzenoh.api`, and those that `embedded` adds."""
+"""The backend on genuine rclpy, with any RMW: it has the names that `embedded` has."""
 
 # ruff: noqa: F401 - `backend_names` looks up what is imported here.
 
@@ -23,9 +23,7 @@ from rclpy.action import (
     ActionServer,
     CancelResponse,
     GoalResponse,
-    get_action_client_names_and_types_by_node,
     get_action_names_and_types,
-    get_action_server_names_and_types_by_node,
 )
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
