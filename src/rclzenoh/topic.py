@@ -40,8 +40,7 @@ class Publisher(Endpoint):
         self._sequence = 0
         # Genuine subscribers drop samples that arrive out of order, so one lock covers numbering and sending.
         self._lock = threading.Lock()
-        self._publisher: Any = _declare(self)
-        self.announce(self._publisher)
+        self.announce(_declare(self))
 
     def publish(self, msg: Message | bytes) -> None:
         """Publish a message, or its CDR bytes."""
@@ -52,24 +51,18 @@ class Publisher(Endpoint):
         else:
             raise TypeError(f"{self.topic_name}: expected {self.msg_type.TYPE} or bytes, got {type(msg).__name__}")
         with self._lock:
-            if self._publisher is None:
+            if self.declared is None:
                 raise InvalidHandle(f"{self.topic_name}: the publisher was destroyed")
             self._sequence += 1
             attachment = Attachment(self._sequence, time.time_ns(), self.gid).pack()
             try:
-                self._publisher.put(data, attachment=attachment)
+                self.declared.put(data, attachment=attachment)
             except zenoh.ZError as error:
                 raise self.invalid(error) from error
 
     def get_subscription_count(self) -> int:
         """Number of subscriptions to the topic in the whole graph; asking again costs a microsecond or two."""
         return self.node.context.graph.count(EntityKind.SUBSCRIPTION, self.name, self.type)
-
-    def destroy(self) -> None:
-        """Withdraw the publisher; see `Node.destroy_publisher`."""
-        with self._lock:
-            self._publisher = None
-        super().destroy()
 
 
 def _declare(endpoint: Endpoint) -> Any:
