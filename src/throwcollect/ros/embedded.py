@@ -1,6 +1,6 @@
 """The embedded backend: `rclzenoh`, which needs no installation of ROS 2, and functions that rclpy lacks."""
 
-# ruff: noqa: F401 - `backend_names` looks up what is imported here.
+# ruff: noqa: F401 - `throwcollect.ros` looks up what is imported here.
 
 from __future__ import annotations
 

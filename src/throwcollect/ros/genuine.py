@@ -1,6 +1,6 @@
 """The backend on genuine rclpy, with any RMW: it has the names that `embedded` has."""
 
-# ruff: noqa: F401 - `backend_names` looks up what is imported here.
+# ruff: noqa: F401 - `throwcollect.ros` looks up what is imported here.
 
 from __future__ import annotations
 
