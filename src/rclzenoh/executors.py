@@ -15,7 +15,6 @@ from rclzenoh.node_base import NodeBase
 from rclzenoh.task import Future, Task, call, submit
 from rclzenoh.time import S_TO_NS, Timer, deadline_after
 
-_FOREVER = float("inf")
 _LONGEST_WAIT_S = 0.5
 """Waits are limited: if a signal comes just before a wait, Python runs its handler only when the wait ends."""
 
@@ -109,14 +108,9 @@ class Executor:
 
     def _find_next_timer(self) -> tuple[Timer | None, float]:
         """The timer that is due first, and the time until then [s]."""
-        first, least = None, _FOREVER
-        for node in self._nodes:
-            for timer in node.timers:
-                left = timer.time_until_next_call()
-                # If only messages advance the clock, waiting for a time is of no use: messages wake the executor.
-                if (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
-                    first, least = timer, left / S_TO_NS
-        return first, least
+        timers = [timer for node in self._nodes for timer in node.timers]
+        first = min(timers, key=Timer.time_until_next_call, default=None)
+        return first, float("inf") if first is None else first.time_until_next_call() / S_TO_NS
 
 
 class SingleThreadedExecutor(Executor):

@@ -57,7 +57,7 @@ def let_callbacks_wait(_node: Node) -> None:
 
 def provide_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``."""
-    node.get_clock().activate(True)
+    node.get_clock().set_ros_time_override(Time())
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:
