@@ -32,9 +32,7 @@ class Executor:
         self.context.executors.add(self)
 
     def add_node(self, node: NodeBase) -> bool:
-        """Take care of a node's callbacks until the node or the executor ends; returns whether the node is new here."""
-        if node in self._nodes:
-            return False
+        """Take care of a node's callbacks until the node or the executor ends; returns True."""
         self._nodes.append(node)
         node.executor = self
         node.mailbox.attach(self._queue)

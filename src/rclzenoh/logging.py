@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 import time
@@ -59,21 +58,7 @@ class Logger:
             sys.stderr.write(line)
             sys.stderr.flush()
         if self.sink is not None:
-            # The caller is the first frame outside of this module; frames of `info` and similar methods are skipped.
-            caller = sys._getframe(1)
-            while caller.f_back is not None and caller.f_code.co_filename == __file__:
-                caller = caller.f_back
-            self.sink(
-                Log(
-                    stamp=Time(nanoseconds=stamp).to_msg(),
-                    level=int(severity),
-                    name=self.name,
-                    msg=text,
-                    file=os.path.abspath(caller.f_code.co_filename),
-                    function=caller.f_code.co_name,
-                    line=caller.f_lineno,
-                )
-            )
+            self.sink(Log(stamp=Time(nanoseconds=stamp).to_msg(), level=int(severity), name=self.name, msg=text))
         return True
 
     def info(self, message: object, *, throttle_duration_sec: float | None = None) -> bool:

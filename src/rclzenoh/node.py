@@ -166,10 +166,8 @@ class Node(NodeBase, NodeParameters):
 
 def _refuse_simulated_time(parameters: list[Parameter]) -> SetParametersResult:
     """Refuse `use_sim_time`: names cannot be remapped here, and no simulation but one in the root has ``/clock``."""
-    if any(parameter.name == _USE_SIM_TIME and parameter.value for parameter in parameters):
-        reason = f"{_USE_SIM_TIME}: nodes on this backend show the system's time; the topic clock has a simulation's"
-        return SetParametersResult(successful=False, reason=reason)
-    return SetParametersResult(successful=True)
+    refused = any(parameter.name == _USE_SIM_TIME and parameter.value for parameter in parameters)
+    return SetParametersResult(successful=not refused, reason=f"{_USE_SIM_TIME}: this node does not follow /clock")
 
 
 def _answer(field: str, find: Callable[[AnyMessage], object], request: AnyMessage, response: AnyMessage) -> AnyMessage:

@@ -56,7 +56,10 @@ def let_callbacks_wait(_node: Node) -> None:
 
 
 def provide_time(node: Node) -> None:
-    """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``."""
+    """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``.
+
+    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``.
+    """
     node.get_clock().set_ros_time_override(Time())
 
 
