@@ -58,9 +58,7 @@ DROPPED = (
     "scipy/fftpack/*",
     "scipy/odr/*",
     "scipy/signal/*",
-    # Recordings in the formats of rosbags: of that package, the interface definitions alone are used.
-    "apsw/*",
-    "backports/zstd/*",
+    # Compression that our recordings do not use.
     "lz4/*",
     # The second of two bindings to the same library.
     "zstandard/_cffi*",

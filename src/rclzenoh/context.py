@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import atexit
-import inspect
 import time
 import weakref
-from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from itertools import count
-from typing import TypeVar
+from typing import Any
 
 import zenoh
 
 from rclzenoh.exceptions import NoRouterError, NotInitializedException
 from rclzenoh.graph import Graph
 from rclzenoh.session_config import describe, domain_of_environment, environment_config
-
-_T = TypeVar("_T")
 
 _open: weakref.WeakSet[Context] = weakref.WeakSet()
 _PATIENCE_S, _RETRY_S = 5.0, 0.1
@@ -27,53 +23,48 @@ _ARRIVAL_S = 1.0
 
 
 class Context:
-    """One Zenoh session, from `init` to `shutdown`."""
+    """One Zenoh session, from `init` to `shutdown`.
+
+    Attributes:
+        executors: Executors that are woken when the context shuts down.
+    """
 
     def __init__(self) -> None:
-        self._ok = False
-        self._session: zenoh.Session | None = None
+        self.executors: weakref.WeakSet[Any] = weakref.WeakSet()
         self._graph: Graph | None = None
-        self._on_shutdown: list[Callable[[], Callable[[], None] | None]] = []
         self._ids = count()
         self._domain_id = 0
 
-    def init(
-        self, args: list[str] | None = None, *, domain_id: int | None = None, config: zenoh.Config | None = None
-    ) -> None:
+    def init(self, *, domain_id: int | None = None, config: zenoh.Config | None = None) -> None:
         """Open the session.
 
         Args:
-            args: Not used: rclpy has this argument, but names cannot be remapped here.
             domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
             config: Configuration of the session; None makes it from the environment.
         """
-        del args
-        if self._session is not None:
+        if self.ok():
             raise RuntimeError("the context has been initialised already")
         self._domain_id = domain_of_environment() if domain_id is None else domain_id
-        self._session = open_session(environment_config() if config is None else config)
-        self._graph = Graph(self._session, self._domain_id)
+        session = open_session(environment_config() if config is None else config)
+        self._graph = Graph(session, self._domain_id)
         self._ids = count()
-        self._ok = True
         _open.add(self)
 
     def ok(self) -> bool:
         """Whether the context can be used."""
-        return self._ok
-
-    def is_open(self) -> bool:
-        """Whether there is a session; it exists even after `request_shutdown`, so nodes can still withdraw tokens."""
-        return self._session is not None
-
-    @property
-    def session(self) -> zenoh.Session:
-        """The session."""
-        return _require_initialized(self._session)
+        return self._graph is not None
 
     @property
     def graph(self) -> Graph:
         """The ROS graph."""
-        return _require_initialized(self._graph)
+        if self._graph is None:
+            raise NotInitializedException("init() has not been called, or shutdown() has")
+        return self._graph
+
+    @property
+    def session(self) -> zenoh.Session:
+        """The session."""
+        return self.graph.session
 
     def get_domain_id(self) -> int:
         """Domain identifier."""
@@ -83,36 +74,23 @@ class Context:
         """A number that no node or endpoint of the session has yet."""
         return next(self._ids)
 
-    def on_shutdown(self, callback: Callable[[], None]) -> None:
-        """Call a function when the context shuts down; a method is called only if its object still lives."""
-        self._on_shutdown.append(weakref.WeakMethod(callback) if inspect.ismethod(callback) else lambda: callback)
-
-    def request_shutdown(self) -> None:
-        """End all spinning; the session stays open until `shutdown`. May be called in a signal handler."""
-        self._ok = False
-        for reference in list(self._on_shutdown):
-            callback = reference()
-            if callback is not None:
-                callback()
-
     def shutdown(self) -> None:
         """End all spinning and close the session."""
-        if self._session is None:
+        if not self.ok():
             raise RuntimeError("the context has not been initialised, or was shut down already")
         self.try_shutdown()
 
     def try_shutdown(self) -> None:
         """Like `shutdown`, but does nothing if there is nothing to shut down."""
-        if self._ok:
-            self.request_shutdown()
-        session, self._session, self._graph = self._session, None, None
-        self._on_shutdown.clear()
+        graph, self._graph = self._graph, None
+        for executor in list(self.executors):
+            executor.wake()
         _open.discard(self)
-        if session is not None:
+        if graph is not None:
             try:
-                _let_messages_arrive(session, self._domain_id)
+                _let_messages_arrive(graph.session, self._domain_id)
             finally:
-                session.close()  # type: ignore[no-untyped-call]
+                graph.session.close()  # type: ignore[no-untyped-call]
 
 
 def open_session(config: zenoh.Config) -> zenoh.Session:
@@ -141,12 +119,6 @@ def _let_messages_arrive(session: zenoh.Session, domain_id: int) -> None:
     """
     with suppress(zenoh.ZError):
         list(session.get(f"{domain_id}/@arrived", timeout=_ARRIVAL_S))
-
-
-def _require_initialized(value: _T | None) -> _T:
-    if value is None:
-        raise NotInitializedException("init() has not been called, or shutdown() has")
-    return value
 
 
 @cache

@@ -31,6 +31,7 @@ class Endpoint:
         token: Token that announces the endpoint.
         gid: Identifier that is part of every attachment.
         encoding: Encoding of all that is sent; rmw_zenoh_cpp neither sets encodings nor reads them.
+        declared: What Zenoh has declared, such as a publisher; None before `announce` and after `destroy`.
     """
 
     def __init__(self, node: NodeBase, kind: EntityKind, name: str, type_name: str, qos_profile: QoSProfile) -> None:
@@ -47,29 +48,31 @@ class Endpoint:
             node_id=node.token.node_id,
             entity_id=node.context.next_id(),
             kind=kind,
-            namespace=node.get_namespace(),
-            node=node.get_name(),
+            node_namespace=node.get_namespace(),
+            node_name=node.get_name(),
             name=self.name,
             type=self.type,
-            type_hash=hashed,
+            topic_type_hash=hashed,
             qos=encode(qos_profile),
         )
         self.gid = self.token.gid
         # It has a digest of the key, because Zenoh panics at encodings of more than 255 bytes, and keys can be longer.
         self.encoding = zenoh.Encoding(f"{_ENCODING}{xxh3_64_hexdigest(self.key.encode())}")
-        self._declared: list[Any] = []
+        self.declared: Any = None
+        self._declared_token: Any = None
         self._has_complained = False
 
     def announce(self, declared: Any) -> None:
         """Declare the endpoint's token; called when its Zenoh object works, so that others may use it."""
-        self._declared = [self.session.liveliness().declare_token(self.token.key()), declared]
+        self.declared = declared
+        self._declared_token = self.session.liveliness().declare_token(self.token.key())
 
     def destroy(self) -> None:
         """Withdraw the token, then the endpoint; does nothing the second time; see `Node.destroy_publisher`."""
-        declared, self._declared = self._declared, []
-        if not self.session.is_closed():
-            for declaration in declared:
-                declaration.undeclare()
+        declared, self.declared = self.declared, None
+        if declared is not None and not self.session.is_closed():
+            self._declared_token.undeclare()
+            declared.undeclare()
 
     def invalid(self, error: zenoh.ZError) -> InvalidHandle:
         """The error to raise when Zenoh refuses to send."""

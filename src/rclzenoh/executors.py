@@ -15,7 +15,6 @@ from rclzenoh.node_base import NodeBase
 from rclzenoh.task import Future, Task, call, submit
 from rclzenoh.time import S_TO_NS, Timer, deadline_after
 
-_FOREVER = float("inf")
 _LONGEST_WAIT_S = 0.5
 """Waits are limited: if a signal comes just before a wait, Python runs its handler only when the wait ends."""
 
@@ -30,14 +29,10 @@ class Executor:
         self._nodes: list[NodeBase] = []
         self._is_shutdown = False
         self._timer_was_last = False
-        self.context.on_shutdown(self.wake)
+        self.context.executors.add(self)
 
     def add_node(self, node: NodeBase) -> bool:
-        """Take care of a node's callbacks; returns whether the node is new here."""
-        if node in self._nodes:
-            return False
-        if node.executor is not None:
-            node.executor.remove_node(node)
+        """Take care of a node's callbacks until the node or the executor ends; returns True."""
         self._nodes.append(node)
         node.executor = self
         node.mailbox.attach(self._queue)
@@ -49,7 +44,6 @@ class Executor:
         if node in self._nodes:
             self._nodes.remove(node)
             node.executor = None
-            node.mailbox.detach()
 
     def wake(self) -> None:
         """Let a waiting executor look for work and at its context again."""
@@ -73,10 +67,10 @@ class Executor:
             self.spin_once()
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Call callbacks until a future is done or cancelled, ``timeout_sec`` at most; None or negative is no limit."""
+        """Call callbacks until a future is done, ``timeout_sec`` at most; None or negative is no limit."""
         future.add_done_callback(lambda _: self.wake())
         deadline = deadline_after(timeout_sec)
-        while self.context.ok() and not (future.done() or future.cancelled() or self._is_shutdown):
+        while self.context.ok() and not (future.done() or self._is_shutdown):
             self._spin_once(deadline, future)
             if time.monotonic() >= deadline:
                 return
@@ -100,26 +94,21 @@ class Executor:
             self._timer_was_last = False
             if not queued:
                 left = deadline - time.monotonic()
-                if left <= 0 or self._is_shutdown or (until is not None and (until.done() or until.cancelled())):
+                if left <= 0 or self._is_shutdown or (until is not None and until.done()):
                     return
                 wait = min(wait, left)
             try:
                 work = self._queue.get(timeout=0 if queued else min(wait, _LONGEST_WAIT_S))
             except Empty:
                 continue
-            if work is not None and work.run():
+            if work is not None and work():
                 return
 
     def _find_next_timer(self) -> tuple[Timer | None, float]:
         """The timer that is due first, and the time until then [s]."""
-        first, least = None, _FOREVER
-        for node in self._nodes:
-            for timer in node.timers:
-                left = timer.time_until_next_call()
-                # If only messages advance the clock, waiting for a time is of no use: messages wake the executor.
-                if (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
-                    first, least = timer, left / S_TO_NS
-        return first, least
+        timers = [timer for node in self._nodes for timer in node.timers]
+        first = min(timers, key=Timer.time_until_next_call, default=None)
+        return first, float("inf") if first is None else first.time_until_next_call() / S_TO_NS
 
 
 class SingleThreadedExecutor(Executor):

@@ -29,10 +29,13 @@ class Graph:
 
     It learns of each kind, or of a part of it, when a node first asks: of endpoints with one name; of all those below
     ``/sim_0``, when those of ``/sim_0/a`` are counted; of those of all nodes in one namespace.
+
+    Attributes:
+        session: The session whose tokens and subscribers are meant.
     """
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
-        self._session = session
+        self.session = session
         self._domain = domain
         # This is not the lock of `_changed`, which threads of Zenoh need while another thread waits for tokens.
         self._asking = threading.Lock()
@@ -59,7 +62,7 @@ class Graph:
                 return
             key = token_keys(self._domain, kind, namespace, name)
             handler = zenoh.handlers.Callback(self._on_change, indirect=False)
-            subscriber = self._session.liveliness().declare_subscriber(key, handler, history=True)
+            subscriber = self.session.liveliness().declare_subscriber(key, handler, history=True)
             self.catch_up()
             self._followed[kind, namespace, name] = subscriber
 
@@ -67,8 +70,8 @@ class Graph:
         """Wait until what exists is known to the subscribers and clients that were declared before."""
         # No node answers this query, but the router ends it only after it has sent what they have asked for. A
         # liveliness query would not do: with a subscriber to the same tokens, it does not end (Zenoh 1.10).
-        asked = f"{PREFIX}/{self._domain}/{self._session.zid()}"
-        list(self._session.get(asked, timeout=_HISTORY_TIMEOUT_S))
+        asked = f"{PREFIX}/{self._domain}/{self.session.zid()}"
+        list(self.session.get(asked, timeout=_HISTORY_TIMEOUT_S))
 
     def _on_change(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
@@ -78,7 +81,7 @@ class Graph:
                 # A token may be announced more than once: after a lost connection to the router, or because two
                 # subscribers follow it, that of its kind and that of a part.
                 _note(self._tokens, (token.kind, token.name), key, token if appeared else None)
-                _note(self._of_nodes, (token.namespace, token.node), key, token if appeared else None)
+                _note(self._of_nodes, (token.node_namespace, token.node_name), key, token if appeared else None)
         self.note_change()
 
     def note_change(self, _status: object = None) -> None:
@@ -111,7 +114,7 @@ class Graph:
 
     def names_and_types(self, *kinds: EntityKind, node: tuple[str, str] | None = None) -> list[tuple[str, list[str]]]:
         """Names and ROS types of endpoints, sorted, of all nodes or of one, given by its namespace and name."""
-        return group_types((token.name, token.ros_type) for token in self.tokens(*kinds, node=node))
+        return group_types((token.name, token.topic_type) for token in self.tokens(*kinds, node=node))
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
         """Wait until a condition is true of the graph; return whether it is.

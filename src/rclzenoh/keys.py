@@ -12,6 +12,8 @@ from functools import cache
 
 from xxhash import xxh3_128_intdigest
 
+from rclzenoh.qos import QoSProfile, decode
+
 PREFIX = "@ros2_lv"
 """First chunk of all tokens."""
 
@@ -30,7 +32,7 @@ class EntityKind(str, Enum):
 
 @dataclass(frozen=True)
 class Token:
-    """A node or an endpoint of the ROS graph.
+    """A node or an endpoint of the ROS graph; an endpoint has the attributes of rclpy's ``TopicEndpointInfo``.
 
     Attributes:
         domain: Domain identifier.
@@ -38,11 +40,11 @@ class Token:
         node_id: Number of the node in its session.
         entity_id: Number of the endpoint in its session; that of the node for a node.
         kind: What is announced.
-        namespace: Absolute namespace of the node.
-        node: Name of the node.
+        node_namespace: Absolute namespace of the node.
+        node_name: Name of the node.
         name: Absolute name of the topic or service; empty for a node.
         type: DDS name of the type; empty for a node.
-        type_hash: Type hash; empty for a node.
+        topic_type_hash: Type hash; empty for a node.
         qos: Quality of service as rmw_zenoh_cpp writes it; empty for a node.
         enclave: Enclave of the node's context.
     """
@@ -52,20 +54,20 @@ class Token:
     node_id: int
     entity_id: int
     kind: EntityKind
-    namespace: str
-    node: str
+    node_namespace: str
+    node_name: str
     name: str = ""
     type: str = ""
-    type_hash: str = ""
+    topic_type_hash: str = ""
     qos: str = ""
     enclave: str = "/"
 
     def key(self) -> str:
         """Key expression of the token."""
         chunks = [PREFIX, str(self.domain), self.session, str(self.node_id), str(self.entity_id), self.kind.value]
-        chunks += [self.enclave.replace("/", "%"), self.namespace.replace("/", "%"), self.node]
+        chunks += [self.enclave.replace("/", "%"), self.node_namespace.replace("/", "%"), self.node_name]
         if self.kind is not EntityKind.NODE:
-            chunks += [self.name.replace("/", "%"), self.type, self.type_hash, self.qos]
+            chunks += [self.name.replace("/", "%"), self.type, self.topic_type_hash, self.qos]
         return "/".join(chunks)
 
     @property
@@ -74,9 +76,19 @@ class Token:
         return xxh3_128_intdigest(self.key().encode()).to_bytes(16, "little")
 
     @property
-    def ros_type(self) -> str:
+    def endpoint_gid(self) -> list[int]:
+        """The identifier as rclpy gives it."""
+        return list(self.gid)
+
+    @property
+    def topic_type(self) -> str:
         """ROS name of the type, such as ``sensor_msgs/msg/JointState``."""
         return ros_type(self.type)
+
+    @property
+    def qos_profile(self) -> QoSProfile:
+        """Quality of service of the endpoint."""
+        return decode(self.qos)
 
 
 def token_keys(domain: int, kind: EntityKind, namespace: str | None = None, name: str | None = None) -> str:
@@ -100,17 +112,19 @@ def parse_token(key: str) -> Token | None:
         domain, session, node_id, entity_id, kind, enclave, namespace, node = chunks[1:_NODE_CHUNKS]
         is_node = EntityKind(kind) is EntityKind.NODE
         name, dds, type_hash, qos = [""] * 4 if is_node else chunks[_NODE_CHUNKS:_ENDPOINT_CHUNKS]
+        if not is_node:
+            decode(qos)  # Genuine nodes, too, ignore an endpoint whose quality of service is malformed.
         return Token(
             domain=int(domain),
             session=session,
             node_id=int(node_id),
             entity_id=int(entity_id),
             kind=EntityKind(kind),
-            namespace=namespace.replace("%", "/"),
-            node=node,
+            node_namespace=namespace.replace("%", "/"),
+            node_name=node,
             name=name.replace("%", "/"),
             type=dds,
-            type_hash=type_hash,
+            topic_type_hash=type_hash,
             qos=qos,
             enclave=enclave.replace("%", "/"),
         )

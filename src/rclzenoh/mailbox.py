@@ -10,29 +10,16 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from queue import SimpleQueue
-from typing import Any, Protocol
+from typing import Any
 
-
-class Work(Protocol):
-    """Something an executor can do.
-
-    Attributes:
-        mailbox: The mailbox that it was put into.
-    """
-
-    mailbox: Mailbox
-
-    def run(self) -> bool:
-        """Do it; returns False if there was nothing to do after all."""
-
-
-WorkQueue = SimpleQueue[Work | None]
-"""Work in order of arrival; None only wakes the executor."""
+WorkQueue = SimpleQueue[Callable[[], bool] | None]
+"""Work in order of arrival, which returns False if there was nothing to do after all; None only wakes the executor."""
 
 
 class Mailbox:
-    """The queue of a node's work; while the node is in an executor, it is the queue of that executor."""
+    """The queue of a node's work; once the node is in an executor, it is the queue of that executor."""
 
     def __init__(self) -> None:
         # The lock is reentrant, because the garbage collector may close a query while the lock is held, which delivers.
@@ -40,31 +27,17 @@ class Mailbox:
         # This must not be a `Queue`: the handler of a signal may wake the executor in the middle of another `put`.
         self.queue: WorkQueue = SimpleQueue()
 
-    def submit(self, work: Work | None) -> None:
+    def submit(self, work: Callable[[], bool] | None) -> None:
         """Give work to the thread that spins; None only wakes it."""
         with self.lock:
             self.queue.put(work)
 
     def attach(self, queue: WorkQueue) -> None:
-        """Deliver to another queue from now on, and move the work that waits in the present queue to it."""
+        """Deliver to the queue of an executor from now on, and move the work that waits to it."""
         with self.lock:
             while not self.queue.empty():
                 queue.put(self.queue.get())
             self.queue = queue
-
-    def detach(self) -> None:
-        """Deliver to a queue of its own again, and take back the work that the executor has not done yet."""
-        with self.lock:
-            shared, own, others = self.queue, SimpleQueue[Work | None](), []
-            while not shared.empty():
-                work = shared.get()
-                if work is not None and work.mailbox is self:
-                    own.put(work)
-                else:
-                    others.append(work)
-            for work in others:
-                shared.put(work)
-            self.queue = own
 
 
 class Receiver(ABC):
@@ -88,11 +61,10 @@ class Receiver(ABC):
                 # the oldest item for the new one.
                 self._items.popleft()
             else:
-                self.mailbox.queue.put(self)
+                self.mailbox.queue.put(self._handle_oldest)
             self._items.append(item)
 
-    def run(self) -> bool:
-        """Handle the oldest item; returns whether there was one."""
+    def _handle_oldest(self) -> bool:
         with self.mailbox.lock:
             if not self._items:
                 return False

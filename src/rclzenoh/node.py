@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar
 
 from rclzenoh.context import Context
+from rclzenoh.endpoint import Endpoint
 from rclzenoh.exceptions import InvalidHandle
-from rclzenoh.interfaces.msg import Clock, Log, ParameterEvent
+from rclzenoh.interfaces import AnyMessage, Message
+from rclzenoh.interfaces import Service as ServiceType
+from rclzenoh.interfaces.msg import Log, ParameterEvent, SetParametersResult
 from rclzenoh.keys import EntityKind
-from rclzenoh.node_endpoints import NodeEndpoints
-from rclzenoh.node_parameters import NodeParameters, offer_parameters
+from rclzenoh.node_base import NodeBase
+from rclzenoh.node_parameters import NodeParameters
 from rclzenoh.parameter import Parameter
-from rclzenoh.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events, qos_profile_rosout
-from rclzenoh.time import Time
-from rclzenoh.topic import Subscription
+from rclzenoh.qos import (
+    QoSProfile,
+    qos_profile_parameter_events,
+    qos_profile_parameters,
+    qos_profile_rosout,
+    qos_profile_services_default,
+)
+from rclzenoh.service import Client, Service
+from rclzenoh.time import S_TO_NS, Timer
+from rclzenoh.topic import Publisher, Subscription
 
-_CLOCK_TOPIC = "/clock"
 _USE_SIM_TIME = "use_sim_time"
 
+_E = TypeVar("_E", bound=Endpoint)
 
-class Node(NodeEndpoints, NodeParameters):
+
+class Node(NodeBase, NodeParameters):
     """A node of the ROS graph.
 
     Args:
@@ -39,7 +52,8 @@ class Node(NodeEndpoints, NodeParameters):
         enable_rosout: bool = True,
         start_parameter_services: bool = True,
     ) -> None:
-        NodeEndpoints.__init__(self, node_name, namespace or "", context)
+        NodeBase.__init__(self, node_name, namespace or "", context)
+        self._endpoints: list[Endpoint] = []
         NodeParameters.__init__(self, self._publish_parameter_event)
         # This looks at the graph before the token of this node is declared, because then this node would be in it, too.
         is_taken = any(self.context.graph.tokens(EntityKind.NODE, node=(self._namespace, node_name)))
@@ -50,24 +64,92 @@ class Node(NodeEndpoints, NodeParameters):
         self._parameter_events = self.create_publisher(
             ParameterEvent, "/parameter_events", qos_profile_parameter_events
         )
-        self._clock_subscription: Subscription | None = None
-        self.add_post_set_parameters_callback(self._choose_clock)
+        self.add_on_set_parameters_callback(_refuse_simulated_time)
         self.declare_parameter(_USE_SIM_TIME, False)
         if start_parameter_services:
-            offer_parameters(self, self)
+            for service, name, field, find in self.parameter_services():
+                answer = partial(_answer, field, find)
+                self.create_service(service, f"~/{name}", answer, qos_profile=qos_profile_parameters)
         if is_taken:
             self._logger.warning(
                 f"there is another node {self.get_fully_qualified_name()}: both work, but who calls one by its "
                 "name, to set a parameter for example, calls both"
             )
 
+    def create_publisher(self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int) -> Publisher:
+        """Make a publisher, with a profile or only a depth."""
+        return self._keep(Publisher(self, msg_type, topic, _make_profile(qos_profile)))
+
+    def create_subscription(
+        self,
+        msg_type: type[Message],
+        topic: str,
+        callback: Callable[..., Any],
+        qos_profile: QoSProfile | int,
+        *,
+        raw: bool = False,
+    ) -> Subscription:
+        """Make a subscription, with a profile or only a depth.
+
+        The callback may be a coroutine function. It gets the message, or with ``raw`` its CDR bytes.
+        """
+        return self._keep(Subscription(self, msg_type, topic, callback, _make_profile(qos_profile), raw=raw))
+
+    def create_service(
+        self,
+        srv_type: type[ServiceType],
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+    ) -> Service:
+        """Make a service.
+
+        The callback gets the request and an empty response, and returns the response; it may be a coroutine function.
+        """
+        return self._keep(Service(self, srv_type, srv_name, callback, qos_profile))
+
+    def create_client(
+        self,
+        srv_type: type[ServiceType],
+        srv_name: str,
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+    ) -> Client:
+        """Make a client of a service."""
+        return self._keep(Client(self, srv_type, srv_name, qos_profile))
+
+    def create_timer(self, timer_period_sec: float, callback: Callable[[], Any]) -> Timer:
+        """Make a timer, which runs in real time; the callback may be a coroutine function."""
+        timer = Timer(callback, int(timer_period_sec * S_TO_NS))
+        self.timers.append(timer)
+        # A waiting executor does not know of this timer and may wait too long, so it is woken.
+        self.mailbox.submit(None)
+        return timer
+
+    def _destroy(self, endpoint: Endpoint) -> bool:
+        """Withdraw an endpoint; returns whether it belonged to this node."""
+        known = endpoint in self._endpoints
+        if known:
+            self._endpoints.remove(endpoint)
+            endpoint.destroy()
+        return known
+
+    destroy_publisher = destroy_subscription = destroy_service = destroy_client = _destroy
+
+    def _keep(self, endpoint: _E) -> _E:
+        self._endpoints.append(endpoint)
+        return endpoint
+
     def destroy_node(self) -> None:
         """Withdraw the node and all of its endpoints."""
         if self.executor is not None:
             self.executor.remove_node(self)
-        self.destroy_endpoints()
+        self.timers.clear()
+        while self._endpoints:
+            self._endpoints.pop().destroy()
         token, self._declared_token = self._declared_token, None
-        if token is not None and self.context.is_open():
+        if token is not None and self.context.ok():
             token.undeclare()
 
     def _publish_parameter_event(self, event: ParameterEvent) -> None:
@@ -81,20 +163,18 @@ class Node(NodeEndpoints, NodeParameters):
         except InvalidHandle:
             self._logger.sink = None  # The node or its session has ended; standard error has the message anyway.
 
-    def _choose_clock(self, parameters: list[Parameter]) -> None:
-        """Set the clock by the topic ``/clock`` while the parameter ``use_sim_time`` is true."""
-        for parameter in parameters:
-            active = bool(parameter.value)
-            # A node that sets its clock itself goes on if it is asked for what it does already.
-            if parameter.name != _USE_SIM_TIME or active == (self._clock_subscription is not None):
-                continue
-            self._clock.activate(active)
-            if self._clock_subscription is None:
-                qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-                self._clock_subscription = self.create_subscription(Clock, _CLOCK_TOPIC, self._take_clock, qos)
-            else:
-                self.destroy_subscription(self._clock_subscription)
-                self._clock_subscription = None
 
-    def _take_clock(self, message: Clock) -> None:
-        self._clock.set_ros_time_override(Time.from_msg(message.clock))
+def _refuse_simulated_time(parameters: list[Parameter]) -> SetParametersResult:
+    """Refuse `use_sim_time`: names cannot be remapped here, and no simulation but one in the root has ``/clock``."""
+    refused = any(parameter.name == _USE_SIM_TIME and parameter.value for parameter in parameters)
+    return SetParametersResult(successful=not refused, reason=f"{_USE_SIM_TIME}: this node does not follow /clock")
+
+
+def _answer(field: str, find: Callable[[AnyMessage], object], request: AnyMessage, response: AnyMessage) -> AnyMessage:
+    """Answer a request by one field of the response."""
+    setattr(response, field, find(request))
+    return response
+
+
+def _make_profile(qos: QoSProfile | int) -> QoSProfile:
+    return qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any
 
 from rclzenoh.context import Context, get_default_context
@@ -12,46 +10,7 @@ from rclzenoh.keys import EntityKind, Token
 from rclzenoh.logging import Logger
 from rclzenoh.mailbox import Mailbox
 from rclzenoh.names import absolute_namespace, check_node_name, join, resolve
-from rclzenoh.qos import QoSProfile, decode
 from rclzenoh.time import ROSClock, Timer
-
-
-class TopicEndpointTypeEnum(IntEnum):
-    """Kind of an endpoint."""
-
-    PUBLISHER = 1
-    SUBSCRIPTION = 2
-
-
-@dataclass(frozen=True)
-class TopicEndpointInfo:
-    """One publisher or subscription; the type is its ROS name, and the identifier has 16 octets."""
-
-    node_name: str
-    node_namespace: str
-    topic_type: str
-    topic_type_hash: str
-    endpoint_type: TopicEndpointTypeEnum
-    endpoint_gid: list[int]
-    qos_profile: QoSProfile
-
-
-def endpoint_info(token: Token) -> TopicEndpointInfo | None:
-    """Describe the endpoint of a token; None if its QoS is malformed, because genuine nodes ignore such tokens."""
-    qos = decode(token.qos)
-    if qos is None:
-        return None
-    is_publisher = token.kind is EntityKind.PUBLISHER
-    return TopicEndpointInfo(
-        node_name=token.node,
-        node_namespace=token.namespace,
-        topic_type=token.ros_type,
-        topic_type_hash=token.type_hash,
-        endpoint_type=TopicEndpointTypeEnum.PUBLISHER if is_publisher else TopicEndpointTypeEnum.SUBSCRIPTION,
-        endpoint_gid=list(token.gid),
-        qos_profile=qos,
-    )
-
 
 NamesAndTypes = list[tuple[str, list[str]]]
 """Names of topics or services, each with its types."""
@@ -83,8 +42,8 @@ class NodeBase:
             node_id=number,
             entity_id=number,
             kind=EntityKind.NODE,
-            namespace=self._namespace,
-            node=self._name,
+            node_namespace=self._namespace,
+            node_name=self._name,
         )
 
     def get_name(self) -> str:
@@ -113,7 +72,7 @@ class NodeBase:
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
         """Names and namespaces of all nodes."""
-        return sorted((token.node, token.namespace) for token in self.context.graph.tokens(EntityKind.NODE))
+        return sorted((token.node_name, token.node_namespace) for token in self.context.graph.tokens(EntityKind.NODE))
 
     def get_topic_names_and_types(self) -> NamesAndTypes:
         """All topics."""
@@ -135,10 +94,6 @@ class NodeBase:
         """Services that a node offers."""
         return self.context.graph.names_and_types(EntityKind.SERVICE, node=(node_namespace, node_name))
 
-    def get_client_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
-        """Services that a node has clients of."""
-        return self.context.graph.names_and_types(EntityKind.CLIENT, node=(node_namespace, node_name))
-
     def count_publishers(self, topic_name: str) -> int:
         """Publishers of a topic, given by its absolute, relative or private name."""
         return self.context.graph.count(EntityKind.PUBLISHER, self.resolve_topic_name(topic_name))
@@ -147,15 +102,10 @@ class NodeBase:
         """Subscriptions to a topic, given by its absolute, relative or private name."""
         return self.context.graph.count(EntityKind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
 
-    def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
+    def get_publishers_info_by_topic(self, topic_name: str) -> list[Token]:
         """All publishers of a topic, given by its absolute, relative or private name."""
-        return self._list_endpoints_info(EntityKind.PUBLISHER, topic_name)
+        return list(self.context.graph.tokens(EntityKind.PUBLISHER, name=self.resolve_topic_name(topic_name)))
 
-    def get_subscriptions_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
+    def get_subscriptions_info_by_topic(self, topic_name: str) -> list[Token]:
         """All subscriptions to a topic, given by its absolute, relative or private name."""
-        return self._list_endpoints_info(EntityKind.SUBSCRIPTION, topic_name)
-
-    def _list_endpoints_info(self, kind: EntityKind, topic_name: str) -> list[TopicEndpointInfo]:
-        name = self.resolve_topic_name(topic_name)
-        infos = (endpoint_info(token) for token in self.context.graph.tokens(kind, name=name))
-        return [info for info in infos if info is not None]
+        return list(self.context.graph.tokens(EntityKind.SUBSCRIPTION, name=self.resolve_topic_name(topic_name)))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from rclzenoh.exceptions import (
     InvalidParameterValueException,
@@ -33,15 +33,11 @@ from rclzenoh.interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
-from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.parameter import Parameter, ParameterKind
-from rclzenoh.qos import qos_profile_parameters
 
 _RELATIVE_TOLERANCE = 1e-6
 """A value this close to a bound or a step of its range counts as equal to it; rclpy has the same tolerance."""
 
-
-_T = TypeVar("_T")
 OnSet = Callable[[list[Parameter]], SetParametersResult]
 """Callback that accepts or refuses parameters before they are set."""
 PostSet = Callable[[list[Parameter]], None]
@@ -97,13 +93,6 @@ class NodeParameters:
             raise ParameterUninitializedException(f"parameter {name!r} has no value yet")
         return parameter
 
-    def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
-        """A parameter, or an alternative if it is not declared or has no value."""
-        parameter = self._parameters.get(name)
-        if parameter is not None and parameter.type_ is not ParameterKind.NOT_SET:
-            return parameter
-        return Parameter(name) if alternative_value is None else alternative_value
-
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Descriptor of a parameter."""
         if name not in self._descriptors:
@@ -150,6 +139,42 @@ class NodeParameters:
         nested = dict.fromkeys(name.rpartition(".")[0] for name in names if "." in name)
         return ListParametersResult(names=names, prefixes=list(nested))
 
+    def parameter_services(self) -> Iterator[tuple[type[Service], str, str, Callable[[AnyMessage], object]]]:
+        """Services by which other nodes read and change the parameters.
+
+        Each has its type, its name, the field of the response, and a function of the request that gives this field. A
+        request that names an unknown parameter is answered with an empty list, as rclpy's nodes do.
+        """
+
+        def read_each(names: list[str], read: Callable[[str], object]) -> list[object]:
+            try:
+                return [read(name) for name in names]
+            except (KeyError, ParameterException):
+                return []
+
+        def find_type(name: str) -> int:
+            return int(self._parameters[name].type_.value)
+
+        def find_value(name: str) -> ParameterValue:
+            return self.get_parameter(name).get_parameter_value()
+
+        def set_each(messages: list[ParameterMessage]) -> list[SetParametersResult]:
+            return [set_all([message]) for message in messages]
+
+        def set_all(messages: list[ParameterMessage]) -> SetParametersResult:
+            try:
+                return self.set_parameters_atomically([Parameter.from_parameter_msg(message) for message in messages])
+            except (ParameterException, ValueError) as error:
+                return SetParametersResult(successful=False, reason=str(error))
+
+        describe, list_names = self.describe_parameter, self.list_parameters
+        yield DescribeParameters, "describe_parameters", "descriptors", lambda asked: read_each(asked.names, describe)
+        yield GetParameters, "get_parameters", "values", lambda asked: read_each(asked.names, find_value)
+        yield GetParameterTypes, "get_parameter_types", "types", lambda asked: read_each(asked.names, find_type)
+        yield ListParameters, "list_parameters", "result", lambda asked: list_names(asked.prefixes, asked.depth)
+        yield SetParameters, "set_parameters", "results", lambda asked: set_each(asked.parameters)
+        yield SetParametersAtomically, "set_parameters_atomically", "result", lambda asked: set_all(asked.parameters)
+
     def _set(self, parameters: list[Parameter], declared: dict[str, ParameterDescriptor] | None) -> SetParametersResult:
         """Set parameters, if descriptors and callbacks agree; ``declared`` has the descriptors of new ones."""
         descriptors = self._descriptors if declared is None else declared
@@ -170,7 +195,7 @@ class NodeParameters:
                 self._descriptors.pop(name, None)
                 event.deleted_parameters.append(message)
                 continue
-            is_new = self.get_parameter_or(name).type_ is ParameterKind.NOT_SET
+            is_new = name not in self._parameters or self._parameters[name].type_ is ParameterKind.NOT_SET
             (event.new_parameters if is_new else event.changed_parameters).append(message)
             self._descriptors[name] = descriptors[name]
             if self._descriptors[name].dynamic_typing:
@@ -221,54 +246,3 @@ def _check_double(parameter: Parameter, allowed: FloatingPointRange) -> str | No
         if not math.isclose(nearest, value, rel_tol=_RELATIVE_TOLERANCE):
             return f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}"
     return None
-
-
-def offer_parameters(node: NodeEndpoints, parameters: NodeParameters) -> None:
-    """Let other nodes read and change a node's parameters.
-
-    A request that names an unknown parameter is answered with an empty list, as rclpy's nodes do.
-    """
-
-    def read_each(names: list[str], read: Callable[[str], _T]) -> list[_T]:
-        try:
-            return [read(name) for name in names]
-        except ParameterException as error:
-            node.get_logger().warning(f"parameter service: {error}")
-            return []
-
-    def find_type(name: str) -> int:
-        # `describe_parameter` raises an error if the parameter is not declared. One without a value is no error.
-        parameters.describe_parameter(name)
-        return int(parameters.get_parameter_or(name).type_.value)
-
-    def find_value(name: str) -> ParameterValue:
-        return parameters.get_parameter(name).get_parameter_value()
-
-    def set_together(messages: list[ParameterMessage]) -> SetParametersResult:
-        try:
-            return parameters.set_parameters_atomically([Parameter.from_parameter_msg(message) for message in messages])
-        except (ParameterException, ValueError) as error:
-            node.get_logger().warning(f"parameter service: {error}")
-            return SetParametersResult(successful=False, reason=str(error))
-
-    def offer(service: type[Service], name: str, field: str, find: Callable[[Any], object]) -> None:
-        """Offer a service that answers with one field."""
-
-        def answer(request: AnyMessage, response: AnyMessage) -> AnyMessage:
-            setattr(response, field, find(request))
-            return response
-
-        node.create_service(service, f"~/{name}", answer, qos_profile=qos_profile_parameters)
-
-    describe = parameters.describe_parameter
-    offer(DescribeParameters, "describe_parameters", "descriptors", lambda asked: read_each(asked.names, describe))
-    offer(GetParameters, "get_parameters", "values", lambda asked: read_each(asked.names, find_value))
-    offer(GetParameterTypes, "get_parameter_types", "types", lambda asked: read_each(asked.names, find_type))
-    offer(
-        ListParameters,
-        "list_parameters",
-        "result",
-        lambda asked: parameters.list_parameters(asked.prefixes, asked.depth),
-    )
-    offer(SetParameters, "set_parameters", "results", lambda asked: [set_together([each]) for each in asked.parameters])
-    offer(SetParametersAtomically, "set_parameters_atomically", "result", lambda asked: set_together(asked.parameters))

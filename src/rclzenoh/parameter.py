@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import array
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,33 +57,27 @@ _SCALARS: dict[int, type] = {1: bool, 2: int, 3: float, 4: str}
 _ELEMENTS: dict[int, type] = {5: bytes, 6: bool, 7: int, 8: float, 9: str}
 
 
+@dataclass
 class Parameter:
     """A parameter. Values are bool, int, float, str, lists of these, or lists of single bytes.
 
-    Args:
+    Attributes:
         name: Name, with dots between its parts.
-        type_: Type; None takes that of the value.
+        type_: Type; by default that of the value.
         value: Value; None together with `ParameterKind.NOT_SET`.
     """
 
-    Type = ParameterKind
+    Type: ClassVar = ParameterKind
 
-    def __init__(self, name: str, type_: ParameterKind | None = None, value: Any = None) -> None:
-        self.name = name
-        self.type_ = ParameterKind.from_parameter_value(value) if type_ is None else type_
-        self.value = value
-        if not self.type_.check(value):
-            raise ValueError(f"parameter {name!r}: {value!r:.80} is not of type {self.type_.name}")
+    name: str
+    type_: ParameterKind = None  # type: ignore[assignment]  # set below
+    value: Any = None
 
-    def __repr__(self) -> str:
-        return f"Parameter({self.name!r}, {self.type_}, {self.value!r})"
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Parameter):
-            return NotImplemented
-        return (self.name, self.type_, self.value) == (other.name, other.type_, other.value)
-
-    __hash__ = None  # type: ignore[assignment]  # values may be lists
+    def __post_init__(self) -> None:
+        if self.type_ is None:
+            self.type_ = ParameterKind.from_parameter_value(self.value)
+        if not self.type_.check(self.value):
+            raise ValueError(f"parameter {self.name!r}: {self.value!r:.80} is not of type {self.type_.name}")
 
     def get_parameter_value(self) -> ParameterValue:
         """The value as a message."""

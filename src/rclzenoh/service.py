@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import count
 from typing import Any
 
@@ -18,7 +19,7 @@ from rclzenoh.keys import EntityKind
 from rclzenoh.mailbox import Receiver
 from rclzenoh.node_base import NodeBase
 from rclzenoh.qos import QoSProfile
-from rclzenoh.task import Future, start
+from rclzenoh.task import Future, call
 
 _PATIENT_SERVICE = "/_action/get_result"
 _ENDLESS_S = 1e9
@@ -43,7 +44,6 @@ class Service(Endpoint, Receiver):
         self.srv_type = srv_type
         self.callback = callback
         self._open: set[zenoh.Query] = set()
-        self._is_destroyed = False
         handler = zenoh.handlers.Callback(self.deliver, indirect=False)
         # It is declared complete because clients of rmw_zenoh_cpp ask only complete queryables.
         self.announce(self.session.declare_queryable(self.key, handler, complete=True))
@@ -57,10 +57,13 @@ class Service(Endpoint, Receiver):
             request = deserialize(payload, self.srv_type.Request)
         except ValueError as error:
             self.complain(error)
-            _refuse(item, str(error))
+            # Clients log the error. If the client has ended, or the session is being closed, it cannot be sent.
+            with suppress(zenoh.ZError):
+                item.reply_err(str(error))
+            item.drop()  # type: ignore[no-untyped-call]
             return
         self._open.add(item)
-        start(self.mailbox, self._serve(item, attachment, request))
+        call(self.mailbox, self._serve, item, attachment, request)
 
     async def _serve(self, query: zenoh.Query, received: Attachment, request: Message) -> None:
         try:
@@ -71,39 +74,24 @@ class Service(Endpoint, Receiver):
                 raise TypeError(
                     f"{self.service_name}: the callback must return {self.srv_type.TYPE}.Response, got {response!r:.80}"
                 )
-            self._reply(query, received, response)
+            payload = serialize(response)
+            attachment = Attachment(received.sequence, time.time_ns(), received.gid).pack()
+            if self.declared is not None:
+                try:
+                    query.reply(self.key, payload, attachment=attachment)
+                except zenoh.ZError as error:
+                    self.complain(f"a response could not be sent, the client may be gone: {error}")
         finally:
             # The query is dropped, because otherwise it would stay open at the client until its timeout.
             self._open.discard(query)
             query.drop()  # type: ignore[no-untyped-call]
 
-    def _reply(self, query: zenoh.Query, received: Attachment, response: Message) -> None:
-        attachment = Attachment(received.sequence, time.time_ns(), received.gid).pack()
-        if self._is_destroyed:
-            return
-        try:
-            query.reply(self.key, serialize(response), attachment=attachment)
-        except zenoh.ZError as error:
-            self.complain(f"a response could not be sent, the client may be gone: {error}")
-
     def destroy(self) -> None:
         """Withdraw the service; requests without an answer get none. See `Node.destroy_service`."""
-        # This is set first, because the thread that spins may be about to answer a request.
-        self._is_destroyed = True
         super().destroy()
         for query in [*self.take_all(), *self._open]:
             query.drop()
         self._open.clear()
-
-
-def _refuse(query: zenoh.Query, reason: str) -> None:
-    """Answer with an error, which clients log, and close the query."""
-    try:
-        query.reply_err(reason)
-    except zenoh.ZError:
-        return  # The client has ended, or the session is being closed.
-    finally:
-        query.drop()  # type: ignore[no-untyped-call]
 
 
 class Client(Endpoint, Receiver):
@@ -118,7 +106,7 @@ class Client(Endpoint, Receiver):
         self._pending: dict[int, tuple[Future, Callable[[Any], Any]]] = {}
         self._numbers = count(1)
         # As in rmw_zenoh_cpp, every complete queryable of this key is asked, and Zenoh must not merge or drop replies.
-        self._querier: Any = self.session.declare_querier(
+        querier = self.session.declare_querier(
             self.key,
             target=zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
@@ -126,18 +114,17 @@ class Client(Endpoint, Receiver):
         )
         # Zenoh knows whether a querier has a queryable, so the graph need not be asked for services of all nodes.
         handler = zenoh.handlers.Callback(node.context.graph.note_change, indirect=False)
-        self._querier.declare_matching_listener(handler)
+        querier.declare_matching_listener(handler)
         self._was_asked = False
-        self.announce(self._querier)
+        self.announce(querier)
 
     def service_is_ready(self) -> bool:
         """Whether a node offers the service."""
-        matching = self._querier is not None and self._querier.matching_status.matching
-        if not (matching or self._was_asked):
+        querier = self.declared
+        if querier is not None and not (self._was_asked or querier.matching_status.matching):
             self._was_asked = True
             self.node.context.graph.catch_up()
-            return self.service_is_ready()
-        return bool(matching)
+        return querier is not None and bool(querier.matching_status.matching)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until a node offers the service, for at most ``timeout_sec``; return whether one does.
@@ -156,7 +143,7 @@ class Client(Endpoint, Receiver):
             raise TypeError(f"{self.service_name}: expected {self.srv_type.TYPE}.Request, got {type(request).__name__}")
         payload, future, sequence = serialize(request), Future(), next(self._numbers)
         # Another thread may destroy the client meanwhile.
-        if (querier := self._querier) is None:
+        if (querier := self.declared) is None:
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")
         # The future is noted before the request is sent, because the thread that spins may get the response at once.
         self._pending[sequence] = future, convert
@@ -190,13 +177,10 @@ class Client(Endpoint, Receiver):
             self.complain("unexpected response; there may be more than one server of this name")
             return
         future, convert = self._pending.pop(attachment.sequence)
-        future.call_back_through(self.mailbox)
-        if not future.cancelled():
-            future.set_result(convert(response))
+        future.set_result(convert(response))
 
     def destroy(self) -> None:
         """Withdraw the client; pending futures stay pending. See `Node.destroy_client`."""
-        self._querier = None
         super().destroy()
         self._pending.clear()
         self.take_all()

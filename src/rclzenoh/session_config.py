@@ -32,16 +32,17 @@ PROTECTED = "tls/"
 """Beginning of the endpoints whose router rejects processes without a key."""
 _TLS = "transport/link/tls"
 _SETTINGS = {
-    "scouting/multicast/enabled": False,
+    "scouting/multicast/enabled": "false",
     # With shared memory, no session would open where /dev/shm is missing or full; rmw_zenoh_cpp has none, either.
-    "transport/shared_memory/enabled": False,
+    "transport/shared_memory/enabled": "false",
     # All subscribers of rmw_zenoh_cpp are advanced ones, which order samples by the time stamps of the session.
-    "timestamping/enabled": True,
-    "queries_default_timeout": 600_000,
+    "timestamping/enabled": "true",
+    "queries_default_timeout": "600000",
     # A silent connection is closed after this time [ms]. On a busy machine, a router with 64 sessions takes longer than
     # the default of 10 s. A machine that vanishes without closing its connections is noticed this late.
-    "transport/link/tx/lease": 60_000,
+    "transport/link/tx/lease": "60000",
 }
+"""Values in JSON by their keys, as in ``ZENOH_CONFIG_OVERRIDE``."""
 
 
 class Key(Protocol):
@@ -58,32 +59,33 @@ class Key(Protocol):
 
 def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
     """Configuration of a client of a router, regardless of the environment; a router at ``tls/...`` needs the key."""
-    config = zenoh.Config()
-    _apply(config, {**_make_client_settings(endpoint, key), **_SETTINGS}, "endpoint")
-    _check_key(config)
-    return config
+    return _configure(zenoh.Config(), {**_make_client_settings(endpoint, key), **_SETTINGS}, "endpoint")
+
+
+def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
+    """Configuration of a router that listens on one endpoint; at ``tls/...`` it rejects processes without the key."""
+    settings = {"mode": '"router"', "listen/endpoints": json.dumps([endpoint]), **_SETTINGS}
+    return _configure(zenoh.Config(), {**settings, **_make_tls_settings(endpoint, key, "listen")}, "listen endpoint")
 
 
 def environment_config() -> zenoh.Config:
     """Configuration that the environment asks for; by default, that of a client of the router on this host."""
-    path = os.environ.get(CONFIG_FILE_VARIABLE)
-    if path:
+    config, settings = zenoh.Config(), {**_SETTINGS}
+    if path := os.environ.get(CONFIG_FILE_VARIABLE):
         try:
-            config = zenoh.Config.from_file(path)
+            config, settings = zenoh.Config.from_file(path), {}
         except zenoh.ZError as error:
             raise ConfigurationError(
                 f"{CONFIG_FILE_VARIABLE}: {path} is no Zenoh configuration: {describe(error)}"
             ) from error
     else:
-        config = zenoh.Config()
-        _apply(config, {"mode": "client", "connect/endpoints": [DEFAULT_ENDPOINT], **_SETTINGS}, "default")
+        settings |= {"mode": '"client"', "connect/endpoints": json.dumps([DEFAULT_ENDPOINT])}
     for override in filter(str.strip, os.environ.get(OVERRIDE_VARIABLE, "").split(";")):
         key, separator, value = override.partition("=")
         if not separator:
             raise ConfigurationError(f"{OVERRIDE_VARIABLE}: {override.strip()!r}: expected key/path=json5")
-        _insert(config, key.strip(), value.strip(), OVERRIDE_VARIABLE)
-    _check_key(config)
-    return config
+        settings[key.strip()] = value.strip()
+    return _configure(config, settings, OVERRIDE_VARIABLE)
 
 
 def connect_endpoint() -> str | None:
@@ -108,17 +110,7 @@ def is_protected() -> bool:
 
 def client_override(endpoint: str, key: Key | None = None) -> str:
     """Value of ``ZENOH_CONFIG_OVERRIDE`` that has the effect of `client_config`; it names files and holds no secret."""
-    return ";".join(f"{name}={json.dumps(value)}" for name, value in _make_client_settings(endpoint, key).items())
-
-
-def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
-    """Configuration of a router that listens on one endpoint; at ``tls/...`` it rejects processes without the key."""
-    config = zenoh.Config()
-    _apply(config, {"mode": "router", "listen/endpoints": [endpoint], **_SETTINGS}, "listen endpoint")
-    if endpoint.startswith(PROTECTED) and key is not None:
-        _apply(config, _make_tls_settings(key, "listen"), "key")
-        _check_key(config)
-    return config
+    return ";".join(f"{name}={value}" for name, value in _make_client_settings(endpoint, key).items())
 
 
 def describe(error: zenoh.ZError) -> str:
@@ -126,29 +118,34 @@ def describe(error: zenoh.ZError) -> str:
     return re.sub(r'^\w+\([^"]*"', "", re.split(r' at /| \(os error|", location: |"\)', str(error))[0])
 
 
-def _make_client_settings(endpoint: str, key: Key | None) -> Mapping[str, object]:
+def _make_client_settings(endpoint: str, key: Key | None) -> dict[str, str]:
     # `listen/endpoints` is set, because a configuration file, as that of rmw_zenoh_cpp, may let clients listen, and
     # they would listen even without a key.
-    settings: dict[str, object] = {"mode": "client", "connect/endpoints": [endpoint], "listen/endpoints": []}
+    settings = {"mode": '"client"', "connect/endpoints": json.dumps([endpoint]), "listen/endpoints": "[]"}
+    return {**settings, **_make_tls_settings(endpoint, key, "connect")}
+
+
+def _make_tls_settings(endpoint: str, key: Key | None, side: Literal["connect", "listen"]) -> dict[str, str]:
     if key is None or not endpoint.startswith(PROTECTED):
-        return settings
-    return {**settings, **_make_tls_settings(key, "connect")}
-
-
-def _make_tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[str, object]:
+        return {}
     return {
-        f"{_TLS}/root_ca_certificate": str(key.certificate),
-        f"{_TLS}/{side}_private_key": str(key.private_key),
-        f"{_TLS}/{side}_certificate": str(key.certificate),
-        f"{_TLS}/enable_mtls": True,
+        f"{_TLS}/root_ca_certificate": json.dumps(str(key.certificate)),
+        f"{_TLS}/{side}_private_key": json.dumps(str(key.private_key)),
+        f"{_TLS}/{side}_certificate": json.dumps(str(key.certificate)),
+        f"{_TLS}/enable_mtls": "true",
         # Names are not verified, because the address of a router in a container is not known when the certificate is
         # made.
-        f"{_TLS}/verify_name_on_connect": False,
+        f"{_TLS}/verify_name_on_connect": "false",
     }
 
 
-def _check_key(config: zenoh.Config) -> None:
-    """Refuse a key that cannot be read, because Zenoh's own error would only say that it cannot connect."""
+def _configure(config: zenoh.Config, settings: Mapping[str, str], where: str) -> zenoh.Config:
+    """Set values in JSON5, and refuse a key that cannot be read, for which Zenoh's error is that it cannot connect."""
+    for key, value in settings.items():
+        try:
+            config.insert_json5(key, value)
+        except zenoh.ZError as error:
+            raise ConfigurationError(f"{where}: {key} cannot be {value}: {describe(error)}") from error
     sided = [f"{side}_{name}" for name in ("private_key", "certificate") for side in ("connect", "listen")]
     for name in (*sided, "root_ca_certificate"):
         if path := json.loads(config.get_json(f"{_TLS}/{name}")):
@@ -156,24 +153,13 @@ def _check_key(config: zenoh.Config) -> None:
                 Path(path).read_bytes()
             except OSError as error:
                 raise ConfigurationError(f"the key of the run cannot be read: {path}: {error.strerror}") from error
+    return config
 
 
 def _read_endpoints(config: zenoh.Config, side: str) -> Sequence[str] | None:
     """Endpoints that sessions of any mode connect to or listen on; None if there is no such list."""
     endpoints = json.loads(config.get_json(f"{side}/endpoints"))
     return endpoints if isinstance(endpoints, list) else None
-
-
-def _apply(config: zenoh.Config, settings: Mapping[str, object], where: str) -> None:
-    for key, value in settings.items():
-        _insert(config, key, json.dumps(value), where)
-
-
-def _insert(config: zenoh.Config, key: str, value: str, where: str) -> None:
-    try:
-        config.insert_json5(key, value)
-    except zenoh.ZError as error:
-        raise ConfigurationError(f"{where}: {key} cannot be {value}: {describe(error)}") from error
 
 
 def domain_of_environment() -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import threading
 import time
 from collections.abc import Callable
@@ -41,8 +40,7 @@ class Publisher(Endpoint):
         self._sequence = 0
         # Genuine subscribers drop samples that arrive out of order, so one lock covers numbering and sending.
         self._lock = threading.Lock()
-        self._publisher: Any = _declare(self)
-        self.announce(self._publisher)
+        self.announce(_declare(self))
 
     def publish(self, msg: Message | bytes) -> None:
         """Publish a message, or its CDR bytes."""
@@ -53,24 +51,18 @@ class Publisher(Endpoint):
         else:
             raise TypeError(f"{self.topic_name}: expected {self.msg_type.TYPE} or bytes, got {type(msg).__name__}")
         with self._lock:
-            if self._publisher is None:
+            if self.declared is None:
                 raise InvalidHandle(f"{self.topic_name}: the publisher was destroyed")
             self._sequence += 1
             attachment = Attachment(self._sequence, time.time_ns(), self.gid).pack()
             try:
-                self._publisher.put(data, attachment=attachment)
+                self.declared.put(data, attachment=attachment)
             except zenoh.ZError as error:
                 raise self.invalid(error) from error
 
     def get_subscription_count(self) -> int:
         """Number of subscriptions to the topic in the whole graph; asking again costs a microsecond or two."""
         return self.node.context.graph.count(EntityKind.SUBSCRIPTION, self.name, self.type)
-
-    def destroy(self) -> None:
-        """Withdraw the publisher; see `Node.destroy_publisher`."""
-        with self._lock:
-            self._publisher = None
-        super().destroy()
 
 
 def _declare(endpoint: Endpoint) -> Any:
@@ -121,8 +113,6 @@ class Subscription(Endpoint, Receiver):
         self.msg_type = msg_type
         self.raw = raw
         self.callback = callback
-        # As in rclpy, a callback whose second argument is optional gets the message alone.
-        self._wants_info = _takes(callback, 2) and not _takes(callback, 1)
         # `handle` may be called with earlier messages before `_declare` returns, so it must not use anything set below.
         self.announce(self._declare())
 
@@ -144,32 +134,15 @@ class Subscription(Endpoint, Receiver):
         """Decode a sample and call back."""
         try:
             self.check_key(item.encoding)
-            attachment = unpack(item.attachment)
+            unpack(item.attachment)
             data = item.payload.to_bytes()
             message = data if self.raw else deserialize(data, self.msg_type)
         except ValueError as error:
             self.complain(error)
             return
-        if not self._wants_info:
-            call(self.mailbox, self.callback, message)
-            return
-        info = {
-            "source_timestamp": attachment.source_timestamp,
-            "received_timestamp": time.time_ns(),
-            "publication_sequence_number": attachment.sequence,
-            "reception_sequence_number": None,
-        }
-        call(self.mailbox, self.callback, message, info)
+        call(self.mailbox, self.callback, message)
 
     def destroy(self) -> None:
         """Withdraw the subscription; see `Node.destroy_subscription`."""
         super().destroy()
         self.take_all()
-
-
-def _takes(callback: Callable[..., Any], count: int) -> bool:
-    try:
-        inspect.signature(callback).bind(*range(count))
-    except TypeError:
-        return False
-    return True

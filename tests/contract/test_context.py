@@ -34,12 +34,3 @@ def test_a_given_domain_wins_over_the_environment(environment):
         assert context.get_domain_id() == 77
     finally:
         context.shutdown()
-
-
-def test_callbacks_hear_of_the_shutdown_once(environment):
-    context, calls = ros.Context(), []
-    context.init()
-    context.on_shutdown(lambda: calls.append(1))
-    context.shutdown()
-    context.try_shutdown()
-    assert calls == [1]

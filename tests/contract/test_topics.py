@@ -104,17 +104,6 @@ def test_a_full_subscription_drops_its_oldest_messages(rig):
     assert heard == ["17", "18", "19"]
 
 
-def test_a_callback_with_two_arguments_learns_when_the_message_was_sent(rig):
-    node = rig.node("node")
-    infos = []
-    node.create_subscription(String, "t", lambda _message, info: infos.append(info), 10)
-    before = time.time_ns()
-    node.create_publisher(String, "t", 10).publish(String())
-    assert rig.spin(lambda: infos)
-    assert before <= infos[0]["source_timestamp"] <= infos[0]["received_timestamp"]
-    assert infos[0]["publication_sequence_number"] == 1
-
-
 def test_destroyed_endpoints_leave_the_graph_and_are_silent(rig):
     node, other = rig.node("node"), rig.node("other")
     heard = []

@@ -101,7 +101,7 @@ def start_simulation(
 @contextmanager
 def discovery_server() -> Iterator[str]:
     """The router of a run on Fast DDS, in a process of its own."""
-    words = [sys.executable, "-m", "throwcollect.ros.router", "--listen", "udp/127.0.0.1:0"]
+    words = [sys.executable, "-m", "throwcollect", "router", "--listen", "udp/127.0.0.1:0"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         listening, _, endpoint = process.stdout.readline().strip().rpartition(" ")

@@ -61,7 +61,11 @@ def endpoints(robot: Robot, kind: EntityKind) -> list[Token]:
         pytest.skip("rclpy does not show the tokens")
     namespace = f"/{robot.name}"
     tokens = robot.node.context.graph.tokens(kind)
-    return [token for token in tokens if token.namespace == namespace or token.namespace.startswith(f"{namespace}/")]
+    return [
+        token
+        for token in tokens
+        if token.node_namespace == namespace or token.node_namespace.startswith(f"{namespace}/")
+    ]
 
 
 def mutate(data: bytes, chance: random.Random) -> bytes:
@@ -109,8 +113,8 @@ def test_a_simulation_survives_garbage_on_every_key(running: tuple[Command, Robo
         f"/{OWN}/{ARM}/follow_joint_trajectory/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")
     }
     for token in topics:
-        key = data_key(domain, token.name, token.ros_type, token.type_hash)
-        for number, (payload, attachment) in enumerate(hostile(token.ros_type, sample_of(token.ros_type), chance)):
+        key = data_key(domain, token.name, token.topic_type, token.topic_type_hash)
+        for number, (payload, attachment) in enumerate(hostile(token.topic_type, sample_of(token.topic_type), chance)):
             session.put(key, payload, attachment=attachment)
             if number % AT_ONCE == 0:
                 robot.state()
@@ -118,7 +122,8 @@ def test_a_simulation_survives_garbage_on_every_key(running: tuple[Command, Robo
         robot.reset()
     unanswered: set[int] = set()
     for token in services:
-        key, request = data_key(domain, token.name, token.ros_type, token.type_hash), f"{token.ros_type}_Request"
+        key = data_key(domain, token.name, token.topic_type, token.topic_type_hash)
+        request = f"{token.topic_type}_Request"
         for payload, attachment in hostile(request, sample_of(request), chance):
             if any(part in token.name for part in CONSEQUENTIAL) and is_correct(payload, request):
                 continue

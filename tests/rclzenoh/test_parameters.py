@@ -1,6 +1,7 @@
 """Uses of parameters that the embedded backend allows and rclpy does not."""
 
-from rclzenoh.api import Parameter, ParameterDescriptor
+from rclzenoh.interfaces.msg import ParameterDescriptor
+from rclzenoh.parameter import Parameter
 
 
 def test_a_descriptor_can_be_used_for_several_parameters(rig):

@@ -13,7 +13,7 @@ String = get_message("std_msgs/msg/String")
 
 
 def test_nodes_survive_a_router_that_dies_and_comes_back(rig, monkeypatch):
-    router = start_python("-m", "throwcollect.ros.router", "--listen", "tcp/127.0.0.1:0")
+    router = start_python("-m", "throwcollect", "router", "--listen", "tcp/127.0.0.1:0")
     endpoint = router.stdout.readline().split()[-1]
     monkeypatch.setenv(OVERRIDE_VARIABLE, f'connect/endpoints=["{endpoint}"]')
     talker, listener = rig.node("talker"), rig.node("listener")
@@ -25,7 +25,7 @@ def test_nodes_survive_a_router_that_dies_and_comes_back(rig, monkeypatch):
     router.communicate()
     assert rig.spin(lambda: publisher.get_subscription_count() == 0)
     publisher.publish(String(data="lost"))
-    router = start_python("-m", "throwcollect.ros.router", "--listen", endpoint)
+    router = start_python("-m", "throwcollect", "router", "--listen", endpoint)
     try:
         assert rig.spin(lambda: publisher.get_subscription_count() == 1)
         publisher.publish(String(data="back"))

@@ -50,7 +50,7 @@ def test_a_sample_for_another_key_is_ignored(rig, durability):
     listener.create_subscription(String, "t", lambda message: heard.append(message.data), qos)
     publisher, other = talker.create_publisher(String, "t", qos), talker.create_publisher(String, "other", qos)
     assert rig.spin(lambda: publisher.get_subscription_count() == 1)
-    publisher._publisher.put(serialize(String(data="stray")), attachment=VALID, encoding=other.encoding)
+    publisher.declared.put(serialize(String(data="stray")), attachment=VALID, encoding=other.encoding)
     publisher.publish(String(data="own"))
     assert rig.spin(lambda: "own" in heard)
     assert heard == ["own"]

@@ -11,10 +11,10 @@ import pytest
 
 from rclzenoh import interfaces
 from rclzenoh.interfaces import type_hash
-from rclzenoh.interfaces.catalog import DEFINITIONS
 from rclzenoh.interfaces.typed_names import ACTIONS, MESSAGES, SERVICES
 
 ROOT = Path(__file__).parents[2]
+DEFINITIONS = Path(interfaces.__file__).parent / "definitions"
 BUILT = ("control_msgs", "controller_manager_msgs", "simulation_interfaces", "tf2_msgs")
 NAME = re.compile(r"""["']([a-z0-9_]+/(?:msg|srv|action)/[A-Z]\w+)["']""")
 

@@ -2,39 +2,22 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from typing import TypeVar
 
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus
 from rclzenoh.interfaces.srv import CancelGoal
 from rclzenoh.time import Time
 
-_ACCEPTED, _EXECUTING = GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING
-_CANCELING, _SUCCEEDED = GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_SUCCEEDED
-_CANCELED, _ABORTED = GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED
+ACCEPTED, EXECUTING, CANCELING = GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_CANCELING
+SUCCEEDED, CANCELED = GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_CANCELED
+ABORTED = GoalStatus.STATUS_ABORTED
 
-
-class GoalEvent(Enum):
-    """An event that may change the state of a goal."""
-
-    EXECUTE = "executed"
-    CANCEL = "cancelled by request"
-    SUCCEED = "reached"
-    ABORT = "aborted"
-    CANCELED = "finished as cancelled"
-
-
-_MOVES = {
-    (_ACCEPTED, GoalEvent.EXECUTE): _EXECUTING,
-    (_ACCEPTED, GoalEvent.CANCEL): _CANCELING,
-    (_EXECUTING, GoalEvent.CANCEL): _CANCELING,
-    (_EXECUTING, GoalEvent.SUCCEED): _SUCCEEDED,
-    (_EXECUTING, GoalEvent.ABORT): _ABORTED,
-    (_CANCELING, GoalEvent.SUCCEED): _SUCCEEDED,
-    (_CANCELING, GoalEvent.ABORT): _ABORTED,
-    (_CANCELING, GoalEvent.CANCELED): _CANCELED,
+_NEXT = {
+    ACCEPTED: (EXECUTING, CANCELING),
+    EXECUTING: (CANCELING, SUCCEEDED, ABORTED),
+    CANCELING: (SUCCEEDED, ABORTED, CANCELED),
 }
-"""The state machine of rcl_action (Jazzy)."""
+"""States that follow each state in the state machine of rcl_action (Jazzy)."""
 
 _NAMES = ("unknown", "accepted", "executing", "canceling", "succeeded", "canceled", "aborted")
 
@@ -50,24 +33,24 @@ class TrackedGoal:
 
     def __init__(self, info: GoalInfo) -> None:
         self.info = info
-        self.status: int = _ACCEPTED
+        self.status: int = ACCEPTED
         self.ended_ns: int | None = None
 
     @property
     def is_active(self) -> bool:
         """Whether the goal has not ended."""
-        return self.status in (_ACCEPTED, _EXECUTING, _CANCELING)
+        return self.status in _NEXT
 
-    def can(self, event: GoalEvent) -> bool:
-        """Whether an event is possible in the present state."""
-        return (self.status, event) in _MOVES
+    def can_become(self, status: int) -> bool:
+        """Whether a state may follow the present one."""
+        return status in _NEXT.get(self.status, ())
 
-    def advance(self, event: GoalEvent, now_ns: int) -> None:
+    def become(self, status: int, now_ns: int) -> None:
         """Change the state."""
-        if not self.can(event):
+        if not self.can_become(status):
             key = key_of(self.info.goal_id).hex()
-            raise RuntimeError(f"goal {key} is {_NAMES[self.status]} and cannot be {event.value}")
-        self.status = _MOVES[self.status, event]
+            raise RuntimeError(f"goal {key} is {_NAMES[self.status]} and cannot become {_NAMES[status]}")
+        self.status = status
         if not self.is_active:
             self.ended_ns = now_ns
 
@@ -95,14 +78,14 @@ class GoalTable(dict[bytes, AGoal]):
         if has_key and not stamp_ns:
             if key not in self:
                 return CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, []
-            if not self[key].can(GoalEvent.CANCEL):
+            if not self[key].can_become(CANCELING):
                 return CancelGoal.Response.ERROR_GOAL_TERMINATED, []
             return CancelGoal.Response.ERROR_NONE, [self[key]]
         everything = not has_key and not stamp_ns
         selected = [
             goal
             for other, goal in self.items()
-            if goal.can(GoalEvent.CANCEL)
+            if goal.can_become(CANCELING)
             and (everything or other == key or Time.from_msg(goal.info.stamp).nanoseconds <= stamp_ns)
         ]
         return CancelGoal.Response.ERROR_NONE, selected

@@ -7,11 +7,21 @@ from enum import Enum
 from functools import partial
 from typing import Any
 
-from rclzenoh.action.goals import GoalEvent, GoalTable, TrackedGoal, key_of
+from rclzenoh.action.goals import (
+    ABORTED,
+    ACCEPTED,
+    CANCELED,
+    CANCELING,
+    EXECUTING,
+    SUCCEEDED,
+    GoalTable,
+    TrackedGoal,
+    key_of,
+)
 from rclzenoh.interfaces import Action, AnyMessage, Message
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray
 from rclzenoh.interfaces.srv import CancelGoal
-from rclzenoh.node_endpoints import NodeEndpoints
+from rclzenoh.node import Node
 from rclzenoh.qos import QoSProfile, qos_profile_action_status_default
 from rclzenoh.task import Future, submit
 from rclzenoh.time import S_TO_NS
@@ -50,13 +60,13 @@ class ServerGoalHandle(TrackedGoal):
     @property
     def is_cancel_requested(self) -> bool:
         """Whether the goal is to be cancelled."""
-        return self.status == GoalStatus.STATUS_CANCELING
+        return self.status == CANCELING
 
     def execute(self) -> None:
         """Let the executor call the execute callback."""
         if not self.is_cancel_requested:
-            self._server.change(self, GoalEvent.EXECUTE)
-        self._server.schedule(self)
+            self._server.change(self, EXECUTING)
+        submit(self._server.node.mailbox, partial(self._server.carry_out, self))
 
     def publish_feedback(self, feedback: Message) -> None:
         """Publish feedback."""
@@ -64,15 +74,15 @@ class ServerGoalHandle(TrackedGoal):
 
     def succeed(self) -> None:
         """End the goal as reached; the execute callback returns the result."""
-        self._server.change(self, GoalEvent.SUCCEED)
+        self._server.change(self, SUCCEEDED)
 
     def abort(self) -> None:
         """End the goal as failed."""
-        self._server.change(self, GoalEvent.ABORT)
+        self._server.change(self, ABORTED)
 
     def canceled(self) -> None:
         """End the goal as cancelled."""
-        self._server.change(self, GoalEvent.CANCELED)
+        self._server.change(self, CANCELED)
 
 
 class ActionServer:
@@ -93,7 +103,7 @@ class ActionServer:
 
     def __init__(
         self,
-        node: NodeEndpoints,
+        node: Node,
         action_type: type[Action],
         action_name: str,
         execute_callback: Callable[[ServerGoalHandle], Any],
@@ -103,7 +113,7 @@ class ActionServer:
         cancel_callback: Callable[[ServerGoalHandle], Any] = lambda _: CancelResponse.REJECT,
         result_timeout: float = _RESULT_TIMEOUT_S,
     ) -> None:
-        self._node = node
+        self.node = node
         self.action_type = action_type
         self._execute_callback = execute_callback
         self._goal_callback = goal_callback
@@ -123,30 +133,22 @@ class ActionServer:
     def destroy(self) -> None:
         """Withdraw the server; clients get no more results."""
         for service in self._services:
-            self._node.destroy_service(service)
-        self._node.destroy_publisher(self._feedback)
-        self._node.destroy_publisher(self._status)
+            self.node.destroy_service(service)
+        self.node.destroy_publisher(self._feedback)
+        self.node.destroy_publisher(self._status)
         self._goals.clear()
 
-    def change(self, handle: ServerGoalHandle, event: GoalEvent) -> None:
+    def change(self, handle: ServerGoalHandle, status: int) -> None:
         """Change a goal's state, and publish it."""
-        handle.advance(event, self._read_clock_ns())
+        handle.become(status, self._read_clock_ns())
         self._publish_status()
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
         """Publish feedback of a goal."""
         self._feedback.publish(self.action_type.Impl.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
 
-    def schedule(self, handle: ServerGoalHandle) -> None:
-        """Let the executor carry a goal out."""
-        submit(self._node.mailbox, partial(self._execute, handle))
-
-    def _set_result(self, handle: ServerGoalHandle, result: Message) -> None:
-        """Set the result of a goal that has ended, and answer those who wait for it."""
-        response = self.action_type.Impl.GetResultService.Response(status=handle.status, result=result)
-        handle.result_future.set_result(response)
-
-    async def _execute(self, handle: ServerGoalHandle) -> None:
+    async def carry_out(self, handle: ServerGoalHandle) -> None:
+        """Call the execute callback of a goal, and answer those who wait for its result."""
         try:
             result = await _await_outcome(self._execute_callback(handle))
         except GeneratorExit:
@@ -159,18 +161,22 @@ class ActionServer:
         self._abort_if_active(handle, "returned")
         self._set_result(handle, self.action_type.Result() if result is None else result)
 
+    def _set_result(self, handle: ServerGoalHandle, result: Message) -> None:
+        response = self.action_type.Impl.GetResultService.Response(status=handle.status, result=result)
+        handle.result_future.set_result(response)
+
     def _abort_if_active(self, handle: ServerGoalHandle, how: str) -> None:
         if handle.is_active:
             self._logger.warning(
                 f"the execute callback {how} without ending goal {key_of(handle.goal_id).hex()}: aborted"
             )
             # The state machine has no transition from accepted to aborted, so the goal is executed in between.
-            if handle.status == GoalStatus.STATUS_ACCEPTED:
-                self.change(handle, GoalEvent.EXECUTE)
+            if handle.status == ACCEPTED:
+                self.change(handle, EXECUTING)
             handle.abort()
 
     async def _on_goal(self, request: AnyMessage, response: AnyMessage) -> Message:
-        now = self._node.get_clock().now()
+        now = self.node.get_clock().now()
         self._goals.expire(now.nanoseconds)
         key = key_of(request.goal_id)
         answer = None
@@ -182,17 +188,13 @@ class ActionServer:
             response.stamp = now.to_msg()
             info = GoalInfo(goal_id=request.goal_id, stamp=response.stamp)
             self._goals[key] = ServerGoalHandle(self, info, request.goal)
-            self._begin_after_response(self._goals[key])
+            # It begins in another task, so that the client gets the response before the goal's first state.
+            submit(self.node.mailbox, partial(self._begin, self._goals[key]))
         return response
 
-    def _begin_after_response(self, handle: ServerGoalHandle) -> None:
-        """Begin in another task, so that the client gets the response before the goal's first state."""
-
-        async def begin() -> None:
-            self._publish_status()
-            await _await_outcome(self._handle_accepted_callback(handle))
-
-        submit(self._node.mailbox, begin)
+    async def _begin(self, handle: ServerGoalHandle) -> None:
+        self._publish_status()
+        await _await_outcome(self._handle_accepted_callback(handle))
 
     async def _on_cancel(self, request: CancelGoal.Request, response: CancelGoal.Response) -> Message:
         self._goals.expire(self._read_clock_ns())
@@ -201,8 +203,8 @@ class ActionServer:
         for handle in handles:
             answer = await _await_outcome(self._cancel_callback(handle))
             # The goal may have ended while the callback was waiting.
-            if answer is CancelResponse.ACCEPT and handle.can(GoalEvent.CANCEL):
-                handle.advance(GoalEvent.CANCEL, self._read_clock_ns())
+            if answer is CancelResponse.ACCEPT and handle.can_become(CANCELING):
+                handle.become(CANCELING, self._read_clock_ns())
                 canceling.append(handle.info)
         if canceling:
             self._publish_status()
@@ -226,7 +228,7 @@ class ActionServer:
         self._status.publish(GoalStatusArray(status_list=status_list))
 
     def _read_clock_ns(self) -> int:
-        return self._node.get_clock().now().nanoseconds
+        return self.node.get_clock().now().nanoseconds
 
 
 async def _await_outcome(value: Any) -> Any:

@@ -40,7 +40,6 @@ _LIBRARIES = (
     "pybullet",
     "mujoco-core",
     "numpy",
-    "rosbags",
     "mcap",
     "zstandard",
     "pyarrow",

@@ -64,6 +64,6 @@ def zenoh_errors() -> Iterator[None]:
         raise UnreachableError(
             str(error),
             evidence=error.reason,
-            hint="start a router: python -m throwcollect.ros.router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "
+            hint="start a router: throwcollect router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "
             f"or name another one in {OVERRIDE_VARIABLE}",
         ) from error

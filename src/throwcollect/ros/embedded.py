@@ -1,12 +1,25 @@
-"""The embedded backend: `rclzenoh`, which needs no installation of ROS 2."""
+"""The embedded backend: `rclzenoh`, which needs no installation of ROS 2, and functions that rclpy lacks."""
+
+# ruff: noqa: F401 - `throwcollect.ros` looks up what is imported here.
 
 from __future__ import annotations
 
 import rclzenoh.context
-from rclzenoh import api
-from rclzenoh.api import *  # noqa: F403
-from rclzenoh.context import Context
+from rclzenoh.action.client import ActionClient, get_action_names_and_types
+from rclzenoh.action.server import ActionServer, CancelResponse, GoalResponse
+from rclzenoh.context import Context, shutdown
+from rclzenoh.exceptions import ExternalShutdownException, NameValidationException
+from rclzenoh.executors import Executor, SingleThreadedExecutor
+from rclzenoh.interfaces import deserialize as deserialize_message
+from rclzenoh.interfaces import get_action, get_message, get_service
+from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclzenoh.node import Node
+from rclzenoh.parameter import Parameter, parameter_value_to_python
+from rclzenoh.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclzenoh.session_config import client_config, is_protected
+from rclzenoh.task import Future
+from rclzenoh.time import Time
+from rclzenoh.topic import Publisher
 from throwcollect.ros.connection import Connection, zenoh_errors
 from throwcollect.ros.middleware import EMBEDDED_RMW
 
@@ -33,5 +46,36 @@ def joins_protected() -> bool:
         return is_protected()
 
 
-__all__ = ["init", "joins_protected"]
-__all__ += api.__all__
+def graph_changes(node: Node) -> int:
+    """Return a number that differs from the last one if anything that was asked about the ROS graph has changed."""
+    return node.context.graph.changes
+
+
+def let_callbacks_wait(_node: Node) -> None:
+    """Let a node go on with other callbacks while one of its coroutines waits; on this backend, all nodes do so."""
+
+
+def provide_time(node: Node) -> None:
+    """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``.
+
+    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``.
+    """
+    node.get_clock().set_ros_time_override(Time())
+
+
+def spin_some(executor: Executor, timeout_sec: float) -> None:
+    """Wait for an input, then call the callbacks of all inputs that have arrived by then, but not of later ones."""
+    executor.spin_once(timeout_sec)
+    last = executor.create_task(_do_nothing)
+    while not last.done():
+        executor.spin_once(timeout_sec=0.0)
+
+
+def stop_waiting(executor: Executor) -> None:
+    """End the wait of `spin_some`, if there is one; for handlers of signals, which run in the thread that spins."""
+    # `wake` is not enough: after it, `spin_once` looks for work and then goes on waiting. A task is work.
+    executor.create_task(_do_nothing)
+
+
+def _do_nothing() -> None:
+    """Do nothing; as a task, this marks a position among the inputs, or ends a wait."""

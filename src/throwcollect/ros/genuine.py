@@ -1,11 +1,10 @@
-"""The backend on genuine rclpy, with any RMW: it has the names of `rclzenoh.api`, and those that `embedded` adds."""
+"""The backend on genuine rclpy, with any RMW: it has the names that `embedded` has."""
 
-# ruff: noqa: F401 - `backend_names` looks up what is imported here.
+# ruff: noqa: F401 - `throwcollect.ros` looks up what is imported here.
 
 from __future__ import annotations
 
 import itertools
-import logging
 import os
 import threading
 import traceback
@@ -23,9 +22,7 @@ from rclpy.action import (
     ActionServer,
     CancelResponse,
     GoalResponse,
-    get_action_client_names_and_types_by_node,
     get_action_names_and_types,
-    get_action_server_names_and_types_by_node,
 )
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
@@ -197,20 +194,16 @@ def _is_of_request(error: BaseException) -> bool:
     return isinstance(error, ValueError) and not any(name.startswith("throwcollect.") for name in modules)
 
 
-def pass_on_log(node: Node, record: logging.LogRecord) -> None:
-    """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
-    # The node's logger would give this line as the place of the record.
-    rclpy_implementation.rclpy_logging_rcutils_log(
-        record.levelno,
-        node.get_logger().name,
-        record.getMessage(),
-        record.funcName,
-        record.pathname,
-        record.lineno,
-    )
-
-
 def provide_time(node: Node) -> None:
-    """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``."""
+    """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``.
+
+    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``.
+    """
     # rclpy's own time source does it like this; there is no public function for it.
     node.get_clock()._set_ros_time_is_active(True)
+    node.add_on_set_parameters_callback(_refuse_simulated_time)
+
+
+def _refuse_simulated_time(parameters: list[Parameter]) -> SetParametersResult:
+    refused = any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters)
+    return SetParametersResult(successful=not refused, reason="use_sim_time: this node does not follow /clock")

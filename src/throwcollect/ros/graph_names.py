@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import itertools
 import os
-from typing import Any
+from typing import Any, Literal
 
 from rclzenoh.exceptions import NameValidationException
 from rclzenoh.names import resolve
 from throwcollect import ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.backend_names import Kind, find_class
+
+Kind = Literal["msg", "srv", "action"]
+"""Kind of an interface, as it stands in full names."""
 
 _DEPTH = 100
-
 
 _numbers = itertools.count()
 
@@ -44,8 +45,9 @@ def full_name(kind: Kind, name: str) -> str:
 
 def find_interface(kind: Kind, name: str) -> Any:
     """Class of a message, service or action that a user names in full, or without its ``kind``."""
+    find: Any = {"msg": ros.get_message, "srv": ros.get_service, "action": ros.get_action}[kind]
     try:
-        return find_class(kind, full_name(kind, name))
+        return find(full_name(kind, name))
     except ValueError as error:
         raise ConfigError(f"{name}: {error}") from error
 

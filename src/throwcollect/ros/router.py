@@ -1,11 +1,10 @@
 """The router of a run: one of Zenoh, as ``ros2 run rmw_zenoh_cpp rmw_zenohd`` is, or a discovery server of Fast DDS.
 
-``python -m throwcollect.ros.router --listen tcp/127.0.0.1:7447`` runs until it gets SIGTERM or SIGINT.
+``throwcollect router --listen tcp/127.0.0.1:7447`` runs one until it gets SIGTERM or SIGINT.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import signal
@@ -14,7 +13,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -25,7 +24,7 @@ from typing import IO
 import zenoh
 
 from rclzenoh.session_config import OPEN, PROTECTED, describe, router_config
-from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.own_process import Heartbeat, die_with_parent, stop_signals
 from throwcollect.ros.connection import zenoh_errors
 from throwcollect.ros.fast_dds import server_profile, write_temporarily
@@ -40,16 +39,13 @@ _STOP_S = 3.0
 _SOON_S = 0.02
 
 
-DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
-"""Reachable from this host alone, at the port that nodes connect to by default."""
-
 _LOOK_S = 0.5
 
 _PORT_ATTEMPTS = 5
 
 
 @contextmanager
-def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[str]:
+def router(listen: str, key: RunKey | None = None) -> Iterator[str]:
     """Run a router in this process; yields the endpoint that nodes connect to. Port 0 takes a free one."""
     session, endpoint = _open(listen, key)
     try:
@@ -97,7 +93,7 @@ def _choose_port(listen: str) -> str:
         raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
 
 
-def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> None:
+def serve(listen: str, key_directory: Path | None) -> None:
     """Run a router until SIGTERM, SIGINT or SIGHUP, after printing one line with its endpoint.
 
     Args:
@@ -130,20 +126,6 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
             with suppress(Empty):
                 stop.get(timeout=_LOOK_S)
                 return
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a router until SIGTERM or SIGINT, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m throwcollect.ros.router", description="Zenoh router")
-    parser.add_argument("--listen", default=DEFAULT_LISTEN, help="endpoint; port 0 takes a free one [%(default)s]")
-    parser.add_argument("--key", type=Path, help="directory of the key for tls/...; made if there is none")
-    try:
-        parsed = parser.parse_args(arguments)
-        serve(parsed.listen, parsed.key)
-    except ThrowcollectError as error:
-        print(error, file=sys.stderr)
-        return error.exit_code
-    return 0
 
 
 @contextmanager
@@ -229,7 +211,3 @@ def _find_program() -> str:
             hint=f"it comes with Fast DDS: {HOW_TO_INSTALL}; or set run.ros to embedded",
         )
     return program
-
-
-if __name__ == "__main__":
-    sys.exit(main())

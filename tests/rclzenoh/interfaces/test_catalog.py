@@ -2,10 +2,12 @@ import re
 from pathlib import Path
 
 import throwcollect
+from rclzenoh import interfaces
 from rclzenoh.interfaces import message_definition, type_hash
-from rclzenoh.interfaces.catalog import DEFINITIONS, structure
+from rclzenoh.interfaces.catalog import structure
 from rclzenoh.interfaces.typed_names import ACTIONS, MESSAGES, SERVICES
 
+DEFINITIONS = Path(interfaces.__file__).parent / "definitions"
 SOURCE = Path(throwcollect.__file__).parent
 TABLE = Path(__file__).with_name("official_hashes.txt")
 HASHES = dict(line.split() for line in TABLE.read_text(encoding="utf-8").splitlines())
@@ -25,7 +27,15 @@ def test_the_hash_of_everything_that_the_sources_name_is_known():
     interface = re.compile(r'"([a-z0-9_]+/(?:msg|srv|action)/[A-Za-z0-9]+)"')
     named = {name for path in SOURCE.rglob("*.py") for name in interface.findall(path.read_text(encoding="utf-8"))}
     assert {"sensor_msgs/msg/JointState", "tf2_msgs/msg/TFMessage"} <= named
-    assert named.union(MESSAGES.values(), SERVICES.values(), ACTIONS.values()) - set(HASHES) == set()
+    assert (
+        named.union(
+            MESSAGES.values(),
+            SERVICES.values(),
+            ACTIONS.values(),
+        )
+        - set(HASHES)
+        == set()
+    )
 
 
 def test_a_definition_lists_dependencies_once_after_lines_of_80_equal_signs():

@@ -1,16 +1,21 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
+from rclzenoh import interfaces
 from rclzenoh.interfaces import deserialize, get_action, get_message, message_class, serialize
-from rclzenoh.interfaces.catalog import _FIELDDEFS, DEFINITIONS, structure
+from rclzenoh.interfaces.catalog import structure
 from rclzenoh.interfaces.message import DTYPES
+from tests.rclzenoh.interfaces.test_stubs import PACKAGING, load_script
 
+DEFINITIONS = Path(interfaces.__file__).parent / "definitions"
 FJT = get_action("control_msgs/action/FollowJointTrajectory")
 OURS = [
-    *(p.relative_to(DEFINITIONS).with_suffix("").as_posix() for p in DEFINITIONS.rglob("*.msg")),
+    *(path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in DEFINITIONS.rglob("*.msg")),
     *(f"{FJT.TYPE}_{part}" for part in ("Goal", "Result", "Feedback", "FeedbackMessage", "SendGoal_Request")),
     "simulation_interfaces/srv/GetEntityState_Response",
     "rcl_interfaces/srv/SetParameters_Request",
@@ -46,9 +51,8 @@ def random_message(name, random, depth=0):
 def store():
     """Rosbags' own store, to which our definitions are added."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    for name in OURS:
-        structure(name)
-    store.register({name: definition for name, definition in _FIELDDEFS.items() if name not in store.fielddefs})
+    ours = load_script(PACKAGING / "interfaces.py").Interfaces().store.fielddefs
+    store.register({name: definition for name, definition in ours.items() if name not in store.fielddefs})
     return store
 
 

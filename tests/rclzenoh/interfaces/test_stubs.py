@@ -23,9 +23,9 @@ def generator():
     return load_script(GENERATOR)
 
 
-def test_the_file_of_jazzy_messages_matches_its_script():
-    script = load_script(PACKAGING / "jazzy_messages.py")
-    assert script.PATH.read_text(encoding="utf-8") == script.jazzy(), "python packaging/jazzy_messages.py writes it"
+def test_the_file_of_interfaces_matches_its_script():
+    script = load_script(PACKAGING / "interfaces.py")
+    assert script.PATH.read_text("utf-8") == script.Interfaces().write(), "python packaging/interfaces.py writes it"
 
 
 def test_the_committed_stubs_match_the_definitions(generator):

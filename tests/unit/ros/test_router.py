@@ -13,7 +13,7 @@ from throwcollect.own_process import HEARTBEAT_VARIABLE
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 
-COMMAND = [sys.executable, "-m", "throwcollect.ros.router", "--listen"]
+COMMAND = [sys.executable, "-m", "throwcollect", "router", "--listen"]
 
 
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGINT])
@@ -47,7 +47,7 @@ def test_a_protected_router_admits_only_clients_with_its_key(environment, rig, m
             monkeypatch.setenv(OVERRIDE_VARIABLE, override)
             with pytest.raises(ThrowcollectError, match="no Zenoh session") as caught:
                 ros.init()
-            assert "python -m throwcollect.ros.router" in caught.value.hint
+            assert "throwcollect router" in caught.value.hint
             assert ".rs" not in caught.value.evidence
 
 

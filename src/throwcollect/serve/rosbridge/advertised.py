@@ -9,8 +9,7 @@ from typing import Any, Literal
 from throwcollect import ros
 from throwcollect.control import GoalStatus
 from throwcollect.errors import ConfigError
-from throwcollect.ros.backend_names import Kind
-from throwcollect.ros.graph_names import absolute_name, find_interface
+from throwcollect.ros.graph_names import Kind, absolute_name, find_interface
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.bridge import FAREWELL_S
 from throwcollect.serve.rosbridge.client import Client

@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -19,20 +18,6 @@ from typing import Any, NamedTuple
 import pytest
 from ruamel.yaml import YAML
 
-from rclzenoh.api import (
-    ActionServer,
-    CancelResponse,
-    Context,
-    DurabilityPolicy,
-    ExternalShutdownException,
-    Future,
-    GoalResponse,
-    IntegerRange,
-    Node,
-    ParameterDescriptor,
-    QoSProfile,
-    SingleThreadedExecutor,
-)
 from rclzenoh.interfaces import get_action, get_message
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.cli.main import main
@@ -41,6 +26,19 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.own_process import stop_signals
 from throwcollect.ros.connection import Connection
+from throwcollect.ros.embedded import (
+    ActionServer,
+    CancelResponse,
+    Context,
+    DurabilityPolicy,
+    Future,
+    GoalResponse,
+    IntegerRange,
+    Node,
+    ParameterDescriptor,
+    QoSProfile,
+    SingleThreadedExecutor,
+)
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
@@ -97,15 +95,10 @@ def endpoint() -> Iterator[str]:
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(Robot(context))
 
-        def spin() -> None:
-            # If the end of the context comes between two messages, `spin` just returns.
-            with suppress(ExternalShutdownException):
-                executor.spin()
-
-        thread = threading.Thread(target=spin)
+        thread = threading.Thread(target=executor.spin)
         thread.start()
         yield endpoint
-        context.request_shutdown()
+        executor.shutdown()
         thread.join()
         context.try_shutdown()
 

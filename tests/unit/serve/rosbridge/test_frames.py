@@ -18,7 +18,7 @@ from tests.rclzenoh.interfaces.test_cdr import random_message
 from tests.unit.serve.rosbridge.conftest import Party
 
 from rclzenoh.interfaces import deserialize, message_class, serialize
-from rclzenoh.interfaces.catalog import _JAZZY, DEFINITIONS
+from rclzenoh.interfaces.catalog import INTERFACES
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.bridge import Sample
@@ -37,11 +37,8 @@ from throwcollect.serve.rosbridge.operations import Fragment, read_operation
 @cache
 def message_names() -> list[str]:
     """Every message that is known, with the requests and responses of services."""
-    files = [path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in DEFINITIONS.rglob("*.*")]
-    services = [f"{name}_{part}" for name in files if "/srv/" in name for part in ("Request", "Response")]
-    parts = ("Goal", "Result", "Feedback", "FeedbackMessage")
-    actions = [f"{name}_{part}" for name in files if "/action/" in name for part in parts]
-    return sorted({*_JAZZY, *(name for name in files if "/msg/" in name), *services, *actions})
+    parts = ("Request", "Response", "Goal", "Result", "Feedback", "FeedbackMessage")
+    return sorted(name for name in INTERFACES if "/msg/" in name or name.rpartition("_")[2] in parts)
 
 
 def content(frame: str | bytes) -> Any:

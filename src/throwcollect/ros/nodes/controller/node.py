@@ -7,12 +7,11 @@ import math
 import time
 
 from throwcollect.control import REPEATED, ControllerState
-from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, pass_on_log
+from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, provide_time
 from throwcollect.ros.msg import ControllerState as ControllerDescription
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
 from throwcollect.ros.nodes.controller.action import ControllerAction, nanoseconds, read_trajectory, state_message
 from throwcollect.ros.nodes.controller.parameters import COMMAND_INTERFACES, ControllerParameterServer, state_interfaces
-from throwcollect.ros.nodes.own_time import make_own_time
 from throwcollect.ros.srv import ListControllers, QueryTrajectoryState
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.live import LiveSimulator
@@ -36,7 +35,7 @@ class ControllerNode(Node):
     def __init__(self, parent: Node, simulation: LiveSimulator, controller: str) -> None:
         limb = simulation.limbs[controller]
         super().__init__(limb.name, namespace=parent.get_namespace(), context=parent.context)
-        make_own_time(self)
+        provide_time(self)
         self.controller = controller
         self._simulation = simulation
         self._limb = limb
@@ -124,7 +123,14 @@ class _LogHandler(logging.Handler):
             if now_s < self._passed_on_s.get(about, -math.inf) + _REPEATED_S:
                 return
             self._passed_on_s[about] = now_s
-        pass_on_log(self._node, record)
+        log, text = self._node.get_logger(), record.getMessage()
+        # rclpy allows one severity for each line that logs.
+        if record.levelno >= logging.ERROR:
+            log.error(text)
+        elif record.levelno >= logging.WARNING:
+            log.warning(text)
+        else:
+            log.info(text)
 
 
 class ControllerManager(Node):
@@ -132,7 +138,7 @@ class ControllerManager(Node):
 
     def __init__(self, parent: Node, simulation: LiveSimulator) -> None:
         super().__init__("controller_manager", namespace=parent.get_namespace(), context=parent.context)
-        make_own_time(self)
+        provide_time(self)
         hz = simulation.config.sim.physics_hz
         self._controllers = [_describe(limb, hz) for limb in simulation.limbs.values()]
         self.create_service(ListControllers, "~/list_controllers", self._list)

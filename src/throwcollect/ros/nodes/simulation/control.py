@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, MemberError, RequestError
@@ -208,14 +208,7 @@ def offer(node: Node, service: Any, name: str, fill: Fill) -> None:
     node.create_service(service, name, answer)
 
 
-class _WithResult(Protocol):
-    result: Result
-
-
-_R = TypeVar("_R", bound=_WithResult)
-
-
-def refusal(response_type: type[_R], error: RequestError) -> _R:
+def refusal(response_type: Any, error: RequestError) -> Any:
     """Make a response, or any other message with a ``result``, that gives the reason of an error.
 
     If the type of the message and all services have a result code of the same name, the code of the type is taken.

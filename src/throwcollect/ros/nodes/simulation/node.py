@@ -29,11 +29,11 @@ from throwcollect.ros import (
     Time,
     get_message,
     graph_changes,
+    provide_time,
 )
 from throwcollect.ros.msg import SetParametersResult, String, UInt8MultiArray
 from throwcollect.ros.nodes import descriptors
 from throwcollect.ros.nodes.controller.node import ControllerManager, ControllerNode
-from throwcollect.ros.nodes.own_time import make_own_time
 from throwcollect.ros.nodes.simulation.control import SimulationControl
 from throwcollect.ros.nodes.simulation.leases import LeaseQueue
 from throwcollect.ros.nodes.simulation.spawning import SpawningServices
@@ -92,10 +92,9 @@ class SimulationNode(Node):
         self._require_own_namespace()
         self._simulation = simulation
         config = simulation.config
-        make_own_time(self)
+        provide_time(self)
         self._description = simulation.channels.robot
         self._publish_latched(simulation.channels)
-        self._declare_description()
         self._declare_parameters(config)
         self._leases = LeaseQueue(simulation)
         self._live = [
@@ -232,22 +231,19 @@ class SimulationNode(Node):
         self._simulation.watch(controller.controller for controller in self._subscribed if controller.wants_states)
 
     def _publish_latched(self, channels: Channels) -> None:
-        self._latched = []
+        """Publish what stays; by a parameter, a client gives viewers another description to draw."""
+        self._latched: dict[str, Publisher] = {}
         for channel, message in channels.encode_latched_messages(0).items():
             publisher = self.create_publisher(get_message(channel.type_name), channel.topic.lstrip("/"), _LATCHED)
             publisher.publish(message)
-            self._latched.append(publisher)
-
-    def _declare_description(self) -> None:
-        """Declare the parameter by which a client gives viewers another description to draw."""
+            self._latched[channel.topic] = publisher
         about = "URDF that viewers draw; only what is seen may differ from that of the configuration."
         self.declare_parameter(DESCRIPTION, self._description, ParameterDescriptor(description=about))
-        (self._described,) = (topic for topic in self._latched if topic.topic_name.endswith(DESCRIPTION))
 
         def show(parameters: list[Parameter]) -> None:
             for parameter in parameters:
                 if parameter.name == DESCRIPTION:
-                    self._described.publish(String(data=parameter.value))
+                    self._latched[f"/{DESCRIPTION}"].publish(String(data=parameter.value))
 
         self.add_post_set_parameters_callback(show)
 
