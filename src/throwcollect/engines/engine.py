@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -20,9 +20,6 @@ from numpy.typing import NDArray
 from throwcollect.engines.body import HERE, BodyLink, BodyModel, LinkInertia, Placement, Vector, turn_of
 
 Quaternion = tuple[float, float, float, float]
-
-Box = tuple[Vector, Vector]
-"""Lowest and highest corner [m]."""
 
 Sample = tuple[float, ...]
 """The world at one instant: positions [rad], velocities [rad/s] and motor torques [Nm] of all moving joints, then
@@ -238,28 +235,18 @@ class Observer:
 
 
 @dataclass(frozen=True)
-class LoadedLink:
-    """A link as an engine has it, with all joints at 0.
+class LoadedRobot:
+    """A robot as an engine has it.
 
     Attributes:
-        name: Its name.
-        mass_kg: Its mass.
-        centre: Its centre of mass in world [m], shape ``(3,)``.
-        inertia: Its inertia about that centre, along the axes of the world [kg m²], shape ``(3, 3)``.
-        shapes: Number of its collision shapes.
-        box: The box around them, along the axes of the world; None without shapes.
-        axis: Direction in world of the joint that moves it; None if none does.
-        range: Lowest and highest position of that joint [rad]; None likewise.
+        shapes: Number of collision shapes of each link, by its name.
+        mass_matrix: Mass matrix of the moving joints, in their order [kg m², kg m or kg], shape ``(n, n)``.
+        tool_m: Origin of the tool's link in world [m].
     """
 
-    name: str
-    mass_kg: float
-    centre: NDArray[np.float64]
-    inertia: NDArray[np.float64]
-    shapes: int
-    box: Box | None
-    axis: NDArray[np.float64] | None
-    range: tuple[float, float] | None
+    shapes: Mapping[str, int]
+    mass_matrix: NDArray[np.float64]
+    tool_m: Vector
 
 
 class Engine(ABC):
@@ -285,11 +272,14 @@ class Engine(ABC):
             ConfigError: If the engine does not take the robot's description, or bodies.
         """
 
-    def describe_robot(self) -> Sequence[LoadedLink] | None:
-        """Describe the robot's links as the engine has them, with all joints at 0, right after `load`.
+    def describe_robot(self, positions: Sequence[float]) -> LoadedRobot | None:  # noqa: ARG002 - for other engines
+        """Describe the robot as the engine has it, right after `load`.
+
+        Args:
+            positions: Those of the moving joints, at which mass matrix and tool are wanted.
 
         Returns:
-            Each link with its joint; None if the engine computes with the values of the scene themselves.
+            The robot; None if the engine computes with the values of the scene themselves.
         """
         return None
 

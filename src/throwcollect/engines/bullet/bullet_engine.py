@@ -13,7 +13,7 @@ from throwcollect.engines.bullet.scenery import (
     Scenery,
     Surface,
     connect,
-    describe_links,
+    describe,
     find_origin,
     load_bodies,
     load_object,
@@ -26,7 +26,7 @@ from throwcollect.engines.bullet.scenery import (
 from throwcollect.engines.engine import (
     BodyState,
     Engine,
-    LoadedLink,
+    LoadedRobot,
     Observer,
     Physics,
     Sample,
@@ -100,9 +100,9 @@ class BulletEngine(Engine):
         self._placed = tuple(part for body in scene.moving_bodies for part in body.start)
         self._tool, self._object, self._scene = scene.tool, scene.object, scene
 
-    def describe_robot(self) -> list[LoadedLink]:
-        """Describe the robot's links as Bullet has them."""
-        return describe_links(self._client, self._scenery.robot)
+    def describe_robot(self, positions: Sequence[float]) -> LoadedRobot:
+        """Describe the robot as Bullet has it."""
+        return describe(self._client, self._scenery, positions)
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""

@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pybullet
-from numpy.typing import NDArray
 
 from throwcollect.engines.body import BodyModel, Vector
 from throwcollect.engines.engine import (
     GROUND,
     BodyState,
-    LoadedLink,
+    LoadedRobot,
     Physics,
     Quaternion,
     Sample,
@@ -120,42 +119,24 @@ def _load_model(
                 raise ConfigError(f"Bullet cannot load the description: {error}") from error
 
 
-def describe_links(client: int, robot: int) -> list[LoadedLink]:
-    """Describe the links of a robot whose joints are at 0 (see `Engine.describe_robot`)."""
-    found = []
-    for link in links(client, robot):
-        mass, _, moments, *_ = pybullet.getDynamicsInfo(robot, link, physicsClientId=client)
-        axis, ends, name = None, None, pybullet.getBodyInfo(robot, physicsClientId=client)[0]
-        if link == BASE:
-            origin, frame = pybullet.getBasePositionAndOrientation(robot, physicsClientId=client)
-        else:
-            # The pose of the centre of mass, with the principal axes.
-            origin, frame, *_ = pybullet.getLinkState(
-                robot, link, computeForwardKinematics=True, physicsClientId=client
-            )
-            joint = pybullet.getJointInfo(robot, link, physicsClientId=client)
-            name = joint[12]
-            if joint[2] != pybullet.JOINT_FIXED:
-                axis, ends = _turn(frame) @ joint[13], (joint[8], joint[9])
-        rotation = _turn(frame)
-        shapes = len(pybullet.getCollisionShapeData(robot, link, physicsClientId=client))
-        found.append(
-            LoadedLink(
-                name=name.decode(),
-                mass_kg=mass,
-                centre=np.array(origin),
-                inertia=rotation * moments @ rotation.T,
-                shapes=shapes,
-                box=pybullet.getAABB(robot, link, physicsClientId=client) if shapes else None,
-                axis=axis,
-                range=ends,
-            )
-        )
-    return found
-
-
-def _turn(quaternion: Quaternion) -> NDArray[np.float64]:
-    return np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+def describe(client: int, scenery: Scenery, positions: Sequence[float]) -> LoadedRobot:
+    """Describe a robot with its moving joints at some positions (see `Engine.describe_robot`)."""
+    robot, given = scenery.robot, {"physicsClientId": client}
+    infos = [pybullet.getJointInfo(robot, number, **given) for number in links(client, robot)[1:]]
+    names = [pybullet.getBodyInfo(robot, **given)[0], *(info[12] for info in infos)]
+    shapes = {
+        name.decode(): len(pybullet.getCollisionShapeData(robot, number, **given))
+        for number, name in enumerate(names, start=BASE)
+    }
+    # Field 3 is the place of a joint among positions; the first 7 are those of a base that could move.
+    columns = [infos[joint][3] - 7 for joint in scenery.joints]
+    posture = [0.0] * len(positions)
+    for joint, column, position in zip(scenery.joints, columns, positions, strict=True):
+        posture[column] = position
+        pybullet.resetJointState(robot, joint, position, **given)
+    matrix = np.array(pybullet.calculateMassMatrix(robot, posture, **given))[np.ix_(columns, columns)]
+    state = pybullet.getLinkState(robot, scenery.tool, computeForwardKinematics=True, **given)
+    return LoadedRobot(shapes, matrix, state[4])
 
 
 def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody]:

@@ -14,7 +14,7 @@ from throwcollect.engines.engine import (
     BODY_NUMBERS,
     BodyState,
     Engine,
-    LoadedLink,
+    LoadedRobot,
     Observer,
     Physics,
     Quaternion,
@@ -31,7 +31,7 @@ from throwcollect.engines.mujoco.loop import check_version, make_loop
 from throwcollect.engines.mujoco.scenery import (
     OBJECT,
     Surface,
-    describe_links,
+    count_shapes,
     find_bounces,
     find_reach,
     let_object_hit_floor,
@@ -130,9 +130,15 @@ class MujocoEngine(Engine):
         sizes = (*self._sizes, surfaces, watched)
         self._fixed = [*_LOOP.list_world(model, data), *map(_LOOP.share, self._memory), *sizes]
 
-    def describe_robot(self) -> list[LoadedLink]:
-        """Describe the robot's links as MuJoCo has them."""
-        return describe_links(self._model, self._scene.robot)
+    def describe_robot(self, positions: Sequence[float]) -> LoadedRobot:
+        """Describe the robot as MuJoCo has it."""
+        model, count = self._model, len(self._order)
+        data, matrix = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+        data.qpos[:count] = np.array(positions)[self._columns]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, matrix)
+        x, y, z = data.body(self._scene.tool.link).xpos.tolist()
+        return LoadedRobot(count_shapes(model, self._scene), matrix[np.ix_(self._order, self._order)], (x, y, z))
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import BodyModel, LinkShape, Vector, turn_of
-from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
+from throwcollect.engines.engine import GROUND, Physics, Scene, SceneBody
 from throwcollect.engines.grip import HELD_LINK, add_held_link
 from throwcollect.engines.mujoco.stepping import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
 from throwcollect.errors import ConfigError
-from throwcollect.reproducible_math import matmul
 
 _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -285,50 +284,10 @@ def set_physics(model: mujoco.MjModel, scene: Scene, physics: Physics) -> None:
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def _find_box(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> Box | None:
-    """Find the box around the shapes of a body, along the axes of the world; None if it has none."""
-    first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
-    if not count:
-        return None
-    lows, highs = zip(*(_find_extent(model, data, geom) for geom in range(first, first + count)), strict=True)
-    return tuple(np.min(lows, axis=0).tolist()), tuple(np.max(highs, axis=0).tolist())
-
-
-def _find_extent(
-    model: mujoco.MjModel, data: mujoco.MjData, geom: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Find the lowest and highest corner of the box around a shape's own box."""
-    turned = data.geom_xmat[geom].reshape(3, 3)
-    # MuJoCo has the box of a shape as its centre and its half sizes.
-    box = model.geom_aabb[geom].reshape(2, 3, 1)
-    centre = data.geom_xpos[geom].reshape(3, 1) + matmul(turned, box[0])
-    half = matmul(np.abs(turned), box[1])
-    return (centre - half).ravel(), (centre + half).ravel()
-
-
-def describe_links(model: mujoco.MjModel, robot: BodyModel) -> list[LoadedLink]:
-    """Describe the links of a robot with all joints at 0 (see `Engine.describe_robot`)."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    found = []
-    for link in robot.links:
-        body = model.body(_STAND_IN if link.name == _WORLD_LINK else link.name).id
-        joint = int(model.body_jntadr[body])
-        frame = data.ximat[body].reshape(3, 3)
-        found.append(
-            LoadedLink(
-                name=link.name,
-                mass_kg=float(model.body_mass[body]),
-                centre=data.xipos[body].copy(),
-                inertia=frame * model.body_inertia[body] @ frame.T,
-                shapes=int(model.body_geomnum[body]),
-                box=_find_box(model, data, body),
-                axis=data.xaxis[joint].copy() if joint >= 0 else None,
-                range=tuple(model.jnt_range[joint].tolist()) if joint >= 0 else None,
-            )
-        )
-    return found
+def count_shapes(model: mujoco.MjModel, scene: Scene) -> dict[str, int]:
+    """Count the collision shapes of each link of the robot."""
+    names = {link.name: _STAND_IN if link.name == _WORLD_LINK else link.name for link in scene.robot.links}
+    return {link: int(model.body(name).geomnum[0]) for link, name in names.items()}
 
 
 def _list_geoms(model: mujoco.MjModel, body: SceneBody) -> list[int]:
