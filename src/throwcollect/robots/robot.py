@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -47,7 +47,6 @@ class Robot:
         rigid: For each group of links that only mimic joints move, the prefix of the links' names. Links of a group are
             not checked for collisions with each other.
         sliding: Joints that are prismatic, whose positions are in metres and efforts in newtons.
-        ros1_names: Name of each controller in the robot's ROS 1 software; empty if the names are the same.
         goal_tolerance_rad: Largest distance of each joint from the end of a trajectory whose goal has no tolerances
             of its own; 0 is not checked.
         goal_time_s: Longest time after the end of such a trajectory until the joint is within that distance; 0 waits
@@ -70,7 +69,6 @@ class Robot:
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
     sliding: frozenset[str] = frozenset()
-    ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     goal_tolerance_rad: float = 0.0
     goal_time_s: float = 0.0
     stopped_velocity_radps: float = 0.01
@@ -113,10 +111,6 @@ class Robot:
         if self.package and url.startswith(own := f"{PACKAGE}{self.package}/"):
             return self.directory / url.removeprefix(own)
         return locate_mesh(url, self.urdf_path.parent, self.directory)
-
-    def graph_name(self, controller: str, naming: str) -> str:
-        """Return the name of a controller in the ROS graph, by the naming ``ros2`` or ``ros1``."""
-        return self.ros1_names.get(controller, controller) if naming == "ros1" else controller
 
     @property
     def directory(self) -> Path:
