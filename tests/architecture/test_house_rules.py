@@ -114,7 +114,7 @@ OF_THE_PROCESSOR = re.compile(
 )
 HARMLESS = {
     "engines/mesh.py": {"np.linalg.svd", "@"},  # whether a mesh is flat; whole numbers of cells
-    "robots/derived.py": {"np.linalg.norm"},  # what is odd about a robot
+    "robots/oddities.py": {"np.linalg.norm"},  # what is odd about a robot
     "robots/joint_model.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
 }
