@@ -26,6 +26,8 @@ Sample = tuple[float, ...]
 position, orientation, linear and angular velocity of each body of the scene that moves, and of the object. These are
 bare numbers, as an engine makes a sample every few steps and objects would slow it down."""
 
+UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
 BODY_NUMBERS = 13
 """How many numbers of a sample belong to a body; the last ones belong to the object."""
 
@@ -45,7 +47,7 @@ class BodyState:
     """
 
     position: Vector
-    orientation_xyzw: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    orientation_xyzw: Quaternion = UPRIGHT
     linear_velocity: Vector = (0.0, 0.0, 0.0)
     angular_velocity: Vector = (0.0, 0.0, 0.0)
 
@@ -327,6 +329,26 @@ class Engine(ABC):
 
         Other bodies that move count from 1, in the order of samples.
         """
+
+
+def make_rest(scene: Scene, joints: Sequence[float], seat: tuple[Vector, Quaternion] | None) -> State:
+    """Make the state in which all is at rest at its start; see `Engine.rest`.
+
+    Args:
+        scene: The scene.
+        joints: Positions of the moving joints.
+        seat: Centre of an object in the tool, in world [m], and orientation of the tool; None if it starts elsewhere.
+    """
+    placed, touching, still = scene.object.start, frozenset[str](), (0.0,) * len(joints)
+    if seat is not None:
+        centre, turn = seat
+        if scene.tool.seat is None:
+            turn = UPRIGHT
+        else:
+            touching = frozenset({scene.tool.name})
+        placed = (*centre, *turn, *placed[7:])
+    bodies = [part for body in scene.moving_bodies for part in body.start]
+    return State((*joints, *still, *still, *bodies, *placed), touching)
 
 
 def object_in(sample: Sample) -> BodyState:

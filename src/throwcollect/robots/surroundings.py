@@ -125,12 +125,10 @@ def looks_of(config: Config) -> tuple[BodyLook, ...]:
                 size = (2 * radius, 2 * radius, *(length or [2 * radius]))
             points = _place(_place(_find_corners(shape, np.array(size)), shape.placement), placement)
             x, y, z = size
-            outlines = [_find_outline(points[:, axes]) for axes in ([0, 1], [0, 2])]
-            about, file = (
-                (section.color, section.mass_kg is not None),
-                "" if shape.mesh is None else str(shape.mesh.path),
-            )
-            looks.append(BodyLook(name, shape.kind, (x, y, z), *placement, *about, *outlines, shape.placement, file))
+            above, side = (_find_outline(points[:, axes]) for axes in ([0, 1], [0, 2]))
+            pose, mesh = (*placement, section.color, section.mass_kg is not None), shape.mesh
+            file = "" if mesh is None else str(mesh.path)
+            looks.append(BodyLook(name, shape.kind, (x, y, z), *pose, above, side, shape.placement, file))
     return tuple(looks)
 
 

@@ -10,7 +10,6 @@ import pybullet
 from throwcollect.engines.body import Vector
 from throwcollect.engines.bullet.scenery import (
     BASE,
-    Scenery,
     Surface,
     connect,
     describe,
@@ -24,6 +23,7 @@ from throwcollect.engines.bullet.scenery import (
     set_physics,
 )
 from throwcollect.engines.engine import (
+    UPRIGHT,
     BodyState,
     Engine,
     LoadedRobot,
@@ -34,15 +34,14 @@ from throwcollect.engines.engine import (
     SceneBody,
     State,
     Steps,
-    ToolLink,
     body_of,
+    make_rest,
     object_in,
     split_bodies,
 )
 from throwcollect.engines.grip import carry, find_held
 
 _ANY_BODY, _ANY_LINK = -1, -2
-_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class BulletEngine(Engine):
@@ -52,25 +51,12 @@ class BulletEngine(Engine):
         WorkerError: If Bullet refuses to start another world in this process.
     """
 
-    _scenery: Scenery
-    _bodies: dict[int, SceneBody]
-    _object: SceneBody
-    _object_id: int
-    _moving: list[int]
-    _displaced: set[int]
-    _names: dict[Surface, str]
-    _has_floor: bool
-    _forces: list[float]
-    _position_gains: list[float]
-    _velocity_gains: list[float]
-    _physics: Physics
-    _tool: ToolLink
-    _held: BodyState | None
+    _scene: Scene
 
     def __init__(self) -> None:
         self._client = connect()
-        self._scene: Scene | None = None
-        self._placed: Sample = ()
+        self._bodies: dict[int, SceneBody] = {}
+        self._object_id, self._is_loaded = BASE, False
         self._touching: frozenset[str] = frozenset()
         # The surfaces that pressed on the object in the last step; None if there was no step since the last reset.
         self._pressing: set[Surface] | None = None
@@ -81,13 +67,12 @@ class BulletEngine(Engine):
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene; if nothing but the object and the bodies differs, only these are made anew."""
-        # Forget the scene until the world is loaded: if loading fails, the next call must not keep anything of it.
-        kept, self._scene = self._scene, None
-        if kept == scene:
-            self._scene = scene
+        if self._is_loaded and scene == self._scene:
             return
-        if kept is None or not scene.has_robot_of(kept):
-            self._scenery = load_scenery(self._client, scene)
+        # If loading fails, the next call must not keep anything of this world.
+        keeps, self._is_loaded = self._is_loaded and scene.has_robot_of(self._scene), False
+        if not keeps:
+            self._scenery, self._bodies = load_scenery(self._client, scene), {}
         else:
             # All of them, so that they follow each other in the same order as in a new world.
             for body in (*self._bodies, self._object_id):
@@ -97,8 +82,7 @@ class BulletEngine(Engine):
         self._object_id = load_object(self._client, scene.object)
         self._moving = [number for number, body in self._bodies.items() if body.moves]
         self._displaced = {each for each in self._moving if not self._bodies[each].inertia.is_centred}
-        self._placed = tuple(part for body in scene.moving_bodies for part in body.start)
-        self._tool, self._object, self._scene = scene.tool, scene.object, scene
+        self._tool, self._object, self._scene, self._is_loaded = scene.tool, scene.object, scene, True
 
     def describe_robot(self, positions: Sequence[float]) -> LoadedRobot:
         """Describe the robot as Bullet has it."""
@@ -120,19 +104,14 @@ class BulletEngine(Engine):
         client, scenery = self._client, self._scenery
         for joint, angle in zip(scenery.joints, joints, strict=True):
             pybullet.resetJointState(scenery.robot, joint, angle, physicsClientId=client)
-        placed, touching = self._object.start, frozenset[str]()
+        place = None
         if seat is not None:
             tool = pybullet.getLinkState(
                 scenery.robot, scenery.tool, computeForwardKinematics=True, physicsClientId=client
             )
             # Fields 4 and 5 are the pose of the link's frame. Those before are of its centre of mass.
-            centre, _ = pybullet.multiplyTransforms(tool[4], tool[5], seat, _UPRIGHT)
-            turn = _UPRIGHT
-            if self._tool.seat is not None:
-                turn, touching = tool[5], frozenset({self._tool.name})
-            placed = (*centre, *turn, *(0.0,) * 6)
-        still = (0.0,) * len(joints)
-        self.reset(State((*joints, *still, *still, *self._placed, *placed), touching))
+            place = pybullet.multiplyTransforms(tool[4], tool[5], seat, UPRIGHT)[0], tool[5]
+        self.reset(make_rest(self._scene, joints, place))
 
     def reset(self, state: State) -> None:
         """Put robot, bodies and object into a state, and leave no trace of earlier ones in the world.

@@ -17,6 +17,7 @@ import pybullet
 from throwcollect.engines.body import BodyModel, Vector
 from throwcollect.engines.engine import (
     GROUND,
+    UPRIGHT,
     BodyState,
     LoadedRobot,
     Physics,
@@ -32,8 +33,6 @@ from throwcollect.errors import ConfigError, WorkerError
 
 Surface = tuple[int, int]
 """Body and link number in Bullet."""
-
-UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 BASE = -1
 """Link number of the first link of a body."""

@@ -23,6 +23,7 @@ from throwcollect.engines.engine import (
     State,
     Steps,
     body_of,
+    make_rest,
     object_in,
     split_bodies,
 )
@@ -30,7 +31,6 @@ from throwcollect.engines.grip import HELD_LINK, carry, find_held
 from throwcollect.engines.mujoco.loop import check_version, make_loop
 from throwcollect.engines.mujoco.scenery import (
     OBJECT,
-    Surface,
     count_shapes,
     find_bounces,
     find_reach,
@@ -60,12 +60,7 @@ class MujocoEngine(Engine):
     """
 
     _scene: Scene
-    _physics: Physics
-    _surfaces: list[Surface]
-    _seat: int | None
-    _held: BodyState | None
     _model: mujoco.MjModel
-    _data: mujoco.MjData
 
     def __init__(self) -> None:
         check_version()
@@ -151,19 +146,14 @@ class MujocoEngine(Engine):
     def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
         """Put joints, object and bodies at their start, all at rest."""
         model, data = self._model, self._data
-        placed, touching = self._scene.object.start, frozenset[str]()
+        place = None
         if seat is not None:
             data.qpos[: len(joints)] = np.array(joints)[self._columns]
             mujoco.mj_kinematics(model, data)
             tool = data.body(self._scene.tool.link)
             centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
-            turn: Quaternion = (0.0, 0.0, 0.0, 1.0)
-            if self._scene.tool.seat is not None:
-                turn, touching = _to_xyzw(tool.xquat), frozenset({self._scene.tool.name})
-            placed = (*centre, *turn, *(0.0,) * 6)
-        still = (0.0,) * len(joints)
-        bodies = [part for body in self._scene.moving_bodies for part in body.start]
-        self.reset(State((*joints, *still, *still, *bodies, *placed), touching))
+            place = centre, _to_xyzw(tool.xquat)
+        self.reset(make_rest(self._scene, joints, place))
 
     def reset(self, state: State) -> None:
         """Put robot, bodies and object into a state, and leave no trace of earlier ones in the world."""
