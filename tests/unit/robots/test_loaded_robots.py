@@ -148,10 +148,8 @@ def test_each_difference_between_engine_and_description_is_found(
 
 
 def measure_bullet(engine: Any, link: str) -> tuple[Any, Any]:
-    import pybullet
-
     number = next(number for (_, number), name in engine._scenery.names.items() if name == link)
-    return pybullet.getAABB(engine._scenery.robot, number, physicsClientId=engine._client)
+    return engine._world.getAABB(engine._scenery.robot, number)
 
 
 def measure_mujoco(engine: Any, link: str) -> tuple[Any, Any]:
