@@ -113,11 +113,8 @@ OF_THE_PROCESSOR = re.compile(
     r"cosh|tanh|hypot|geomspace|logspace|dot|vdot|inner|matmul|tensordot|einsum|linalg\.\w+)"
 )
 HARMLESS = {
-    "engines/as_described.py": {"np.sin", "np.cos", "np.linalg.norm", "np.linalg.eigvalsh", "@"},  # with tolerances
-    "engines/bullet/scenery.py": {"@"},  # what is compared there
     "engines/mesh.py": {"np.linalg.svd", "@"},  # whether a mesh is flat; whole numbers of cells
-    "engines/mujoco/scenery.py": {"@"},  # what is compared there
-    "robots/derived.py": {"np.linalg.norm"},  # what is odd about a robot
+    "robots/oddities.py": {"np.linalg.norm"},  # what is odd about a robot
     "robots/joint_model.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
 }

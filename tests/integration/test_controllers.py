@@ -27,7 +27,6 @@ from throwcollect.ros import Context, DurabilityPolicy, Parameter, QoSProfile, g
 SUCCEEDED, ABORTED = 4, 6
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
 JTC = "joint_trajectory_controller/JointTrajectoryController"
-RIGHT_ARM = "right_arm_controller"
 SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 Time: Any = get_message("builtin_interfaces/msg/Time")
 
@@ -166,7 +165,7 @@ def test_after_a_reset_the_start_posture_is_held(robot: Robot) -> None:
 @pytest.fixture(scope="module")
 def other(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
     """A simulation in which every configurable behaviour of controllers differs from its default."""
-    options = ControllersConfig(names="ros1", hold="decelerate", topic_aborts_goal=True, refused_goals="abort")
+    options = ControllersConfig(hold="decelerate", topic_aborts_goal=True, refused_goals="abort")
     config = CONFIG.model_copy(update={"controllers": options})
     with running_simulation(tmp_path_factory.mktemp("other"), endpoint, session, "sim_1", config) as robot:
         yield robot
@@ -176,12 +175,12 @@ def test_goals_that_are_refused_can_be_accepted_and_aborted_with_the_reason(othe
     other.reset()
     wish = goal(ARM)
     wish.trajectory.joint_names = list(TALOS.controllers["arm_left_controller"])
-    handle = other.send(wish, RIGHT_ARM)
+    handle = other.send(wish, ARM)
     assert handle.accepted
     status, code, text = other.outcome(handle)
     assert (status, code) == (ABORTED, -2)
-    assert text.startswith(f"{RIGHT_ARM}: Incoming joint arm_left_1_joint doesn't match the controller's joints.")
-    locked = other.outcome(other.send(goal(ARM, arm_right_5_joint=0.4), RIGHT_ARM))
+    assert text.startswith(f"{ARM}: Incoming joint arm_left_1_joint doesn't match the controller's joints.")
+    locked = other.outcome(other.send(goal(ARM, arm_right_5_joint=0.4), ARM))
     assert locked[:2] == (ABORTED, -1)
     assert "arm_right_5_joint is locked at 0 rad" in locked[2]
     assert other.now_ns() == 0

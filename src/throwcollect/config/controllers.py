@@ -4,16 +4,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from throwcollect.config.key import Effect, Key
 from throwcollect.config.section import Section
 
 
 class ControllersConfig(Section):
     """The joint trajectory controllers; by default they do what clients of PAL's robot and ros2_controllers expect."""
 
-    names: Annotated[Literal["ros2", "ros1"], Key(Effect.APPEARANCE)] = "ros2"
-    """Names of the controllers in the ROS graph: `arm_left_controller` as on Talos with ROS 2, or `left_arm_controller`
-    as with ROS 1. Datasets always have the names of ROS 2."""
     hold: Literal["measured", "command", "decelerate"] = "measured"
     """What joints do when a goal is cancelled or aborted: they are held at the `measured` positions (ros2_controllers);
     at the last `command`, so that joints which lag under load do not sag; or they `decelerate` to rest. This needs

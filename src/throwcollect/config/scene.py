@@ -125,7 +125,7 @@ class UrdfConfig(FileBodyConfig):
     """The one rigid body of a URDF, whose joints have to be fixed.
 
     Its collision shapes count, also in pictures. Its mass is `mass_kg`; those of the URDF say how it is spread, and
-    without any it is spread evenly. By default, its color is that of the URDF.
+    without any it is spread evenly.
     """
 
     suffix = ".urdf"

@@ -20,6 +20,10 @@ class ToolConfig(Section):
     name: str
     """Tool model."""
 
+    def __hash__(self) -> int:
+        """Hash all keys, also lists and mappings that a tool may have."""
+        return hash(self.model_dump_json())
+
     def without_release(self) -> Self:
         """Make a copy without the time of a release; tools whose copies are equal are loaded and checked only once."""
         return self

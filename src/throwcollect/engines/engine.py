@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -21,13 +21,12 @@ from throwcollect.engines.body import HERE, BodyLink, BodyModel, LinkInertia, Pl
 
 Quaternion = tuple[float, float, float, float]
 
-Box = tuple[Vector, Vector]
-"""Lowest and highest corner [m]."""
-
 Sample = tuple[float, ...]
 """The world at one instant: positions [rad], velocities [rad/s] and motor torques [Nm] of all moving joints, then
 position, orientation, linear and angular velocity of each body of the scene that moves, and of the object. These are
 bare numbers, as an engine makes a sample every few steps and objects would slow it down."""
+
+UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 BODY_NUMBERS = 13
 """How many numbers of a sample belong to a body; the last ones belong to the object."""
@@ -48,7 +47,7 @@ class BodyState:
     """
 
     position: Vector
-    orientation_xyzw: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    orientation_xyzw: Quaternion = UPRIGHT
     linear_velocity: Vector = (0.0, 0.0, 0.0)
     angular_velocity: Vector = (0.0, 0.0, 0.0)
 
@@ -238,28 +237,18 @@ class Observer:
 
 
 @dataclass(frozen=True)
-class LoadedLink:
-    """A link as an engine has it, with all joints at 0.
+class LoadedRobot:
+    """A robot as an engine has it.
 
     Attributes:
-        name: Its name.
-        mass_kg: Its mass.
-        centre: Its centre of mass in world [m], shape ``(3,)``.
-        inertia: Its inertia about that centre, along the axes of the world [kg m²], shape ``(3, 3)``.
-        shapes: Number of its collision shapes.
-        box: The box around them, along the axes of the world; None without shapes.
-        axis: Direction in world of the joint that moves it; None if none does.
-        range: Lowest and highest position of that joint [rad]; None likewise.
+        shapes: Number of collision shapes of each link, by its name.
+        mass_matrix: Mass matrix of the moving joints, in their order [kg m², kg m or kg], shape ``(n, n)``.
+        tool_m: Origin of the tool's link in world [m].
     """
 
-    name: str
-    mass_kg: float
-    centre: NDArray[np.float64]
-    inertia: NDArray[np.float64]
-    shapes: int
-    box: Box | None
-    axis: NDArray[np.float64] | None
-    range: tuple[float, float] | None
+    shapes: Mapping[str, int]
+    mass_matrix: NDArray[np.float64]
+    tool_m: Vector
 
 
 class Engine(ABC):
@@ -273,8 +262,7 @@ class Engine(ABC):
         """Say how steps are taken here, if there are several ways, such as ``compiled``; all give the same bits."""
         return ""
 
-    @abstractmethod
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - not every engine has something to free
         """Free the world; it cannot be used afterwards."""
 
     @abstractmethod
@@ -285,11 +273,14 @@ class Engine(ABC):
             ConfigError: If the engine does not take the robot's description, or bodies.
         """
 
-    def describe_robot(self) -> Sequence[LoadedLink] | None:
-        """Describe the robot's links as the engine has them, with all joints at 0, right after `load`.
+    def describe_robot(self, positions: Sequence[float]) -> LoadedRobot | None:  # noqa: ARG002 - for other engines
+        """Describe the robot as the engine has it, right after `load`.
+
+        Args:
+            positions: Those of the moving joints, at which mass matrix and tool are wanted.
 
         Returns:
-            Each link with its joint; None if the engine computes with the values of the scene themselves.
+            The robot; None if the engine computes with the values of the scene themselves.
         """
         return None
 
@@ -337,6 +328,26 @@ class Engine(ABC):
 
         Other bodies that move count from 1, in the order of samples.
         """
+
+
+def make_rest(scene: Scene, joints: Sequence[float], seat: tuple[Vector, Quaternion] | None) -> State:
+    """Make the state in which all is at rest at its start; see `Engine.rest`.
+
+    Args:
+        scene: The scene.
+        joints: Positions of the moving joints.
+        seat: Centre of an object in the tool, in world [m], and orientation of the tool; None if it starts elsewhere.
+    """
+    placed, touching, still = scene.object.start, frozenset[str](), (0.0,) * len(joints)
+    if seat is not None:
+        centre, turn = seat
+        if scene.tool.seat is None:
+            turn = UPRIGHT
+        else:
+            touching = frozenset({scene.tool.name})
+        placed = (*centre, *turn, *placed[7:])
+    bodies = [part for body in scene.moving_bodies for part in body.start]
+    return State((*joints, *still, *still, *bodies, *placed), touching)
 
 
 def object_in(sample: Sample) -> BodyState:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from throwcollect.config.robot_config import RobotConfig
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.plan.trials import Trial
 from throwcollect.robots.derived import Postures
@@ -95,7 +94,6 @@ class _Search:
         upper = np.minimum(limits.upper[order], 2 * math.pi)
         margin = np.minimum(_MARGIN_RAD, (upper - lower) / 20)
         self._lower, self._upper = lower + margin, upper - margin
-        self._data = self._postures.model.createData()
         self._carrying = [index for index in self._postures.carrying if self._velocity[index] > 0]
         self._base_m = robot.base_height_m
 
@@ -158,10 +156,7 @@ class _Search:
                 yield _Candidate(float(np.hypot(*velocity[:2]) + velocity[2] / 2), begin, end, round(duration_s, 3))
 
     def _find_ball(self, posture: NDArray[np.float64]) -> NDArray[np.float64]:
-        pinocchio.framesForwardKinematics(self._postures.model, self._data, posture)
-        place: NDArray[np.float64] = (self._data.oMf[self._postures.hand] * self._postures.tool).act(
-            np.array([0.0, 0.0, -_SPOON_M])
-        )
+        place: NDArray[np.float64] = self._postures.place_tool(posture).act(np.array([0.0, 0.0, -_SPOON_M]))
         return place
 
     def _make_config(

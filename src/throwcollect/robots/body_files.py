@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import math
 import xml.etree.ElementTree as ElementTree
+from collections import ChainMap
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -34,24 +34,19 @@ class BodyFile(NamedTuple):
     """What a file describes: shapes, a mesh without a scale, and the inertia of a URDF that has one.
 
     `files` are those that a dataset carries for it, by name. The first describes the body, also by the digests of the
-    others; `sha256` is its digest in hexadecimal. `color` is that of the first shape in pictures that has one.
+    others; `sha256` is its digest in hexadecimal.
     """
 
     link: BodyLink
     files: Mapping[str, bytes]
     sha256: str
-    color: str | None = None
 
 
 def complete(section: FileBodyConfig) -> FileBodyConfig:
     """Complete the section of a body, whose file is read, unless it has a digest: that of a dataset's own file."""
     if section.sha256 is not None:
         return section
-    found = _read(type(section), section.file)
-    keys = {"sha256": found.sha256}
-    if found.color is not None and "color" not in section.model_fields_set:
-        keys["color"] = found.color
-    made = section.model_copy(update=keys)
+    made = section.model_copy(update={"sha256": _read(type(section), section.file).sha256})
     for shape in shapes_of(made):
         extents = np.ptp(shape.mesh.corners * shape.size, axis=0) if shape.mesh else np.zeros(3)
         if (extent := float(extents.max())) > _LARGEST_M:
@@ -119,9 +114,8 @@ def _read(kind: type[FileBodyConfig], file: str) -> BodyFile:
     if kind is not MeshConfig:
         return _read_body(read_xml(path), path, partial(find_mesh, urdf=path))
     mesh = Mesh(path)
-    name, sha256 = _name(content := mesh.encode(), ".stl")
     link = BodyLink(_NAME, None, (LinkShape("mesh", (1.0, 1.0, 1.0), HERE, mesh),))
-    return BodyFile(link, {name: content}, sha256)
+    return BodyFile(link, *_pack(mesh.encode(), ".stl"))
 
 
 def _read_body(root: ElementTree.Element, path: Path, find: Callable[[str], Path]) -> BodyFile:
@@ -136,17 +130,18 @@ def _read_body(root: ElementTree.Element, path: Path, find: Callable[[str], Path
     model = BodyModel(_NAME, (link,))
     robot = ElementTree.Element("robot", name=_NAME)
     robot.extend(model.to_xml())
-    meshes = [(_name(content, ".stl")[0], content) for content in model.encode_meshes().values()]
+    meshes = {name: _pack(content, ".stl")[0] for name, content in model.encode_meshes().items()}
     for mesh in robot.iter("mesh"):
-        mesh.set("filename", meshes[int(mesh.attrib["filename"].removesuffix(".stl"))][0])
-    name, sha256 = _name(content := to_text(robot).encode(), ".urdf")
-    return BodyFile(link, {name: content, **dict(meshes)}, sha256, _find_color(root))
+        (filename,) = meshes[mesh.attrib["filename"]]
+        mesh.set("filename", filename)
+    files, sha256 = _pack(to_text(robot).encode(), ".urdf")
+    return BodyFile(link, {**files, **ChainMap(*meshes.values())}, sha256)
 
 
-def _name(content: bytes, suffix: str) -> tuple[str, str]:
-    """Name a file by its digest, which is the second of the two."""
+def _pack(content: bytes, suffix: str) -> tuple[dict[str, bytes], str]:
+    """Make a file that is named by its digest, and that digest."""
     sha256 = hashlib.sha256(content).hexdigest()
-    return f"{sha256[:16]}{suffix}", sha256
+    return {f"{sha256[:16]}{suffix}": content}, sha256
 
 
 def _merge(model: BodyModel) -> BodyLink:
@@ -196,16 +191,3 @@ def place_spawned(body: SceneBody, name: str, at: BodyState) -> SceneBody:
 
 def _refuse_mesh(filename: str) -> Path:
     raise ConfigError(f"{filename}: a mesh is a file, which no client names; name a body of the scene as uri")
-
-
-def _find_color(root: ElementTree.Element) -> str | None:
-    """Find the colour of the first visual shape that has one."""
-    named = {each.get("name"): color for each in root.iter("material") if (color := each.find("color")) is not None}
-    for material in root.iterfind("link/visual/material"):
-        color = material.find("color")
-        color = named.get(material.get("name")) if color is None else color
-        with suppress(ValueError):
-            if color is not None:
-                r, g, b, _ = (min(max(float(word), 0.0), 1.0) for word in color.get("rgba", "").split())
-                return f"#{round(255 * r):02x}{round(255 * g):02x}{round(255 * b):02x}"
-    return None

@@ -8,6 +8,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from throwcollect.config.robot_config import ChainConfig, DescribedRobotConfig, LimitsConfig
@@ -50,6 +51,7 @@ class Cleaning:
 
     def __init__(self, section: DescribedRobotConfig, path: Path) -> None:
         self._section, self._path = section, path
+        self._find_mesh = partial(find_mesh, urdf=path, packages=section.packages)
         self._source = read_xml(path)
         self.notes: dict[str, str] = {}
         self.files: dict[str, bytes] = {}
@@ -59,6 +61,7 @@ class Cleaning:
         self._above = {joint.child: joint for joint in self.urdf.model.joints}
         self.chain = self._find_chain(section.flange)
         self.controllers = self._find_controllers()
+        self._moving = {name for names in self.controllers.values() for name in names}
 
     def _find_name(self) -> str:
         given = self._section.name
@@ -72,9 +75,6 @@ class Cleaning:
     def _require(self, kind: str, name: str, known: Collection[str], key: str) -> None:
         if name not in known:
             raise make_error(key, f"{self._path} has no {kind} {name!r}{suggest(name, known)}")
-
-    def _find_mesh(self, filename: str) -> Path:
-        return find_mesh(filename, self._path, self._section.packages)
 
     def _find_chain(self, tip: str, base: str | None = None) -> list[BodyJoint]:
         """List the joints from the root, or from a link, to a link."""
@@ -134,9 +134,8 @@ class Cleaning:
 
     def clean(self) -> BodyModel:
         """Make the model of the joints that controllers command; all others are fixed."""
-        commanded = {name for names in self.controllers.values() for name in names}
         model = self.urdf.model
-        joints = tuple(self._limit(joint) if joint.name in commanded else self._fix(joint) for joint in model.joints)
+        joints = tuple(self._limit(joint) if joint.name in self._moving else self._fix(joint) for joint in model.joints)
         beyond = self._find_beyond() if self._section.gripper == "dropped" else set()
         links = tuple(
             replace(link, shapes=() if link.name in beyond else tuple(map(self._make_hull, link.shapes)))
@@ -181,14 +180,8 @@ class Cleaning:
 
     def _find_beyond(self) -> set[str]:
         """Find the links that hang on the flange."""
-        found: set[str] = set()
-        for joint in self.urdf.model.joints:
-            above: BodyJoint | None = joint
-            while above is not None and above.parent != self._section.flange:
-                above = self._above.get(above.parent)
-            if above is not None:
-                found.add(joint.child)
-        return found
+        flange = self._section.flange
+        return {link for link in self.urdf.links if any(joint.parent == flange for joint in self._find_chain(link))}
 
     def _make_hull(self, shape: LinkShape) -> LinkShape:
         """Replace a mesh by its convex hull, as which it collides in every engine."""
@@ -204,10 +197,7 @@ class Cleaning:
 
     def _keep_visual(self, path: Path) -> Path:
         """Keep a mesh for viewers: a large one without colours of its own more coarsely."""
-        try:
-            content, suffix = path.read_bytes(), path.suffix.lower()
-        except OSError as error:
-            raise ConfigError(f"{path}: cannot be read as a mesh: {error.strerror}") from error
+        content, suffix = path.read_bytes(), path.suffix.lower()
         if suffix == ".stl" and len(content) > _LARGE_BYTES:
             content = Mesh(path).encode_coarse()
         return self._keep(content, suffix)
@@ -271,7 +261,3 @@ class Cleaning:
             if joint.parent in held and joint.name not in self._moving:
                 held.add(joint.child)
         return sorted(held)
-
-    @property
-    def _moving(self) -> set[str]:
-        return {name for names in self.controllers.values() for name in names}

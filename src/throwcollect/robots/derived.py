@@ -39,8 +39,6 @@ class Postures:
         joints: Their names.
         allowed: Links that may overlap, by pairs in alphabetical order; more may be added.
         carrying: Numbers of the joints that carry the hand.
-        hand: Frame in the model of the link that holds the tool.
-        tool: Pose in which it holds the tool.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -51,9 +49,8 @@ class Postures:
         self._placed = self.geometry.createData()
         self._links = [self.model.frames[shape.parentFrame].name for shape in self.geometry.geometryObjects]
         self._pairs = [(pair.first, pair.second) for pair in self.geometry.collisionPairs]
-        self.hand = self.model.getFrameId(robot.hand, pinocchio.BODY)
-        self.carrying = [joint - 1 for joint in self.model.supports[self.model.frames[self.hand].parentJoint] if joint]
-        self.tool = pose_of(robot.tool_pose)
+        self._hand, self._tool = self.model.getFrameId(robot.hand, pinocchio.BODY), pose_of(robot.tool_pose)
+        self.carrying = [joint - 1 for joint in self.model.supports[self.model.frames[self._hand].parentJoint] if joint]
         self.allowed: set[tuple[str, str]] = set()
         # While a robot is imported, it has no SRDF, and no posture at rest.
         self._rest = None
@@ -96,15 +93,14 @@ class Postures:
         found = {self._name(*self._pairs[index]) for index in np.flatnonzero(self.find_overlaps(posture))}
         return sorted(found - self.allowed)
 
+    def place_tool(self, posture: NDArray[np.float64]) -> pinocchio.SE3:
+        """Compute the pose in which the hand holds the tool, in the base."""
+        pinocchio.framesForwardKinematics(self.model, self._data, posture)
+        return self._data.oMf[self._hand] * self._tool
+
     def find_uprightness(self, posture: NDArray[np.float64]) -> float:
         """Compute the cosine of the angle between the tool's opening and the vertical."""
-        pinocchio.framesForwardKinematics(self.model, self._data, posture)
-        return float((self._data.oMf[self.hand] * self.tool).rotation[2, 0])
-
-    def find_reach(self, posture: NDArray[np.float64]) -> float:
-        """Compute the distance of the hand from the base [m]."""
-        pinocchio.framesForwardKinematics(self.model, self._data, posture)
-        return float(np.linalg.norm(self._data.oMf[self.hand].translation))
+        return float(self.place_tool(posture).rotation[2, 0])
 
     def find_upright(self, count: int = 1) -> tuple[list[NDArray[np.float64]], float]:
         """Search postures that hold a ball in the tool and are clear.

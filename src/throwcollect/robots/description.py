@@ -5,31 +5,22 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.engines.body import (
-    BodyJoint,
-    BodyLink,
-    BodyModel,
-    LinkShape,
-    to_text,
-)
+from throwcollect.config.tool_config import ToolConfig
+from throwcollect.engines.body import BodyJoint, BodyLink, BodyModel, LinkShape, to_text
 from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError, MemberError, Problem
 from throwcollect.extras import MissingExtraError, is_installed
 from throwcollect.robots.importing import find_robot
 from throwcollect.robots.joint_model import describe_inertia, joint_model, lock_joints, mount_of, placement_of, pose_of
 from throwcollect.robots.robot import Robot
-from throwcollect.robots.tools.tool import Tool, tool_of
-
-_written: dict[tuple[Robot, str], str] = {}
-"""The latest full descriptions, by robot and configuration of the tool. They are kept, because everything that looks at
-a dataset needs the same description, and writing it takes 20 ms."""
-_MOST_WRITTEN = 8
+from throwcollect.robots.tools.tool import Tool, make_tool, tool_of
 
 
 @dataclass(frozen=True)
@@ -92,18 +83,13 @@ def full_description(config: Config) -> str:
 
     The hand has no collision shapes, because its fingers reach into the tool's handle.
     """
-    robot = robot_of(config)
-    key = robot, config.tool.without_release().model_dump_json()
-    # Another thread may clear the dictionary at any moment.
-    if (text := _written.get(key)) is None:
-        if len(_written) >= _MOST_WRITTEN:
-            _written.clear()
-        text = _written[key] = _write_full(robot, tool_of(config))
-    return text
+    return _write_full(robot_of(config), config.tool.without_release())
 
 
-def _write_full(robot: Robot, tool: Tool) -> str:
-    _ = robot.description
+# Everything that looks at a dataset needs the same description, and writing it takes 20 ms.
+@lru_cache(maxsize=8)
+def _write_full(robot: Robot, section: ToolConfig) -> str:
+    _, tool = robot.description, make_tool(section)
     # The tree is copied, because writing the text indents each element, perhaps in another thread.
     description = copy.deepcopy(robot.xml)
     link, joint = _hold(tool, robot.hand, mount_of(robot, tool))

@@ -14,7 +14,7 @@ from throwcollect.engines.body import Placement
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.extras import MissingExtraError
 from throwcollect.robots.robot import Robot
-from throwcollect.robots.urdf import PACKAGE, locate_mesh
+from throwcollect.robots.urdf import PACKAGE, as_vector, locate_mesh
 
 URDF, SRDF = "robot.urdf", "robot.srdf"
 """Names of an imported robot's files; its meshes have names made of their digests."""
@@ -49,15 +49,10 @@ def _make_robot(keys: str) -> Robot:
         srdf=SRDF,
         rest=HOME,
         hand=section.flange,
-        tool_pose=Placement(_as_vector(section.tool_pose.position_m), _as_vector(section.tool_pose.rpy_rad)),
+        tool_pose=Placement(as_vector(section.tool_pose.position_m), as_vector(section.tool_pose.rpy_rad)),
         holding=tuple(section.holding or ()),
         sliding=frozenset(section.prismatic),
     )
-
-
-def _as_vector(numbers: list[float]) -> tuple[float, float, float]:
-    x, y, z = numbers
-    return x, y, z
 
 
 def package_of(name: str) -> str:
@@ -72,14 +67,8 @@ def list_files(directory: Path) -> list[Path]:
 
 def hash_files(directory: Path) -> str:
     """Hash the files of an imported robot with their names; SHA-256, in hexadecimal."""
-    return _hash_files(tuple((path, path.stat().st_size, path.stat().st_mtime_ns) for path in list_files(directory)))
-
-
-# A command hashes the files of its robot when it imports the robot, and when it reads the description.
-@lru_cache(maxsize=16)
-def _hash_files(files: tuple[tuple[Path, int, int], ...]) -> str:
     digest = hashlib.sha256()
-    for path, _, _ in files:
+    for path in list_files(directory):
         content = path.read_bytes()
         digest.update(f"{path.name}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
+from throwcollect.engines.as_described import build_model
 from throwcollect.engines.body import HERE, INERTIA, BodyJoint, LinkInertia, Placement
-from throwcollect.engines.native_reading import reading_natively
 from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError
 from throwcollect.robots.robot import Robot
@@ -25,26 +24,17 @@ def joint_model(robot: Robot) -> pinocchio.Model:
 
     It is cached, because each trial with other locked joints or another tool needs it.
     """
-    source = robot.description.model
-    # Pinocchio gets the links and joints alone: it would take other things from the file than the strict reader.
-    bare = replace(source, links=tuple(replace(link, shapes=()) for link in source.links))
-    with reading_natively():
-        try:
-            model = pinocchio.buildModelFromXML(bare.write_urdf())
-        except (ValueError, RuntimeError) as error:
-            raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
-    _check_inertias(robot, model)
-    return model
-
-
-def _check_inertias(robot: Robot, model: pinocchio.Model) -> None:
-    """Make sure that there can be the bodies that joints move: engines would change others, or drop them."""
-    # Pinocchio's first joint is the universe.
+    try:
+        model = build_model(robot.description.model)
+    except (ValueError, RuntimeError) as error:
+        raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
+    # Engines would change a body that cannot be, or drop it. Pinocchio's first joint is the universe.
     for joint, body in zip(model.names[1:], model.inertias[1:], strict=True):
         where = f"{robot.urdf_path}: link {robot.description.joints[joint].child}, which {joint} moves,"
         if body.mass <= 0:
             raise ConfigError(f"{where} has no mass", hint="give it an <inertial> with <mass> and <inertia> in a copy")
         check_moments(where, body)
+    return model
 
 
 def check_moments(where: str, body: pinocchio.Inertia) -> None:

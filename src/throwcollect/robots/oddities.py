@@ -46,6 +46,6 @@ def find_oddities(robot: Robot) -> Iterator[str]:
     if tilt > _TILT_RAD:
         degrees = math.degrees(tilt)
         yield f"the posture at rest tilts the tool by {degrees:.0f}°; a task needs a start that holds the ball"
-    reach = max(postures.find_reach(postures.draw()) for _ in range(_DRAWS))
+    reach = max(np.linalg.norm(postures.place_tool(postures.draw()).translation) for _ in range(_DRAWS))
     if not _LEAST_REACH_M < reach < _MOST_REACH_M:
-        yield f"the hand is at most {reach:.3g} m from the base: are its lengths in metres?"
+        yield f"the tool is at most {reach:.3g} m from the base: are its lengths in metres?"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -47,7 +47,6 @@ class Robot:
         rigid: For each group of links that only mimic joints move, the prefix of the links' names. Links of a group are
             not checked for collisions with each other.
         sliding: Joints that are prismatic, whose positions are in metres and efforts in newtons.
-        ros1_names: Name of each controller in the robot's ROS 1 software; empty if the names are the same.
         goal_tolerance_rad: Largest distance of each joint from the end of a trajectory whose goal has no tolerances
             of its own; 0 is not checked.
         goal_time_s: Longest time after the end of such a trajectory until the joint is within that distance; 0 waits
@@ -70,7 +69,6 @@ class Robot:
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
     sliding: frozenset[str] = frozenset()
-    ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     goal_tolerance_rad: float = 0.0
     goal_time_s: float = 0.0
     stopped_velocity_radps: float = 0.01
@@ -113,10 +111,6 @@ class Robot:
         if self.package and url.startswith(own := f"{PACKAGE}{self.package}/"):
             return self.directory / url.removeprefix(own)
         return locate_mesh(url, self.urdf_path.parent, self.directory)
-
-    def graph_name(self, controller: str, naming: str) -> str:
-        """Return the name of a controller in the ROS graph, by the naming ``ros2`` or ``ros1``."""
-        return self.ros1_names.get(controller, controller) if naming == "ros1" else controller
 
     @property
     def directory(self) -> Path:
@@ -179,19 +173,14 @@ class Robot:
             raise ConfigError(f"{path}: joint {missing[0]} is missing")
         if self.hand not in urdf.links:
             raise ConfigError(f"{path}: link {self.hand} is missing")
-        moving = [joint.name for joint in urdf.model.joints if joint.moves]
-        kinds = {name: f"mimics {joint.mimics}" if joint.mimics else joint.kind for name, joint in urdf.joints.items()}
-        if more := [f"{name} ({kinds[name]})" for name in moving if name not in self.joints]:
-            raise ConfigError(
-                f"{path}: joints that move, but have no controller of {self.title}: {', '.join(more)}",
-                hint='make them type="fixed" in a copy of the URDF, or add them to a controller if they are revolute',
-            )
         wanted = {name: "prismatic" if name in self.sliding else "revolute" for name in self.joints}
-        if others := [name for name in self.joints if kinds[name] != wanted[name]]:
+        found = {joint.name: f"mimics {joint.mimics}" if joint.mimics else joint.kind for joint in urdf.model.joints}
+        moving = [joint.name for joint in urdf.model.moving]
+        if wrong := [name for name in (*moving, *self.joints) if found[name] != wanted.get(name)]:
             raise ConfigError(
-                f"{path}: joints of controllers should be {wanted[others[0]]}; "
-                + ", ".join(name + (" " if urdf.joints[name].mimics else " is ") + kinds[name] for name in others),
-                hint='a continuous joint becomes type="revolute" with a <limit> that has lower and upper',
+                f"{path}: joints that move should be those of controllers of {self.title}, and revolute, or "
+                f"prismatic if they slide: {', '.join(f'{name} ({found[name]})' for name in dict.fromkeys(wrong))}",
+                hint='make others type="fixed" in a copy of the URDF, and give a continuous joint a <limit> with ends',
             )
         return urdf
 
@@ -211,8 +200,8 @@ class Robot:
             posture = {name: float(angles.get(name, "0")) for name in self.joints}
         except ValueError as error:
             raise ConfigError(f"{path}: group_state {self.rest} is not readable: {error}") from error
-        if wrong := [name for name, angle in posture.items() if not math.isfinite(angle)]:
-            raise ConfigError(f"{path}: group_state {self.rest}: the angle of {wrong[0]} is not finite")
+        if not all(map(math.isfinite, posture.values())):
+            raise ConfigError(f"{path}: group_state {self.rest} has an angle that is not finite")
         return MappingProxyType(posture)
 
 

@@ -117,20 +117,18 @@ def looks_of(config: Config) -> tuple[BodyLook, ...]:
     looks, sections = [], _list_sections(config)
     for name in sorted(sections, key=lambda name: name == config.acted_on):
         section = sections[name]
-        shapes, (place, turn) = _make_shapes(section), _find_placement(section, sections)
-        for shape in shapes:
+        placement = _find_placement(section, sections)
+        for shape in _make_shapes(section):
             size = shape.size
             if shape.kind in ("cylinder", "sphere"):
                 radius, *length = size
                 size = (2 * radius, 2 * radius, *(length or [2 * radius]))
-            within = shape.placement
-            points = _turn(_find_corners(shape, np.array(size)), within.rpy) + within.xyz
-            points = _turn(points, turn) + place
+            points = _place(_place(_find_corners(shape, np.array(size)), shape.placement), placement)
             x, y, z = size
             above, side = (_find_outline(points[:, axes]) for axes in ([0, 1], [0, 2]))
-            pose, mesh = (place, turn, section.color, section.mass_kg is not None), shape.mesh
+            pose, mesh = (*placement, section.color, section.mass_kg is not None), shape.mesh
             file = "" if mesh is None else str(mesh.path)
-            looks.append(BodyLook(name, shape.kind, (x, y, z), *pose, above, side, within, file))
+            looks.append(BodyLook(name, shape.kind, (x, y, z), *pose, above, side, shape.placement, file))
     return tuple(looks)
 
 
@@ -159,14 +157,10 @@ def _find_outermost(mesh: Mesh) -> NDArray[np.float64]:
     return np.take(mesh.corners, ends, axis=0)
 
 
-def _turn(points: NDArray[np.float64], rpy_rad: Vector) -> NDArray[np.float64]:
-    """Turn points, shape ``(n, 3)``, about the fixed axes x, y, z in this order."""
-    turned = points.copy()
-    for angle, (one, other) in zip(rpy_rad, ((1, 2), (2, 0), (0, 1)), strict=True):
-        u, v = turned[:, [one, other]].T
-        turned[:, one] = math.cos(angle) * u - math.sin(angle) * v
-        turned[:, other] = math.sin(angle) * u + math.cos(angle) * v
-    return turned
+def _place(points: NDArray[np.float64], placement: Placement) -> NDArray[np.float64]:
+    """Find points of a frame in its parent, shape ``(n, 3)``."""
+    rows = Pose.of(placement.xyz, turn_of(placement)).rows
+    return matmul(points, np.array(rows).T) + placement.xyz
 
 
 @cache

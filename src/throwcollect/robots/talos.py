@@ -44,16 +44,6 @@ TALOS = Robot(
             "gripper_right_controller": ("gripper_right_joint",),
         }
     ),
-    ros1_names=MappingProxyType(
-        {
-            "arm_left_controller": "left_arm_controller",
-            "arm_right_controller": "right_arm_controller",
-            "leg_left_controller": "left_leg_controller",
-            "leg_right_controller": "right_leg_controller",
-            "gripper_left_controller": "left_gripper_controller",
-            "gripper_right_controller": "right_gripper_controller",
-        }
-    ),
     goal_tolerance_rad=0.02,
     goal_time_s=0.6,
     stopped_velocity_radps=0.05,

@@ -101,12 +101,27 @@ def read_urdf(root: ElementTree.Element, name: str, *, find_mesh: Callable[[str]
         name: The file, or what stands for it in messages.
         find_mesh: Finds the file of a collision mesh by its ``filename``.
     """
-    return _Reader(root, name, find_mesh).read()
+    robot = _Element(root, name)
+    if root.tag != "robot":
+        robot.fail(f"is {_OTHERS.get(root.tag, f'<{root.tag:.40}>, not URDF, whose root is <robot>')}")
+    if any("xacro" in each.tag or "${" in "".join(each.attrib.values()) for each in root.iter()):
+        robot.fail("is xacro, not URDF; convert it with `xacro FILE > robot.urdf`")
+    elements, joints = robot.list_named("link"), robot.list_named("joint")
+    if shared := elements.keys() & joints.keys():
+        # Pinocchio has a frame for the joint and one for the link, and cannot tell which one is meant.
+        raise ConfigError(
+            f"{name}: a joint has the name of a link: {', '.join(sorted(shared))}", hint="rename the joint in a copy"
+        )
+    read = tuple(_read_joint(joint, each) for joint, each in joints.items())
+    first = _find_root(robot, list(elements), read)
+    order = [first, *(link for link in elements if link != first)]
+    links = tuple(_read_link(link, elements[link], find_mesh) for link in order)
+    return Urdf(BodyModel(name=root.get("name", ""), links=links, joints=read))
 
 
 def read_visual(link: ElementTree.Element, visual: ElementTree.Element) -> LinkShape:
     """Read a shape for viewers; the file of a mesh is not looked for."""
-    return _Reader(link, "robot description", Path).read_shape(visual, of=link)
+    return _Element(visual, f"robot description: link {link.get('name')}").read_shape()
 
 
 def locate_mesh(filename: str, directory: Path, packages: Path) -> Path:
@@ -122,203 +137,46 @@ def locate_mesh(filename: str, directory: Path, packages: Path) -> Path:
     raise ConfigError(f"{filename!r:.255}: unknown kind of URL", expected="file:///... or package://...")
 
 
-class _Reader:
-    """Reads one description."""
+class _Element:
+    """An element of a description.
 
-    def __init__(self, root: ElementTree.Element, name: str, find_mesh: Callable[[str], Path]) -> None:
-        self._root, self._name, self._find_mesh = root, name, find_mesh
+    Args:
+        xml: The element.
+        where: Where it stands, for messages: the file, and a link or a joint in it.
+    """
 
-    def read(self) -> Urdf:
-        root = self._root
-        if root.tag != "robot":
-            self._fail(f"is {_OTHERS.get(root.tag, f'<{root.tag:.40}>, not URDF, whose root is <robot>')}")
-        if any("xacro" in each.tag or "${" in "".join(each.attrib.values()) for each in root.iter()):
-            self._fail("is xacro, not URDF; convert it with `xacro FILE > robot.urdf`")
-        elements = {self._read_name(link): link for link in root.findall("link")}
-        joints = {self._read_name(joint): self._read_joint(joint) for joint in root.findall("joint")}
-        for kind, named in (("link", elements), ("joint", joints)):
-            if len(named) < len(found := root.findall(kind)):
-                names = [element.get("name") for element in found]
-                self._fail(f"{kind} {next(name for name in names if names.count(name) > 1)} is there twice")
-        if shared := elements.keys() & joints.keys():
-            # Pinocchio has a frame for the joint and one for the link, and cannot tell which one is meant.
-            raise ConfigError(
-                f"{self._name}: a joint has the name of a link: {', '.join(sorted(shared))}",
-                hint="rename the joint in a copy",
-            )
-        first = self._find_root(list(elements), list(joints.values()))
-        order = [first, *(name for name in elements if name != first)]
-        model = BodyModel(
-            name=root.get("name", ""),
-            links=tuple(self._read_link(elements[name]) for name in order),
-            joints=tuple(joints.values()),
-        )
-        return Urdf(model)
+    def __init__(self, xml: ElementTree.Element, where: str) -> None:
+        self.xml, self._where = xml, where
 
-    def _read_link(self, link: ElementTree.Element) -> BodyLink:
-        shapes = []
-        for collision in link.findall("collision"):
-            shape = self.read_shape(collision, of=link)
-            if shape.kind == "mesh":
-                from throwcollect.engines.mesh import Mesh
+    def fail(self, message: str) -> NoReturn:
+        raise ConfigError(f"{self._where}: {message}")
 
-                filename = collision.find("geometry/mesh").get("filename", "")  # type: ignore[union-attr]
-                try:
-                    shape = replace(shape, mesh=Mesh(self._find_mesh(filename)))
-                except ConfigError as error:
-                    self._fail(f"link {link.get('name')}: {error.message}")
-            shapes.append(shape)
-        for visual in link.findall("visual"):
-            self.read_shape(visual, of=link)
-        return BodyLink(self._read_name(link), self._read_inertia(link), tuple(shapes))
-
-    def _read_inertia(self, link: ElementTree.Element) -> LinkInertia | None:
-        """Read mass and inertia, which are there both or not at all."""
-        inertial = link.find("inertial")
-        if inertial is None:
-            return None
-        mass, inertia = (self._find(inertial, tag, of=link) for tag in ("mass", "inertia"))
-        (mass_kg,) = self._read_numbers(mass, "value", 1, of=link)
-        if mass_kg < 0:
-            self._fail(f"link {link.get('name')}: value of <mass> should be a mass of at least 0, is {mass_kg:g}")
-        moments = tuple(self._read_numbers(inertia, key, 1, of=link)[0] for key in INERTIA)
-        return LinkInertia(mass_kg, self._read_placement(inertial, of=link), moments)
-
-    def read_shape(self, element: ElementTree.Element, *, of: ElementTree.Element) -> LinkShape:
-        """Read a collision or visual shape of a link, without the file of a mesh."""
-        geometry = next(iter(element.findall("geometry/*")), None)
-        if geometry is None:
-            self._fail(f"link {of.get('name')}: a {element.tag} without geometry")
-        if geometry.tag not in SIZES:
-            self._fail(f"link {of.get('name')}: unknown shape {geometry.tag:.40}; known: {', '.join(SIZES)}")
-        size: list[float] = []
-        for key in SIZES[geometry.tag]:
-            scale = [1.0] * 3 if key == "scale" else None
-            size += self._read_numbers(geometry, key, 3 if key in ("size", "scale") else 1, of=of, default=scale)
-        if geometry.tag == "mesh":
-            if not all(size) or not geometry.get("filename"):
-                self._fail(f"link {of.get('name')}: a mesh should have a filename, and a scale other than 0")
-        elif min(size) <= 0:
-            self._fail(f"link {of.get('name')}: sizes of a {geometry.tag} should be above 0")
-        return LinkShape(geometry.tag, tuple(size), self._read_placement(element, of=of))
-
-    def _read_joint(self, joint: ElementTree.Element) -> BodyJoint:
-        name, kind = self._read_name(joint), joint.get("type", "")
-        if kind not in _KINDS:
-            self._fail(f"joint {name}: unknown type {kind!r:.40}; known: {', '.join(_KINDS)}")
-        ends = [self._find(joint, end, of=joint).get("link", "") for end in ("parent", "child")]
-        axis, limits, damping, friction = (1.0, 0.0, 0.0), None, 0.0, 0.0
-        if kind != "fixed":
-            if (element := joint.find("axis")) is not None:
-                axis = _as_vector(self._read_numbers(element, "xyz", 3, of=joint))
-            if (length := math.hypot(*axis)) < _LEAST_AXIS:
-                self._fail(f"joint {name}: its axis {' '.join(f'{each:g}' for each in axis)} has no direction")
-            if not math.isclose(length, 1.0):
-                axis = _as_vector([each / length for each in axis])
-            limits = self._read_limits(joint, kind)
-            if (dynamics := joint.find("dynamics")) is not None:
-                (damping,), (friction,) = (
-                    self._read_numbers(dynamics, key, 1, of=joint, default=[0.0]) for key in ("damping", "friction")
-                )
-                if damping < 0 or friction < 0:
-                    self._fail(f"joint {name}: damping and friction should not be below 0")
-        mimic, factor, offset = joint.find("mimic"), 1.0, 0.0
-        if mimic is not None:
-            (factor,) = self._read_numbers(mimic, "multiplier", 1, of=joint, default=[1.0])
-            (offset,) = self._read_numbers(mimic, "offset", 1, of=joint, default=[0.0])
-        return BodyJoint(
-            name=name,
-            kind=kind,
-            parent=ends[0],
-            child=ends[1],
-            placement=self._read_placement(joint, of=joint),
-            axis=axis,
-            limits=limits,
-            damping=damping,
-            friction=friction,
-            mimics="" if mimic is None else mimic.get("joint", ""),
-            mimic_factor=factor,
-            mimic_offset=offset,
-        )
-
-    def _read_limits(self, joint: ElementTree.Element, kind: str) -> tuple[float, float, float, float] | None:
-        element = joint.find("limit")
-        if element is None:
-            if kind in ("revolute", "prismatic"):
-                self._fail(f"joint {joint.get('name')}: has no limit")
-            return None
-        # A continuous joint has no ends, and others may leave out an end that is 0, as the specification has it.
-        lower, upper, velocity, effort = (
-            self._read_numbers(
-                element,
-                key,
-                1,
-                of=joint,
-                default=[0.0] if key in ("lower", "upper") else None,
-                largest=math.inf,
-            )[0]
-            for key in LIMITS
-        )
-        if kind == "continuous":
-            lower, upper = -math.inf, math.inf
-        elif not (-math.inf < lower <= upper < math.inf and velocity >= 0 and effort >= 0):
-            found = ", ".join(f"{key} {element.get(key)}" for key in LIMITS)
-            self._fail(
-                f"joint {joint.get('name')}: lower should be at most upper, velocity and effort not below 0: {found}"
-            )
-        return lower, upper, velocity, effort
-
-    def _find_root(self, links: Sequence[str], joints: Sequence[BodyJoint]) -> str:
-        """Find the root of the tree of links, which all joints together have to form."""
-        carriers: dict[str, BodyJoint] = {}
-        for joint in joints:
-            for link in (joint.parent, joint.child):
-                if link not in links:
-                    self._fail(f"joint {joint.name}: there is no link {link!r:.80}")
-            if joint.child in carriers:
-                self._fail(f"link {joint.child} hangs on two joints: {carriers[joint.child].name} and {joint.name}")
-            carriers[joint.child] = joint
-        roots = [link for link in links if link not in carriers]
-        if len(roots) > 1:
-            self._fail(f"links {roots[0]} and {roots[1]} are not connected")
-        try:
-            TopologicalSorter({child: [joint.parent] for child, joint in carriers.items()}).prepare()
-        except CycleError:
-            self._fail("the joints form a ring")
-        if not roots:
-            self._fail("has no links")
-        return roots[0]
-
-    def _read_name(self, element: ElementTree.Element) -> str:
-        name = element.get("name", "")
-        if not name:
-            self._fail(f"a {element.tag} has no name")
-        return name
-
-    def _find(self, element: ElementTree.Element, tag: str, *, of: ElementTree.Element) -> ElementTree.Element:
-        found = element.find(tag)
-        if found is None:
-            self._fail(f"{of.tag} {of.get('name')}: <{element.tag}> without <{tag}>")
+    def list_named(self, tag: str) -> dict[str, _Element]:
+        """List the links or joints by their names, which have to differ."""
+        found: dict[str, _Element] = {}
+        for each in self.xml.findall(tag):
+            if not (name := each.get("name", "")):
+                self.fail(f"a {tag} has no name")
+            if name in found:
+                self.fail(f"{tag} {name} is there twice")
+            found[name] = _Element(each, f"{self._where}: {tag} {name}")
         return found
 
-    def _read_placement(self, element: ElementTree.Element, *, of: ElementTree.Element) -> Placement:
-        origin = element.find("origin")
-        if origin is None:
-            return Placement()
-        xyz, rpy = (_as_vector(self._read_numbers(origin, key, 3, of=of, default=[0.0] * 3)) for key in ("xyz", "rpy"))
-        return Placement(xyz, rpy)
+    def list_all(self, path: str) -> list[_Element]:
+        return [_Element(each, self._where) for each in self.xml.findall(path)]
 
-    def _read_numbers(
-        self,
-        element: ElementTree.Element,
-        key: str,
-        count: int,
-        *,
-        of: ElementTree.Element,
-        default: list[float] | None = None,
-        largest: float = _LARGEST_NUMBER,
+    def find(self, tag: str) -> _Element | None:
+        return next(iter(self.list_all(tag)), None)
+
+    def require(self, tag: str) -> _Element:
+        if (found := self.find(tag)) is None:
+            self.fail(f"<{self.xml.tag}> without <{tag}>")
+        return found
+
+    def read_numbers(
+        self, key: str, count: int = 3, default: list[float] | None = None, largest: float = _LARGEST_NUMBER
     ) -> list[float]:
-        text = element.get(key)
+        text = self.xml.get(key)
         if text is None and default is not None:
             return default
         try:
@@ -329,13 +187,127 @@ class _Reader:
         if len(values) != count or not all(abs(value) <= largest for value in values):
             numeral = "a finite number" if count == 1 else f"{count} finite numbers"
             given = "is missing" if text is None else f"is {text!r:.80}"
-            self._fail(f"{of.tag} {of.get('name')}: {key} of <{element.tag}> should be {numeral}, {given}")
+            self.fail(f"{key} of <{self.xml.tag}> should be {numeral}, {given}")
         return values
 
-    def _fail(self, message: str) -> NoReturn:
-        raise ConfigError(f"{self._name}: {message}")
+    def read_number(self, key: str, default: float | None = None, largest: float = _LARGEST_NUMBER) -> float:
+        (number,) = self.read_numbers(key, 1, None if default is None else [default], largest)
+        return number
+
+    def read_placement(self) -> Placement:
+        if (origin := self.find("origin")) is None:
+            return Placement()
+        xyz, rpy = (as_vector(origin.read_numbers(key, default=[0.0] * 3)) for key in ("xyz", "rpy"))
+        return Placement(xyz, rpy)
+
+    def read_shape(self) -> LinkShape:
+        """Read a collision or visual shape, without the file of a mesh."""
+        if (geometry := self.find("geometry/*")) is None:
+            self.fail(f"a {self.xml.tag} without geometry")
+        kind = geometry.xml.tag
+        if kind not in SIZES:
+            self.fail(f"unknown shape {kind:.40}; known: {', '.join(SIZES)}")
+        size: list[float] = []
+        for key in SIZES[kind]:
+            size += geometry.read_numbers(
+                key, 3 if key in ("size", "scale") else 1, [1.0] * 3 if key == "scale" else None
+            )
+        if kind == "mesh" and not (all(size) and geometry.xml.get("filename")):
+            self.fail("a mesh should have a filename, and a scale other than 0")
+        if kind != "mesh" and min(size) <= 0:
+            self.fail(f"sizes of a {kind} should be above 0")
+        return LinkShape(kind, tuple(size), self.read_placement())
 
 
-def _as_vector(numbers: Sequence[float]) -> Vector:
+def _read_link(name: str, link: _Element, find_mesh: Callable[[str], Path]) -> BodyLink:
+    shapes = []
+    for collision in link.list_all("collision"):
+        shape = collision.read_shape()
+        if shape.kind == "mesh":
+            from throwcollect.engines.mesh import Mesh
+
+            try:
+                path = find_mesh(collision.require("geometry/mesh").xml.get("filename", ""))
+            except ConfigError as error:
+                link.fail(error.message)
+            shape = replace(shape, mesh=Mesh(path))
+        shapes.append(shape)
+    for visual in link.list_all("visual"):
+        visual.read_shape()
+    # Mass and inertia are there both or not at all.
+    if (inertial := link.find("inertial")) is None:
+        return BodyLink(name, None, tuple(shapes))
+    mass_kg, inertia = inertial.require("mass").read_number("value"), inertial.require("inertia")
+    if mass_kg < 0:
+        link.fail(f"value of <mass> should be a mass of at least 0, is {mass_kg:g}")
+    moments = tuple(inertia.read_number(key) for key in INERTIA)
+    return BodyLink(name, LinkInertia(mass_kg, inertial.read_placement(), moments), tuple(shapes))
+
+
+def _read_joint(name: str, joint: _Element) -> BodyJoint:
+    kind = joint.xml.get("type", "")
+    if kind not in _KINDS:
+        joint.fail(f"unknown type {kind!r:.40}; known: {', '.join(_KINDS)}")
+    parent, child = (joint.require(end).xml.get("link", "") for end in ("parent", "child"))
+    read = BodyJoint(name, kind, parent, child, joint.read_placement())
+    if (mimic := joint.find("mimic")) is not None:
+        factor, offset = mimic.read_number("multiplier", 1.0), mimic.read_number("offset", 0.0)
+        read = replace(read, mimics=mimic.xml.get("joint", ""), mimic_factor=factor, mimic_offset=offset)
+    if kind == "fixed":
+        return read
+    axis = [1.0, 0.0, 0.0] if (element := joint.find("axis")) is None else element.read_numbers("xyz")
+    if (length := math.hypot(*axis)) < _LEAST_AXIS:
+        joint.fail(f"its axis {' '.join(f'{each:g}' for each in axis)} has no direction")
+    if not math.isclose(length, 1.0):
+        axis = [each / length for each in axis]
+    damping, friction = 0.0, 0.0
+    if (dynamics := joint.find("dynamics")) is not None:
+        damping, friction = (dynamics.read_number(key, 0.0) for key in ("damping", "friction"))
+    if damping < 0 or friction < 0:
+        joint.fail("damping and friction should not be below 0")
+    limits = _read_limits(joint, kind)
+    return replace(read, axis=as_vector(axis), limits=limits, damping=damping, friction=friction)
+
+
+def _read_limits(joint: _Element, kind: str) -> tuple[float, float, float, float] | None:
+    if (limit := joint.find("limit")) is None:
+        if kind in ("revolute", "prismatic"):
+            joint.fail("has no limit")
+        return None
+    # A continuous joint has no ends, and others may leave out an end that is 0, as the specification has it.
+    lower, upper = (limit.read_number(key, 0.0, math.inf) for key in ("lower", "upper"))
+    velocity, effort = (limit.read_number(key, None, math.inf) for key in ("velocity", "effort"))
+    if kind == "continuous":
+        lower, upper = -math.inf, math.inf
+    elif not (-math.inf < lower <= upper < math.inf and velocity >= 0 and effort >= 0):
+        found = ", ".join(f"{key} {limit.xml.get(key)}" for key in LIMITS)
+        joint.fail(f"lower should be at most upper, velocity and effort not below 0: {found}")
+    return lower, upper, velocity, effort
+
+
+def _find_root(robot: _Element, links: Sequence[str], joints: Sequence[BodyJoint]) -> str:
+    """Find the root of the tree of links, which all joints together have to form."""
+    carriers: dict[str, BodyJoint] = {}
+    for joint in joints:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                robot.fail(f"joint {joint.name}: there is no link {link!r:.80}")
+        if joint.child in carriers:
+            robot.fail(f"link {joint.child} hangs on two joints: {carriers[joint.child].name} and {joint.name}")
+        carriers[joint.child] = joint
+    roots = [link for link in links if link not in carriers]
+    if len(roots) > 1:
+        robot.fail(f"links {roots[0]} and {roots[1]} are not connected")
+    try:
+        TopologicalSorter({child: [joint.parent] for child, joint in carriers.items()}).prepare()
+    except CycleError:
+        robot.fail("the joints form a ring")
+    if not roots:
+        robot.fail("has no links")
+    return roots[0]
+
+
+def as_vector(numbers: Sequence[float]) -> Vector:
+    """Make a vector of three numbers."""
     x, y, z = numbers
     return x, y, z

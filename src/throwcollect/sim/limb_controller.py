@@ -41,7 +41,7 @@ class LimbController:
     def __init__(
         self, robot: Robot, limb: str, *, moving: Sequence[str], period_ns: int, config: ControllersConfig
     ) -> None:
-        self.name = robot.graph_name(limb, config.names)
+        self.name = limb
         """Name of the controller in the ROS graph."""
         joints = robot.controllers[limb]
         self._configured = _configure(robot, joints, config)

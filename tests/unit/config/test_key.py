@@ -31,7 +31,6 @@ def test_every_key_declares_its_effect():
         ("record.zstd_level", Effect.ENCODING),
         ("record.trials_per_shard", Effect.FILES),
         ("sim.real_time_factor", Effect.APPEARANCE),
-        ("controllers.names", Effect.APPEARANCE),
         ("controllers.hold", Effect.PHYSICS),
         ("task.start.torso_1_joint", Effect.PHYSICS),
         ("task.end.torso_1_joint", Effect.TASK),

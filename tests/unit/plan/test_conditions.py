@@ -15,7 +15,6 @@ CONFIG = Config()
 WITHOUT_EFFECT = {
     "sim.real_time_factor": 2.0,
     "record.trials_per_shard": 7,
-    "controllers.names": "ros1",
     "task.duration_s": 1.5,
     "task.points_hz": 50.0,
     "task.recatch_gap_s": 0.1,

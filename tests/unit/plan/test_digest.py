@@ -14,7 +14,7 @@ from throwcollect.plan.trials import Points
 from throwcollect.tasks.throw.throw_config import UntilLanded
 
 WITHOUT_EFFECT = {
-    *("name", "trials", "until", "sim.real_time_factor", "controllers.names"),
+    *("name", "trials", "until", "sim.real_time_factor"),
     *("record.zstd_level", "record.trials_per_shard"),
 }
 POINTS = Points(("ball.mass_kg", "task.duration_s"), np.array([[0.1, 1.0], [0.2, 1.0]]))
@@ -54,7 +54,6 @@ def test_a_swept_and_a_fixed_value_give_the_same_digest():
         {"cluster": ClusterConfig(partition="long")},
         {"sim": Config().sim.model_copy(update={"real_time_factor": 1.0})},
         {"record": Config().record.model_copy(update={"zstd_level": 9, "trials_per_shard": 9})},
-        {"controllers": ControllersConfig(names="ros1")},
         {"until": UntilLanded(landed=9)},
         {"sweep": SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)}, target=TARGET)},
     ],

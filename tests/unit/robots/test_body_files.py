@@ -33,10 +33,9 @@ def write_box(path: Path, low: tuple[float, ...], high: tuple[float, ...]) -> Pa
 
 L_SHAPE = """\
 <robot name="l_shape">
-  <material name="blue"><color rgba="0 0.5 1 1"/></material>
   <link name="foot">
     <inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
-    <visual><geometry><sphere radius="1"/></geometry><material name="blue"/></visual>
+    <visual><geometry><sphere radius="1"/></geometry></visual>
     <collision><geometry><box size="0.4 0.2 0.1"/></geometry></collision>
   </link>
   <link name="post">
@@ -88,7 +87,7 @@ def test_a_mesh_lies_on_another_by_its_hull(tmp_path: Path) -> None:
     assert heights["turned"] == pytest.approx((1.0, 0.2, 0.7))
 
 
-def test_a_urdf_is_one_body_with_the_colour_and_the_spread_of_mass_of_its_links(tmp_path: Path) -> None:
+def test_a_urdf_is_one_body_with_the_spread_of_mass_of_its_links(tmp_path: Path) -> None:
     write_l_shape(tmp_path)
     config = load_bodies(
         tmp_path,
@@ -102,7 +101,7 @@ def test_a_urdf_is_one_body_with_the_colour_and_the_spread_of_mass_of_its_links(
     assert thing.inertia.diagonal == pytest.approx([(2 + 4 * 0.125**2) / 4] * 2 + [0.5])
     assert thing.placement.xyz == pytest.approx((0.0, 0.0, 0.15))
     one, other, _, _ = looks_of(config)
-    assert (one.shape, other.shape, one.color) == ("box", "mesh", "#0080ff")
+    assert (one.shape, other.shape) == ("box", "mesh")
     # The post stands upright: its y is the vertical.
     assert np.ptp(np.array(other.side_m), axis=0) == pytest.approx([0.2, 0.4], abs=2e-3)
 

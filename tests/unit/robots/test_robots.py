@@ -35,12 +35,6 @@ def test_every_joint_has_one_controller(robot: Robot) -> None:
 
 
 @of_every_robot
-def test_controllers_have_different_names_in_the_ros_graph(robot: Robot) -> None:
-    for naming in ("ros1", "ros2"):
-        assert len({robot.graph_name(controller, naming) for controller in robot.controllers}) == len(robot.controllers)
-
-
-@of_every_robot
 def test_the_posture_at_rest_is_within_the_limits(robot: Robot) -> None:
     limits = joint_limits(robot)
     posture = np.array([robot.rest_posture[joint] for joint in robot.joints])

@@ -31,21 +31,6 @@ def goal(seconds: float, elbow: float = -1.0) -> TrajectoryGoal:
     return TrajectoryGoal(through([TrajectoryPoint(round(seconds * 1e9), positions)], TALOS.controllers[ARM]))
 
 
-def test_controllers_have_the_names_of_either_ros() -> None:
-    names = [limb.name for limb in simulation(names="ros1").limbs.values()]
-    assert names == [
-        "left_arm_controller",
-        "right_arm_controller",
-        "left_leg_controller",
-        "right_leg_controller",
-        "torso_controller",
-        "head_controller",
-        "left_gripper_controller",
-        "right_gripper_controller",
-    ]
-    assert [TALOS.graph_name(name, "ros2") for name in TALOS.controllers] == list(TALOS.controllers)
-
-
 def parameters_of(name: str, **options: object) -> ControllerParameters:
     return simulation(**options).limbs[name].controller.parameters
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from throwcollect.engines.ballistic.tool_path import Array, ToolPath
+from throwcollect.engines.ballistic.tool_path import ToolPath
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import (
     GROUND,
+    UPRIGHT,
     BodyState,
     Engine,
     Observer,
@@ -19,6 +21,7 @@ from throwcollect.engines.engine import (
     Scene,
     State,
     Steps,
+    make_rest,
     object_in,
 )
 from throwcollect.errors import ConfigError, Problem
@@ -43,20 +46,10 @@ class BallisticEngine(Engine):
     - The object never spins, and nothing touches the robot.
     """
 
-    _scene: Scene
-    _physics: Physics
-    _joints: Array
-    _velocities: Array
-    _position: Vector
-    _velocity: Vector
-
     def __init__(self) -> None:
         self._touching = self._reported = _FREE
         self._orientation = (0.0, 0.0, 0.0, 1.0)
         self._seat = np.zeros((3, 1))
-
-    def close(self) -> None:
-        """Do nothing: this world holds no resources."""
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene."""
@@ -82,13 +75,12 @@ class BallisticEngine(Engine):
 
     def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
         """Put joints and object at their start, all at rest."""
-        placed, touching = self._scene.object.start, _FREE
+        place = None
         if seat is not None:
-            place, turn = self._tool_path.along(np.array([joints]))
-            centre = (place + matmul(turn, np.array(seat).reshape(3, 1))).ravel().tolist()
-            placed, touching = (*centre, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 6), self._carried_by
-        still = (0.0,) * len(joints)
-        self.reset(State((*joints, *still, *still, *placed), touching))
+            origin, turn = self._tool_path.along(np.array([joints]))
+            x, y, z = (origin + matmul(turn, np.array(seat).reshape(3, 1))).ravel().tolist()
+            place = (x, y, z), UPRIGHT
+        self.reset(replace(make_rest(self._scene, joints, place), touching=_FREE if seat is None else self._carried_by))
 
     def reset(self, state: State) -> None:
         """Put robot and object into a state; the place of an object that touches the tool becomes its seat."""

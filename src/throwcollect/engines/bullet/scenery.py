@@ -9,17 +9,19 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pybullet
-from numpy.typing import NDArray
 
 from throwcollect.engines.body import BodyModel, Vector
 from throwcollect.engines.engine import (
     GROUND,
+    UPRIGHT,
     BodyState,
-    LoadedLink,
+    LoadedRobot,
     Physics,
     Quaternion,
     Sample,
@@ -33,8 +35,6 @@ from throwcollect.errors import ConfigError, WorkerError
 
 Surface = tuple[int, int]
 """Body and link number in Bullet."""
-
-UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 BASE = -1
 """Link number of the first link of a body."""
@@ -68,26 +68,36 @@ class Scenery:
     names: dict[Surface, str]
 
 
-def connect() -> int:
-    """Start an empty world in this process, and return the number of its physics client."""
-    client = int(pybullet.connect(pybullet.DIRECT))
-    if client < 0:
-        raise WorkerError("Bullet could not start a physics world", hint="close other worlds of this process")
-    return client
+class World:
+    """The functions of Bullet, for an empty world in this process.
+
+    Raises:
+        WorkerError: If Bullet refuses to start another world in this process.
+    """
+
+    def __init__(self) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
+        if self._client < 0:
+            raise WorkerError("Bullet could not start a physics world", hint="close other worlds of this process")
+
+    def __getattr__(self, name: str) -> Any:
+        """Bind a function of Bullet to this world."""
+        bound = partial(getattr(pybullet, name), physicsClientId=self._client)
+        setattr(self, name, bound)
+        return bound
 
 
-def load_scenery(client: int, scene: Scene) -> Scenery:
+def load_scenery(world: World, scene: Scene) -> Scenery:
     """Empty the world and load ground and robot into it."""
-    pybullet.resetSimulation(physicsClientId=client)
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
-    ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
+    world.resetSimulation()
+    plane = world.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1])
+    ground = world.createMultiBody(0, plane)
     # By default Bullet computes inertias from the collision shapes.
-    robot = _load_model(client, add_held_link(scene.robot, scene.tool), (0.0, 0.0, scene.base_height_m))
-    root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
-    joints = {}
-    names = {(ground, BASE): GROUND, (robot, BASE): root}
-    for number in links(client, robot)[1:]:
-        info = pybullet.getJointInfo(robot, number, physicsClientId=client)
+    robot = _load_model(world, add_held_link(scene.robot, scene.tool), (0.0, 0.0, scene.base_height_m))
+    root = world.getBodyInfo(robot)[0].decode()
+    joints, names = {}, {(ground, BASE): GROUND, (robot, BASE): root}
+    for number in range(world.getNumJoints(robot)):
+        info = world.getJointInfo(robot, number)
         # Field 1 is the name of the joint, field 12 the name of the link that it moves.
         joints[info[1].decode()] = number
         names[robot, number] = info[12].decode()
@@ -97,13 +107,13 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
         group, mask = _ROBOT_GROUP, _OBJECT_GROUP
         if body == ground:
             group, mask = (_GROUND_GROUP, _OBJECT_GROUP) if scene.ground_is_solid else (_FLOOR_GROUP, 0)
-        pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
+        world.setCollisionFilterGroupMask(body, link, group, mask)
     held = joints.get(HELD_LINK)
     return Scenery(robot, [joints[joint] for joint in scene.moving], tool, held, names)
 
 
 def _load_model(
-    client: int, model: BodyModel, position: Vector, turn: Quaternion = UPRIGHT, *, moves: bool = False
+    world: World, model: BodyModel, position: Vector, turn: Quaternion = UPRIGHT, *, moves: bool = False
 ) -> int:
     """Load a tree of links at a pose in world, whose root does not move by default; return its body number."""
     # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
@@ -115,50 +125,31 @@ def _load_model(
         flags, fixed = pybullet.URDF_USE_INERTIA_FROM_FILE, not moves
         with reading_natively():
             try:
-                return int(pybullet.loadURDF(str(path), position, turn, 0, fixed, flags, physicsClientId=client))
+                return int(world.loadURDF(str(path), position, turn, 0, fixed, flags))
             except pybullet.error as error:
                 raise ConfigError(f"Bullet cannot load the description: {error}") from error
 
 
-def describe_links(client: int, robot: int) -> list[LoadedLink]:
-    """Describe the links of a robot whose joints are at 0 (see `Engine.describe_robot`)."""
-    found = []
-    for link in links(client, robot):
-        mass, _, moments, *_ = pybullet.getDynamicsInfo(robot, link, physicsClientId=client)
-        axis, ends, name = None, None, pybullet.getBodyInfo(robot, physicsClientId=client)[0]
-        if link == BASE:
-            origin, frame = pybullet.getBasePositionAndOrientation(robot, physicsClientId=client)
-        else:
-            # The pose of the centre of mass, with the principal axes.
-            origin, frame, *_ = pybullet.getLinkState(
-                robot, link, computeForwardKinematics=True, physicsClientId=client
-            )
-            joint = pybullet.getJointInfo(robot, link, physicsClientId=client)
-            name = joint[12]
-            if joint[2] != pybullet.JOINT_FIXED:
-                axis, ends = _turn(frame) @ joint[13], (joint[8], joint[9])
-        rotation = _turn(frame)
-        shapes = len(pybullet.getCollisionShapeData(robot, link, physicsClientId=client))
-        found.append(
-            LoadedLink(
-                name=name.decode(),
-                mass_kg=mass,
-                centre=np.array(origin),
-                inertia=rotation * moments @ rotation.T,
-                shapes=shapes,
-                box=pybullet.getAABB(robot, link, physicsClientId=client) if shapes else None,
-                axis=axis,
-                range=ends,
-            )
-        )
-    return found
+def describe(world: World, scenery: Scenery, positions: Sequence[float]) -> LoadedRobot:
+    """Describe a robot with its moving joints at some positions (see `Engine.describe_robot`)."""
+    robot = scenery.robot
+    infos = [world.getJointInfo(robot, number) for number in range(world.getNumJoints(robot))]
+    names = [world.getBodyInfo(robot)[0], *(info[12] for info in infos)]
+    shapes = {
+        name.decode(): len(world.getCollisionShapeData(robot, number)) for number, name in enumerate(names, start=BASE)
+    }
+    # Field 3 is the place of a joint among positions; the first 7 are those of a base that could move.
+    columns = [infos[joint][3] - 7 for joint in scenery.joints]
+    posture = [0.0] * len(positions)
+    for joint, column, position in zip(scenery.joints, columns, positions, strict=True):
+        posture[column] = position
+        world.resetJointState(robot, joint, position)
+    matrix = np.array(world.calculateMassMatrix(robot, posture))[np.ix_(columns, columns)]
+    state = world.getLinkState(robot, scenery.tool, computeForwardKinematics=True)
+    return LoadedRobot(shapes, matrix, state[4])
 
 
-def _turn(quaternion: Quaternion) -> NDArray[np.float64]:
-    return np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-
-
-def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody]:
+def load_bodies(world: World, bodies: Sequence[SceneBody]) -> dict[int, SceneBody]:
     """Put bodies into the world, and return them by their body numbers."""
     numbers = {}
     for body in bodies:
@@ -166,33 +157,33 @@ def load_bodies(client: int, bodies: Sequence[SceneBody]) -> dict[int, SceneBody
         link = body.link if body.moves else replace(body.link, inertia=ANY_INERTIA)
         at = body_of(body.start)
         model = BodyModel(link.name, (link,))
-        number = _load_model(client, model, at.position, at.orientation_xyzw, moves=body.moves)
+        number = _load_model(world, model, at.position, at.orientation_xyzw, moves=body.moves)
         if not body.moves:
-            pybullet.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _OBJECT_GROUP, physicsClientId=client)
+            world.setCollisionFilterGroupMask(number, BASE, _ROBOT_GROUP, _OBJECT_GROUP)
         if any(shape.mesh is not None for shape in link.shapes):
             # Around a hull, Bullet would leave a margin of 1 mm.
-            pybullet.changeDynamics(number, BASE, collisionMargin=0.0, physicsClientId=client)
+            world.changeDynamics(number, BASE, collisionMargin=0.0)
         numbers[number] = body
     return numbers
 
 
-def place_body(client: int, number: int, body: SceneBody, state: BodyState) -> None:
+def place_body(world: World, number: int, body: SceneBody, state: BodyState) -> None:
     """Set pose and velocity of a body, whose centre of mass Bullet places."""
     place, turn, linear = state.position, state.orientation_xyzw, state.linear_velocity
     if not body.inertia.is_centred:
-        centre, axes = pybullet.getDynamicsInfo(number, BASE, physicsClientId=client)[3:5]
-        place, turn = pybullet.multiplyTransforms(place, turn, centre, axes)
+        centre, axes = world.getDynamicsInfo(number, BASE)[3:5]
+        place, turn = world.multiplyTransforms(place, turn, centre, axes)
         linear = _move_velocity(linear, state.angular_velocity, state.position, place)
-    pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
-    pybullet.resetBaseVelocity(number, linear, state.angular_velocity, physicsClientId=client)
+    world.resetBasePositionAndOrientation(number, place, turn)
+    world.resetBaseVelocity(number, linear, state.angular_velocity)
 
 
-def find_origin(client: int, number: int, numbers: Sample) -> Sample:
+def find_origin(world: World, number: int, numbers: Sample) -> Sample:
     """Compute the numbers of a sample for the origin of a body from those for its centre of mass."""
     centre = body_of(numbers)
-    frame = pybullet.getDynamicsInfo(number, BASE, physicsClientId=client)[3:5]
-    back = pybullet.invertTransform(*frame)
-    place, turn = pybullet.multiplyTransforms(centre.position, centre.orientation_xyzw, *back)
+    frame = world.getDynamicsInfo(number, BASE)[3:5]
+    back = world.invertTransform(*frame)
+    place, turn = world.multiplyTransforms(centre.position, centre.orientation_xyzw, *back)
     linear = _move_velocity(centre.linear_velocity, centre.angular_velocity, centre.position, place)
     return (*place, *turn, *linear, *centre.angular_velocity)
 
@@ -203,71 +194,50 @@ def _move_velocity(linear: Vector, angular: Vector, at: Vector, to: Vector) -> V
     return linear[0] + b * z - c * y, linear[1] + c * x - a * z, linear[2] + a * y - b * x
 
 
-def renew_moving(client: int, body: int) -> None:
+def renew_moving(world: World, body: int) -> None:
     """Let a body that moves collide with everything; Bullet then forgets all contacts that it had."""
     everything = _GROUND_GROUP | _ROBOT_GROUP | _OBJECT_GROUP | _MOVING_GROUP | _FLOOR_GROUP
-    pybullet.setCollisionFilterGroupMask(body, BASE, _MOVING_GROUP, everything, physicsClientId=client)
+    world.setCollisionFilterGroupMask(body, BASE, _MOVING_GROUP, everything)
 
 
-def load_object(client: int, body: SceneBody) -> int:
+def load_object(world: World, body: SceneBody) -> int:
     """Put the object into the world, far above everything else, and return its body number.
 
     Its sizes cannot be changed later.
     """
     (shape,) = body.link.shapes
-    names = _SIZES[shape.kind]
-    size = (
-        {"halfExtents": [edge / 2 for edge in shape.size]} if not names else dict(zip(names, shape.size, strict=True))
-    )
-    number = pybullet.createCollisionShape(_KINDS[shape.kind], physicsClientId=client, **size)
-    object_id = int(pybullet.createMultiBody(1, number, basePosition=[0, 0, 100], physicsClientId=client))
-    renew_pairs(client, object_id)
+    size: dict[str, Any] = dict(zip(_SIZES[shape.kind], shape.size, strict=False))
+    if shape.kind == "box":
+        size["halfExtents"] = [edge / 2 for edge in shape.size]
+    number = world.createCollisionShape(_KINDS[shape.kind], **size)
+    object_id = int(world.createMultiBody(1, number, basePosition=[0, 0, 100]))
+    renew_pairs(world, object_id)
     return object_id
 
 
-def renew_pairs(client: int, object_id: int, *, floor: bool = False) -> None:
+def renew_pairs(world: World, object_id: int, *, floor: bool = False) -> None:
     """Let the object collide with everything, or also with a floor; Bullet then forgets all contacts that it had."""
     mask = _GROUND_GROUP | _ROBOT_GROUP | (_FLOOR_GROUP if floor else 0)
-    pybullet.setCollisionFilterGroupMask(object_id, BASE, _OBJECT_GROUP, mask, physicsClientId=client)
+    world.setCollisionFilterGroupMask(object_id, BASE, _OBJECT_GROUP, mask)
 
 
-def links(client: int, body: int) -> range:
-    """List the link numbers of a body, that of its base included."""
-    return range(BASE, pybullet.getNumJoints(body, physicsClientId=client))
-
-
-def set_physics(client: int, scenery: Scenery, bodies: Mapping[int, SceneBody], physics: Physics) -> None:
+def set_physics(world: World, scenery: Scenery, bodies: Mapping[int, SceneBody], physics: Physics) -> None:
     """Set time step, solver, gravity and surfaces, also of bodies by their numbers, so that no earlier ones stay."""
-    pybullet.setPhysicsEngineParameter(
+    world.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,
         # Otherwise friction acts along two directions separately, and turns what slides between them.
         enableConeFriction=1,
         # Bullet sorts the pairs of shapes, so that contacts are solved in the same order each time.
         deterministicOverlappingPairs=1,
-        physicsClientId=client,
     )
-    pybullet.setGravity(0, 0, -physics.gravity_mps2, physicsClientId=client)
+    world.setGravity(0, 0, -physics.gravity_mps2)
     # Bullet's default damping of 0.04/s has no physical cause and would shorten a throw by 6 cm.
     undamped = {"linearDamping": 0, "angularDamping": 0}
     for body, link in scenery.names:
         # Bullet multiplies restitutions: with 1 here, only the restitution of the object counts.
-        pybullet.changeDynamics(
-            body,
-            link,
-            lateralFriction=physics.surface_friction,
-            restitution=1,
-            physicsClientId=client,
-            **undamped,
-        )
+        world.changeDynamics(body, link, lateralFriction=physics.surface_friction, restitution=1, **undamped)
     for number, each in bodies.items():
-        pybullet.changeDynamics(
-            number,
-            BASE,
-            lateralFriction=each.friction,
-            restitution=each.restitution,
-            rollingFriction=each.rolling_friction_m,
-            spinningFriction=each.rolling_friction_m,
-            physicsClientId=client,
-            **undamped,
-        )
+        rolling = dict.fromkeys(("rollingFriction", "spinningFriction"), each.rolling_friction_m)
+        surface = {"lateralFriction": each.friction, "restitution": each.restitution, **rolling}
+        world.changeDynamics(number, BASE, **surface, **undamped)

@@ -14,7 +14,7 @@ from throwcollect.engines.engine import (
     BODY_NUMBERS,
     BodyState,
     Engine,
-    LoadedLink,
+    LoadedRobot,
     Observer,
     Physics,
     Quaternion,
@@ -23,6 +23,7 @@ from throwcollect.engines.engine import (
     State,
     Steps,
     body_of,
+    make_rest,
     object_in,
     split_bodies,
 )
@@ -30,8 +31,7 @@ from throwcollect.engines.grip import HELD_LINK, carry, find_held
 from throwcollect.engines.mujoco.loop import check_version, make_loop
 from throwcollect.engines.mujoco.scenery import (
     OBJECT,
-    Surface,
-    describe_links,
+    count_shapes,
     find_bounces,
     find_reach,
     let_object_hit_floor,
@@ -60,12 +60,7 @@ class MujocoEngine(Engine):
     """
 
     _scene: Scene
-    _physics: Physics
-    _surfaces: list[Surface]
-    _seat: int | None
-    _held: BodyState | None
     _model: mujoco.MjModel
-    _data: mujoco.MjData
 
     def __init__(self) -> None:
         check_version()
@@ -100,7 +95,7 @@ class MujocoEngine(Engine):
         place_bodies(self._model, scene.bodies)
         self._data = mujoco.MjData(self._model)
         self._seat = None if scene.tool.seat is None else self._model.body(HELD_LINK).id
-        self._grip = [surface.name == scene.tool.name for surface in self._surfaces]
+        self._grip = [name == scene.tool.name for name in self._surfaces]
         # Joints of the robot come first in the model, but not in the order of the scene.
         names = [self._model.joint(number).name for number in range(len(scene.moving))]
         self._columns = np.array([scene.moving.index(name) for name in names])
@@ -130,9 +125,15 @@ class MujocoEngine(Engine):
         sizes = (*self._sizes, surfaces, watched)
         self._fixed = [*_LOOP.list_world(model, data), *map(_LOOP.share, self._memory), *sizes]
 
-    def describe_robot(self) -> list[LoadedLink]:
-        """Describe the robot's links as MuJoCo has them."""
-        return describe_links(self._model, self._scene.robot)
+    def describe_robot(self, positions: Sequence[float]) -> LoadedRobot:
+        """Describe the robot as MuJoCo has it."""
+        model, count = self._model, len(self._order)
+        data, matrix = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+        data.qpos[:count] = np.array(positions)[self._columns]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, matrix)
+        x, y, z = data.body(self._scene.tool.link).xpos.tolist()
+        return LoadedRobot(count_shapes(model, self._scene), matrix[np.ix_(self._order, self._order)], (x, y, z))
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""
@@ -145,19 +146,14 @@ class MujocoEngine(Engine):
     def rest(self, joints: Sequence[float], seat: Vector | None) -> None:
         """Put joints, object and bodies at their start, all at rest."""
         model, data = self._model, self._data
-        placed, touching = self._scene.object.start, frozenset[str]()
+        place = None
         if seat is not None:
             data.qpos[: len(joints)] = np.array(joints)[self._columns]
             mujoco.mj_kinematics(model, data)
             tool = data.body(self._scene.tool.link)
             centre = (tool.xpos + matmul(tool.xmat.reshape(3, 3), np.array(seat).reshape(3, 1)).ravel()).tolist()
-            turn: Quaternion = (0.0, 0.0, 0.0, 1.0)
-            if self._scene.tool.seat is not None:
-                turn, touching = _to_xyzw(tool.xquat), frozenset({self._scene.tool.name})
-            placed = (*centre, *turn, *(0.0,) * 6)
-        still = (0.0,) * len(joints)
-        bodies = [part for body in self._scene.moving_bodies for part in body.start]
-        self.reset(State((*joints, *still, *still, *bodies, *placed), touching))
+            place = centre, _to_xyzw(tool.xquat)
+        self.reset(make_rest(self._scene, joints, place))
 
     def reset(self, state: State) -> None:
         """Put robot, bodies and object into a state, and leave no trace of earlier ones in the world."""
@@ -267,7 +263,7 @@ class MujocoEngine(Engine):
 
     def _report_touch(self, step: int, presses: Sequence[int], observer: Observer) -> None:
         """Tell the observer which bodies press on the object now, if others did before; one number says so of each."""
-        touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
+        touching = frozenset(compress(self._surfaces, presses))
         if touching != self._touching:
             self._touching = touching
             observer.on_touch(step, touching)

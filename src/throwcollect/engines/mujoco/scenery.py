@@ -6,18 +6,16 @@ As in Bullet, only the object and bodies that move collide with other things.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.body import BodyModel, LinkShape, Vector, turn_of
-from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene, SceneBody
+from throwcollect.engines.engine import GROUND, Physics, Scene, SceneBody
 from throwcollect.engines.grip import HELD_LINK, add_held_link
 from throwcollect.engines.mujoco.stepping import HARDNESS, ROLLING_ROWS, SLIDING_ROWS
 from throwcollect.errors import ConfigError
-from throwcollect.reproducible_math import matmul
 
 _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -49,19 +47,6 @@ _WORLD_LINK, _STAND_IN = "world", "world of the robot"
 """MuJoCo takes a root link of this name for the world itself, which is at height 0; so that link has another name."""
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A body that can press on the object.
-
-    Attributes:
-        body: Name of the body in the model; all its shapes count.
-        name: Its name in contacts of the object.
-    """
-
-    body: str
-    name: str
-
-
 def _read_robot(model: BodyModel) -> mujoco.MjSpec:
     """Read the robot, whose links all become bodies of MuJoCo."""
     text = model.write_urdf()
@@ -74,11 +59,11 @@ def _read_robot(model: BodyModel) -> mujoco.MjSpec:
     return spec
 
 
-def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
+def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[str]]:
     """Put ground, robot, object and bodies together.
 
     Returns:
-        The world, and its surfaces that can press on the object.
+        The world, and names in contacts of what can press on the object; each is a body with all its shapes.
     """
     try:
         robot = add_held_link(scene.robot, scene.tool).rename_links({_WORLD_LINK: _STAND_IN})
@@ -87,10 +72,10 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         raise ConfigError(f"MuJoCo cannot read the robot's description: {error}") from error
     world = spec.worldbody
     world.first_body().pos = (0.0, 0.0, scene.base_height_m)
-    surfaces = [Surface(world.name, GROUND)]
+    surfaces = {world.name: GROUND}
     names = {scene.tool.link: scene.tool.name, _STAND_IN: _WORLD_LINK}
     for body in spec.bodies[1:]:
-        surfaces.append(Surface(body.name, names.get(body.name, body.name)))
+        surfaces[body.name] = names.get(body.name, body.name)
         for geom in body.geoms:
             geom.contype, geom.conaffinity = _ROBOT_BIT, 0
     world.add_geom(
@@ -107,9 +92,9 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     # Those that move are last, so that their pairs with all others can be named.
     for each in sorted(scene.bodies, key=lambda body: body.moves):
         _add_body(spec, each)
-        surfaces.append(Surface(_name_body(each), each.link.name))
-    for surface in surfaces:
-        _watch(spec, surface)
+        surfaces[_name_body(each)] = each.link.name
+    for body in surfaces:
+        _watch(spec, body)
     option = spec.option
     # `MujocoEngine.run` relies on damping that acts on the velocity after the step.
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -117,7 +102,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     # MuJoCo would reset a world that diverges. Without that, its numbers are not finite, and the trial is refused.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return spec, surfaces
+    return spec, list(surfaces.values())
 
 
 def _add_object(spec: mujoco.MjSpec, body: SceneBody) -> None:
@@ -206,8 +191,8 @@ def _size(shape: LinkShape) -> tuple[Vector, Vector]:
     raise ValueError(shape.kind)
 
 
-def _watch(spec: mujoco.MjSpec, surface: Surface) -> None:
-    """Add a sensor of the force with which a surface presses on the object; its first number is the normal force."""
+def _watch(spec: mujoco.MjSpec, body: str) -> None:
+    """Add a sensor of the force with which a body presses on the object; its first number is the normal force."""
     # The sensor reports the force of one contact: of all between the two bodies, the strongest.
     force, strongest, one = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 2, 1
     spec.add_sensor(
@@ -215,7 +200,7 @@ def _watch(spec: mujoco.MjSpec, surface: Surface) -> None:
         objtype=mujoco.mjtObj.mjOBJ_GEOM,
         objname=OBJECT,
         reftype=mujoco.mjtObj.mjOBJ_BODY,
-        refname=surface.body,
+        refname=body,
         intprm=(force, strongest, one),
     )
 
@@ -285,50 +270,10 @@ def set_physics(model: mujoco.MjModel, scene: Scene, physics: Physics) -> None:
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def _find_box(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> Box | None:
-    """Find the box around the shapes of a body, along the axes of the world; None if it has none."""
-    first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
-    if not count:
-        return None
-    lows, highs = zip(*(_find_extent(model, data, geom) for geom in range(first, first + count)), strict=True)
-    return tuple(np.min(lows, axis=0).tolist()), tuple(np.max(highs, axis=0).tolist())
-
-
-def _find_extent(
-    model: mujoco.MjModel, data: mujoco.MjData, geom: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Find the lowest and highest corner of the box around a shape's own box."""
-    turned = data.geom_xmat[geom].reshape(3, 3)
-    # MuJoCo has the box of a shape as its centre and its half sizes.
-    box = model.geom_aabb[geom].reshape(2, 3, 1)
-    centre = data.geom_xpos[geom].reshape(3, 1) + matmul(turned, box[0])
-    half = matmul(np.abs(turned), box[1])
-    return (centre - half).ravel(), (centre + half).ravel()
-
-
-def describe_links(model: mujoco.MjModel, robot: BodyModel) -> list[LoadedLink]:
-    """Describe the links of a robot with all joints at 0 (see `Engine.describe_robot`)."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    found = []
-    for link in robot.links:
-        body = model.body(_STAND_IN if link.name == _WORLD_LINK else link.name).id
-        joint = int(model.body_jntadr[body])
-        frame = data.ximat[body].reshape(3, 3)
-        found.append(
-            LoadedLink(
-                name=link.name,
-                mass_kg=float(model.body_mass[body]),
-                centre=data.xipos[body].copy(),
-                inertia=frame * model.body_inertia[body] @ frame.T,
-                shapes=int(model.body_geomnum[body]),
-                box=_find_box(model, data, body),
-                axis=data.xaxis[joint].copy() if joint >= 0 else None,
-                range=tuple(model.jnt_range[joint].tolist()) if joint >= 0 else None,
-            )
-        )
-    return found
+def count_shapes(model: mujoco.MjModel, scene: Scene) -> dict[str, int]:
+    """Count the collision shapes of each link of the robot."""
+    names = {link.name: _STAND_IN if link.name == _WORLD_LINK else link.name for link in scene.robot.links}
+    return {link: int(model.body(name).geomnum[0]) for link, name in names.items()}
 
 
 def _list_geoms(model: mujoco.MjModel, body: SceneBody) -> list[int]:

@@ -6,20 +6,17 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from throwcollect.config.schema import Config
+from throwcollect.config.tool_config import ToolConfig
 from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.members import explain_failure, load_part
 from throwcollect.reproducible_math import add_up
-
-Positive = Annotated[float, Field(gt=0)]
-_Numbers = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -139,14 +136,18 @@ def spread_mass(mass_kg: float, boxes: Sequence[Box]) -> pinocchio.Inertia:
 
 
 def tool_of(config: Config) -> Tool:
-    """Make the tool that a configuration describes.
+    """Make the tool that a configuration describes; see `make_tool`."""
+    return make_tool(config.tool)
+
+
+def make_tool(section: ToolConfig) -> Tool:
+    """Make the tool of a section.
 
     Raises:
         ConfigError: If the tool comes from another package, and cannot be imported.
         MemberError: If the tool comes from another package, and fails.
     """
-    name = config.tool.name
-    kind = load_part("tools", name, config.tool.implementation)
-    with explain_failure("tools", name, "be made"):
-        tool: Tool = kind(config.tool)
+    kind = load_part("tools", section.name, section.implementation)
+    with explain_failure("tools", section.name, "be made"):
+        tool: Tool = kind(section)
     return tool
