@@ -15,7 +15,7 @@ from throwcollect.control.followed_curve import Motion
 from throwcollect.control.interpolation import interpolate
 from throwcollect.control.parameters import ControllerParameters
 from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
-from throwcollect.control.validation import refusal
+from throwcollect.control.validation import find_refusal
 from throwcollect.control.values import (
     ControllerState,
     ErrorCode,
@@ -335,7 +335,7 @@ class JointTrajectoryController:
         return Judge(tolerances, self._parameters.timeout_ns, self._parameters.joints)
 
     def _find_refusal(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
-        if reason := refusal(trajectory, self._parameters, now_ns):
+        if reason := find_refusal(trajectory, self._parameters, now_ns):
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns
         if ahead_ns > _FAR_AHEAD_NS:
