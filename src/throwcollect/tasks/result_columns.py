@@ -11,10 +11,12 @@ A description may name the ``{tool}`` and the ``{object}``, by which contacts an
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import Field, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 Vector = tuple[float, float, float]
+COLUMNS = "columns"
+"""Name of the columns in the metadata of a field."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,6 @@ class Peak:
     share: float
 
 
-_DECLARED = "columns"
-
-
 @dataclass(frozen=True)
 class Column:
     """A column of the table.
@@ -62,9 +61,16 @@ class Column:
     kind: Literal["number", "count", "text"]
     description: str
 
+    def fill(self, **words: str) -> Column:
+        """Put words in the place of their names in braces."""
+        name, description = self.name, self.description
+        for word, text in words.items():
+            name, description = name.replace(f"{{{word}}}", text), description.replace(f"{{{word}}}", text)
+        return Column(name, self.kind, description)
+
 
 class Columns:
-    """The columns of one field of a result, by default a single column; all are null where the field is None.
+    """The columns of one field of a result; all are null where the field is None.
 
     Args:
         columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field.
@@ -74,7 +80,7 @@ class Columns:
 
     def __init__(
         self,
-        columns: Sequence[Column],
+        *columns: Column,
         split: Callable[[Any], Sequence[object]] = lambda value: (value,),
         join: Callable[..., Any] = lambda value: value,
     ) -> None:
@@ -82,10 +88,7 @@ class Columns:
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns of the field `name`, for the joints that the task moves."""
-        return [
-            Column(each.name.replace("{field}", name), each.kind, each.description.replace("{field}", name))
-            for each in self._columns
-        ]
+        return [each.fill(field=name) for each in self._columns]
 
     def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Split a value of the field, which is not None, into one value for each column."""
@@ -100,30 +103,27 @@ class Number(Columns):
     """A number, in a column that has the field's name; the description is one sentence, with the unit."""
 
     def __init__(self, description: str) -> None:
-        super().__init__([Column("{field}", "number", description)])
+        super().__init__(Column("{field}", "number", description))
 
 
 class Count(Columns):
     """An integer, in a column that has the field's name; the description is one sentence."""
 
     def __init__(self, description: str) -> None:
-        super().__init__([Column("{field}", "count", description)])
+        super().__init__(Column("{field}", "count", description))
 
 
 class BodyColumns(Columns):
     """A `ObjectState`: ``<field>_time_s``, ``<field>_x_m`` and so on; `when` ends a sentence with the instant."""
 
     def __init__(self, when: str) -> None:
-        time = Column("{field}_time_s", "number", f"Time since the start of the trial {when} [s].")
         place, speed = (f"{what} of the {{object}} in world {when}" for what in ("Centre", "Velocity"))
         super().__init__(
-            [
-                time,
-                *(Column(f"{{field}}_{axis}_m", "number", f"{place}, {axis} [m].") for axis in "xyz"),
-                *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
-            ],
-            lambda state: (state.time_s, *state.position, *state.velocity),
-            lambda time_s, x, y, z, vx, vy, vz: ObjectState(time_s, (x, y, z), (vx, vy, vz)),
+            Column("{field}_time_s", "number", f"Time since the start of the trial {when} [s]."),
+            *(Column(f"{{field}}_{axis}_m", "number", f"{place}, {axis} [m].") for axis in "xyz"),
+            *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
+            split=lambda state: (state.time_s, *state.position, *state.velocity),
+            join=lambda time_s, *numbers: ObjectState(time_s, numbers[:3], numbers[3:]),
         )
 
 
@@ -132,8 +132,8 @@ class SpinColumns(Columns):
 
     def __init__(self, when: str) -> None:
         spin = f"Angular velocity of the {{object}} in world {when}"
-        columns = [Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz"]
-        super().__init__(columns, tuple, lambda *parts: parts)
+        columns = (Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz")
+        super().__init__(*columns, split=tuple, join=lambda *parts: parts)
 
 
 class PeakColumns(Columns):
@@ -142,7 +142,9 @@ class PeakColumns(Columns):
     def __init__(self, of: str) -> None:
         share = Column("{field}_share", "number", f"{of} [-]; 1 is at the limit.")
         joint = Column("{field}_joint", "text", "Joint that had {field}_share.")
-        super().__init__([share, joint], lambda peak: (peak.share, peak.joint), lambda share, joint: Peak(joint, share))
+        super().__init__(
+            share, joint, split=lambda peak: (peak.share, peak.joint), join=lambda share, joint: Peak(joint, share)
+        )
 
 
 class JointColumns(Columns):
@@ -152,15 +154,12 @@ class JointColumns(Columns):
     """
 
     def __init__(self, description: str) -> None:
-        super().__init__([Column("{joint}_{field}", "number", description)])
+        super().__init__(Column("{joint}_{field}", "number", description))
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns; see `Columns`."""
-        (each,) = super().declare(name, joints)
-        return [
-            Column(each.name.replace("{joint}", joint), each.kind, each.description.replace("{joint}", joint))
-            for joint in joints
-        ]
+        (column,) = super().declare(name, joints)
+        return [column.fill(joint=joint) for joint in joints]
 
     def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Return the numbers in the order of the joints; see `Columns`."""
@@ -173,10 +172,4 @@ class JointColumns(Columns):
 
 def measured(columns: Columns) -> Any:
     """Make a field of a result that is stored in these columns, and is None where there is nothing to measure."""
-    return field(default=None, metadata={_DECLARED: columns})
-
-
-def columns_of(declared: Field[Any]) -> Columns | None:
-    """Return the columns of a field of a result; None if it was not made by `measured`."""
-    columns: Columns | None = declared.metadata.get(_DECLARED)
-    return columns
+    return field(default=None, metadata={COLUMNS: columns})
