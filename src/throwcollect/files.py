@@ -129,14 +129,14 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[int]:
+def replacing(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     """Open a new file as `beside` does; once the block has ended, the file survives a power cut.
 
     Yields:
         File descriptor to write to.
     """
     try:
-        with beside(path) as descriptor:
+        with beside(path, mode=mode) as descriptor:
             yield descriptor
             os.fsync(descriptor)
         sync_directory(path.parent)
@@ -216,17 +216,7 @@ def read_text(path: Path, *, most_bytes: int) -> str:
         raise DatasetError(f"cannot be read: no UTF-8 text: byte {error.start}", path=path) from error
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write a whole file at once, in place of any file of that name."""
-    with replacing(path) as descriptor:
+def write_file(path: Path, data: bytes, *, mode: int = 0o666) -> None:
+    """Write a whole file at once, in place of any file of that name; its mode holds from the first moment on."""
+    with replacing(path, mode=mode) as descriptor:
         write_all(descriptor, data)
-
-
-def write_secret(path: Path, data: bytes) -> None:
-    """Write a file that only its owner can read, whole or not at all."""
-    try:
-        # The permissions are set when the file is made, so others can read it at no moment.
-        with beside(path, mode=0o600) as descriptor:
-            write_all(descriptor, data)
-    except OSError as error:
-        raise unwritable(path, error) from error
