@@ -23,7 +23,7 @@ from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem, 
 from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.plan.chosen_motions import complete_point
-from throwcollect.plan.plan import Check, make_trials, refusal
+from throwcollect.plan.plan import Check, make_trials
 from throwcollect.plan.trials import Points, Trial
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
@@ -238,7 +238,7 @@ def find_refusal(config: Config, values: Point, check: Check) -> str | None:
     wrong = {key: reason for key in values if (reason := reason_not_sweepable(config, key)) is not None}
     if wrong:
         raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
-    return refusal(with_values(config, values), check)
+    return check(with_values(config, values))
 
 
 def with_policy(

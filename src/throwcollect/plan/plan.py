@@ -14,7 +14,7 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
+from throwcollect.errors import DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import write_file
 from throwcollect.plan.digest import config_digest, trial_digests
 from throwcollect.plan.parquet_file import encode_table, open_parquet
@@ -30,7 +30,7 @@ _JOINED_KEY = b"throwcollect.joined"
 _MOST_REASONS = 5
 
 Check = Callable[[Config], str | None]
-"""Explains why a trial with this configuration cannot be run; None if it can."""
+"""Explains why the plan refuses a trial with this configuration; None if it can be run."""
 
 
 @dataclass(frozen=True)
@@ -156,14 +156,6 @@ def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
 def _make_seed(root: int, number: int) -> int:
     # The seed of a trial does not depend on other trials, so a plan can be continued.
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
-
-
-def refusal(config: Config, check: Check) -> str | None:
-    """Explain why the plan refuses a trial; None if it does not. A ConfigError of the check is a reason, too."""
-    try:
-        return check(config)
-    except ConfigError as error:
-        return str(error)
 
 
 def check_some_left(found: Sequence[str | None]) -> None:
