@@ -206,10 +206,10 @@ class JointTrajectoryController:
             Most updates that `take` may make now; the one after them must be made with `update`. `sys.maxsize` if
             nothing is to be decided.
         """
-        if self._holding:
-            return sys.maxsize
         if self._incoming is not None:
             return 0
+        if self._holding:
+            return sys.maxsize
         updates = self._tolerances.updates_to_skip(self._motion, goal=self.goal_id is not None)
         return sys.maxsize if updates is None else updates
 
@@ -222,20 +222,8 @@ class JointTrajectoryController:
         Returns:
             Their commands [rad], shape ``(n_updates, n_joints)``, read-only.
         """
-        commands: NDArray[np.float64]
-        before_ns = self._time_ns
-        if self._incoming is None:
-            commands = self._motion.skip(n_updates)
-        else:
-            # Only a stop can be waiting here, and that does not depend on the measured state.
-            self._time_ns = before_ns + self._period_ns
-            self._begin(self._incoming, JointState(self.command))
-            motion, first = self._motion, self._motion.command
-            rows = motion.skip(n_updates - 1)
-            resting = motion.past_end and not motion.curve.end_ns
-            commands = np.broadcast_to(first, (n_updates, len(first))) if resting else np.vstack((first, rows))
-            commands.setflags(write=False)
-        self._time_ns = before_ns + n_updates * self._period_ns
+        commands = self._motion.skip(n_updates)
+        self._time_ns += n_updates * self._period_ns
         self.command = commands[-1]
         return commands
 
