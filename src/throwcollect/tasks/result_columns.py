@@ -73,30 +73,24 @@ class Columns:
     """The columns of one field of a result; all are null where the field is None.
 
     Args:
-        columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field.
-        split: Splits a value of the field, which is not None, into one value for each column.
-        join: Makes a value of the field from the columns' values, none of which is null.
+        columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field; those with
+            ``{joint}`` are there for each joint that the task moves.
+        split: Splits a value of the field, which is not None, into one value for each column, given the joints.
+        join: Makes a value of the field from the columns' values, none of which is null, given the joints.
     """
 
     def __init__(
         self,
         *columns: Column,
-        split: Callable[[Any], Sequence[object]] = lambda value: (value,),
-        join: Callable[..., Any] = lambda value: value,
+        split: Callable[[Any, Sequence[str]], Sequence[object]] = lambda value, _: (value,),
+        join: Callable[[Sequence[Any], Sequence[str]], Any] = lambda values, _: values[0],
     ) -> None:
-        self._columns, self._split, self._join = columns, split, join
+        self._columns, self.split, self.join = columns, split, join
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns of the field `name`, for the joints that the task moves."""
-        return [each.fill(field=name) for each in self._columns]
-
-    def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
-        """Split a value of the field, which is not None, into one value for each column."""
-        return self._split(value)
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Make the field's value from the columns' values, none of which is null."""
-        return self._join(*values)
+        of_joints = ((each, joints if "{joint}" in each.name else [""]) for each in self._columns)
+        return [each.fill(field=name, joint=joint) for each, own in of_joints for joint in own]
 
 
 class Number(Columns):
@@ -122,8 +116,8 @@ class BodyColumns(Columns):
             Column("{field}_time_s", "number", f"Time since the start of the trial {when} [s]."),
             *(Column(f"{{field}}_{axis}_m", "number", f"{place}, {axis} [m].") for axis in "xyz"),
             *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
-            split=lambda state: (state.time_s, *state.position, *state.velocity),
-            join=lambda time_s, *numbers: ObjectState(time_s, numbers[:3], numbers[3:]),
+            split=lambda state, _: (state.time_s, *state.position, *state.velocity),
+            join=lambda values, _: ObjectState(values[0], (*values[1:4],), (*values[4:],)),
         )
 
 
@@ -133,7 +127,7 @@ class SpinColumns(Columns):
     def __init__(self, when: str) -> None:
         spin = f"Angular velocity of the {{object}} in world {when}"
         columns = (Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz")
-        super().__init__(*columns, split=tuple, join=lambda *parts: parts)
+        super().__init__(*columns, split=lambda spin, _: spin, join=lambda values, _: tuple(values))
 
 
 class PeakColumns(Columns):
@@ -143,7 +137,10 @@ class PeakColumns(Columns):
         share = Column("{field}_share", "number", f"{of} [-]; 1 is at the limit.")
         joint = Column("{field}_joint", "text", "Joint that had {field}_share.")
         super().__init__(
-            share, joint, split=lambda peak: (peak.share, peak.joint), join=lambda share, joint: Peak(joint, share)
+            share,
+            joint,
+            split=lambda peak, _: (peak.share, peak.joint),
+            join=lambda values, _: Peak(values[1], values[0]),
         )
 
 
@@ -154,20 +151,11 @@ class JointColumns(Columns):
     """
 
     def __init__(self, description: str) -> None:
-        super().__init__(Column("{joint}_{field}", "number", description))
-
-    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the columns; see `Columns`."""
-        (column,) = super().declare(name, joints)
-        return [column.fill(joint=joint) for joint in joints]
-
-    def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
-        """Return the numbers in the order of the joints; see `Columns`."""
-        return [value[joint] for joint in joints]
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Return the numbers by joint; see `Columns`."""
-        return dict(zip(joints, values, strict=True))
+        super().__init__(
+            Column("{joint}_{field}", "number", description),
+            split=lambda value, joints: [value[joint] for joint in joints],
+            join=lambda values, joints: dict(zip(joints, values, strict=True)),
+        )
 
 
 def measured(columns: Columns) -> Any:
