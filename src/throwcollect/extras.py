@@ -132,10 +132,10 @@ def explain_missing() -> Iterator[None]:
 
 
 def lazily(name: str) -> Any:
-    """Make a stand-in for a module of a package in `EXTRA_OF`, which imports the module when it is first used.
+    """Make a stand-in for a module, which imports the module when it is first used.
 
-    Using an attribute raises `MissingExtraError` if the package is not installed, and `ConfigError` if the system lacks
-    a library that the package loads.
+    Using an attribute raises `MissingExtraError` if the package of an extra is not installed, and `ConfigError` if the
+    system lacks a library that the package loads.
     """
     return _LazyModule(name)
 

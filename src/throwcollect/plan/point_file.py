@@ -6,9 +6,11 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
@@ -16,12 +18,10 @@ from throwcollect.config.task_config import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import suggest_path
+from throwcollect.plan.arrow_column import make_table, null_where_nan
 from throwcollect.plan.chosen_motions import add_motions
 from throwcollect.plan.parquet_file import encode_table
 from throwcollect.plan.trials import Points
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
 """Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
@@ -54,10 +54,6 @@ def read_table(path: Path, key: str) -> pa.Table:
 
     Messages name the file by its key or option.
     """
-    import pyarrow as pa
-    import pyarrow.csv
-    import pyarrow.parquet as pq
-
     if path.suffix.lower() not in (".csv", ".parquet"):
         raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", key)])
     try:
@@ -81,8 +77,6 @@ def read_table(path: Path, key: str) -> pa.Table:
 
 def read_numbers(table: pa.Table, names: Sequence[str], path: Path) -> NDArray[np.float64]:
     """Read columns of a table of `read_table`, NaN where a cell is empty, shape ``(n_rows, n_names)``."""
-    import pyarrow as pa
-
     numbers = []
     for name in names:
         column, kind = table[name], table.schema.field(name).type
@@ -108,10 +102,6 @@ def _is_number(cell: str) -> bool:
 
 def encode_points(points: Points) -> bytes:
     """Encode points as Parquet for `read_points`; equal points give equal bytes."""
-    import pyarrow as pa
-
-    from throwcollect.plan.arrow_column import make_table, null_where_nan
-
     schema = pa.schema([(name, pa.float64()) for name in points.names])
     return encode_table(make_table([*map(null_where_nan, points.table.T)], schema))
 

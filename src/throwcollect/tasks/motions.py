@@ -18,7 +18,7 @@ from throwcollect.config.section import unknown_joint
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.motion_files import MOTION, TIME, columns_of, read_motion_table
+from throwcollect.tasks.motion_files import MOTION, TIME, columns_of, pa, read_motion_table
 from throwcollect.wording import format_count, join_names
 
 KEY = "task.trajectory.motion"
@@ -71,8 +71,6 @@ class Motions:
 
     def table(self) -> Any:
         """Make the Arrow table of all points, which a Parquet file of motions has."""
-        import pyarrow as pa
-
         numbers = np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.offsets))
         return pa.table({MOTION: pa.DictionaryArray.from_arrays(numbers, self.names).cast(pa.string()), **self.columns})
 
