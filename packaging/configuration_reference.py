@@ -43,13 +43,14 @@ that is absent from the file is given as a whole.
 _SAMPLERS = """\
 ### Samplers
 
-| sampler | points | with more `trials` |
-|---|---|---|
-| `grid` | all combinations, the last key fastest; `trials` takes the first ones | same first points |
-| `uniform` | independent random points, evenly distributed | same first points |
-| `latin_hypercube` | one point in each of `trials` strips of every key | all points change, as the strips do |
-| `sobol` | scrambled Sobol' sequence, the most even one; any number of trials | same first points |
-| `list` | the rows of `sweep.file`; `trials` takes the first ones | same first points |
+| sampler | points |
+|---|---|
+| `grid` | all combinations, the last key fastest; `trials` takes the first ones |
+| `uniform` | independent random points, evenly distributed |
+| `sobol` | scrambled Sobol' sequence, the most even one; any number of trials |
+| `list` | the rows of `sweep.file`; `trials` takes the first ones |
+
+With more `trials`, the first points stay the same.
 
 The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
 Each of a set of `values` is drawn equally often. All draws follow from `seed`.

@@ -67,8 +67,7 @@ _WHEELS = {
     "pybullet": (
         ((3, 10), (3, 11)),
         "Python 3.11, such as that of `uv venv --python 3.11`; or `up --runtime docker`; or, instead of the default "
-        "engine bullet, `--set sim.engine=mujoco` (for `dataset replay`: --engine mujoco), whose throws land some "
-        "millimetres elsewhere",
+        "engine bullet, `--set sim.engine=mujoco`, whose throws land some millimetres elsewhere",
     ),
     "mujoco": (((3, 11), (3, 99)), "Python 3.11 or later, or `sim.engine: bullet`"),
 }
@@ -80,9 +79,8 @@ class MissingExtraError(ThrowcollectError, ImportError):
 
     exit_code = ConfigError.exit_code
 
-    def __init__(self, package: str, extra: str | None = None) -> None:
-        self.package = package
-        self.extra = extra or EXTRA_OF[package]
+    def __init__(self, package: str) -> None:
+        self.package, self.extra = package, EXTRA_OF.get(package, "collect")
         problem, hint = f"this needs {package}, which is not installed", install_command(self.extra)
         if not has_wheel(package):
             problem += f" and has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]}"
@@ -108,14 +106,11 @@ def is_installed(package: str) -> bool:
     return spec is not None and spec.origin is not None
 
 
-def require(*packages: str, extra: str | None = None) -> None:
-    """Check that packages, by their names in imports, are installed, before anything begins.
-
-    The error names `extra`, or else the extra in `EXTRA_OF`.
-    """
+def require(*packages: str) -> None:
+    """Check that packages of `EXTRA_OF`, by their names in imports, are installed, before anything begins."""
     for package in packages:
         if not is_installed(package):
-            raise MissingExtraError(package, extra)
+            raise MissingExtraError(package)
 
 
 def require_engine(name: str) -> None:
@@ -125,34 +120,34 @@ def require_engine(name: str) -> None:
 
 
 @contextmanager
-def explain_missing(extra: str | None = None) -> Iterator[None]:
-    """Turn a failed import in the block into an error that names `extra`, or else the extra in `EXTRA_OF`."""
+def explain_missing() -> Iterator[None]:
+    """Turn a failed import of a package in `EXTRA_OF` in the block into an error that names the extra."""
     try:
         yield
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRA_OF:
             raise
-        raise MissingExtraError(package, extra) from error
+        raise MissingExtraError(package) from error
 
 
-def lazily(name: str, *, extra: str | None = None) -> Any:
-    """Make a stand-in for a module of a package in `EXTRA_OF`, which imports the module when it is first used.
+def lazily(name: str) -> Any:
+    """Make a stand-in for a module, which imports the module when it is first used.
 
-    Using an attribute raises `MissingExtraError` if the package is not installed, which names `extra`, or else the
-    extra in `EXTRA_OF`; and `ConfigError` if the system lacks a library that the package loads.
+    Using an attribute raises `MissingExtraError` if the package of an extra is not installed, and `ConfigError` if the
+    system lacks a library that the package loads.
     """
-    return _LazyModule(name, extra)
+    return _LazyModule(name)
 
 
 class _LazyModule:
     """See `lazily`."""
 
-    def __init__(self, name: str, extra: str | None) -> None:
-        self._name, self._extra = name, extra
+    def __init__(self, name: str) -> None:
+        self._name = name
 
     def __getattr__(self, attribute: str) -> Any:
-        with explain_missing(self._extra):
+        with explain_missing():
             try:
                 module = import_module(self._name)
             except ImportError as error:

@@ -22,9 +22,6 @@ from throwcollect.wording import did_you_mean, find_near
 StrPath = str | os.PathLike[str]
 """A path, for functions that other programs call."""
 
-_POINTER = b"version https://git-lfs"
-_POINTER_BYTES = 1000
-"""Git LFS takes no longer file for a pointer."""
 _MOVE_HERE = "put the file itself, or a copy of it, in that place; or remove it"
 _HINTS = {
     errno.ENOSPC: "free space on that disk",
@@ -62,18 +59,6 @@ def suggest_path(path: Path) -> str:
     """Write the end of a message on a file or directory that does not exist: which ones in its place may be meant."""
     names = os.listdir(path.parent) if path.parent.is_dir() and not path.exists() else []
     return did_you_mean([str(path.with_name(each)) for each in find_near(path.name, names)])
-
-
-def refuse_pointers(directory: Path) -> None:
-    """Refuse a directory in which Git LFS has put pointers in the place of files."""
-    try:
-        for path in directory.iterdir():
-            status = path.lstat()
-            is_small = stat.S_ISREG(status.st_mode) and status.st_size < _POINTER_BYTES
-            if is_small and path.read_bytes().startswith(_POINTER):
-                raise DatasetError("a Git LFS pointer is in its place", path=path, hint="git lfs pull")
-    except OSError as error:
-        raise unreadable(directory, error) from error
 
 
 def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = None) -> int:
@@ -144,14 +129,14 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[int]:
+def replacing(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     """Open a new file as `beside` does; once the block has ended, the file survives a power cut.
 
     Yields:
         File descriptor to write to.
     """
     try:
-        with beside(path) as descriptor:
+        with beside(path, mode=mode) as descriptor:
             yield descriptor
             os.fsync(descriptor)
         sync_directory(path.parent)
@@ -231,17 +216,7 @@ def read_text(path: Path, *, most_bytes: int) -> str:
         raise DatasetError(f"cannot be read: no UTF-8 text: byte {error.start}", path=path) from error
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write a whole file at once, in place of any file of that name."""
-    with replacing(path) as descriptor:
+def write_file(path: Path, data: bytes, *, mode: int = 0o666) -> None:
+    """Write a whole file at once, in place of any file of that name; its mode holds from the first moment on."""
+    with replacing(path, mode=mode) as descriptor:
         write_all(descriptor, data)
-
-
-def write_secret(path: Path, data: bytes) -> None:
-    """Write a file that only its owner can read, whole or not at all."""
-    try:
-        # The permissions are set when the file is made, so others can read it at no moment.
-        with beside(path, mode=0o600) as descriptor:
-            write_all(descriptor, data)
-    except OSError as error:
-        raise unwritable(path, error) from error

@@ -109,7 +109,7 @@ def load_member(family: str, name: str) -> Any:
     what, namesakes = _describe(family, name), _find_namesakes(family, name)
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
-    found, kind = _import(entry.value, what), import_own(_KINDS[family])
+    found, kind = load_part(family, name, entry.value), import_own(_KINDS[family])
     if not (isinstance(found, kind) if family in _VALUES else isinstance(found, type) and issubclass(found, kind)):
         raise ConfigError(f"{what}: {entry.value} should be of {kind.__module__}.{kind.__name__}, is {found!r}")
     # A section of a configuration has its name as the default of a key; engines, runtimes and exporters have none.
@@ -162,7 +162,18 @@ def list_origins(family: str, name: str) -> list[str]:
 
 def load_part(family: str, name: str, path: str) -> Any:
     """Import the object ``module:name`` that a member names."""
-    return import_own(path) if is_own(family, name) else _import(path, f"{_describe(family, name)}: {path}")
+    if is_own(family, name):
+        return import_own(path)
+    try:
+        with explain_missing():
+            # Unlike `getattr`, an entry point also finds an attribute of an attribute.
+            return EntryPoint("", path, "").load()
+    except ThrowcollectError:
+        raise
+    # `SystemExit` would end the process without a word.
+    except (Exception, SystemExit) as error:
+        sentence = f"{_describe(family, name)} cannot be loaded: {type(error).__name__}: {error}"
+        raise ConfigError(sentence, hint=_WAY_OUT) from error
 
 
 @contextmanager
@@ -203,27 +214,12 @@ def import_own(path: str) -> Any:
     return EntryPoint("", path, "").load()
 
 
-def _import(path: str, what: str) -> Any:
-    """Import ``module:name`` of another package; the message of an error begins with `what`."""
-    try:
-        with explain_missing():
-            # Unlike `getattr`, an entry point also finds an attribute of an attribute.
-            return EntryPoint("", path, "").load()
-    except ThrowcollectError:
-        raise
-    # `SystemExit` would end the process without a word.
-    except (Exception, SystemExit) as error:
-        raise ConfigError(f"{what} cannot be loaded: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
-
-
 def _describe(family: str, name: str) -> str:
     """Name a member of another package and that package, as the beginning of a message."""
     owners = sorted(map(_name_owner, _find_namesakes(family, name)))
     kind = "policy" if family == "policies" else family.removesuffix("s")
     # A policy may be an object, or a function that no package has given a name.
-    return (
-        f"the {kind} {name}" if family == "policies" and not owners else f"the {kind} {name} of {' and '.join(owners)}"
-    )
+    return f"the {kind} {name}" + (f" of {' and '.join(owners)}" if owners else "")
 
 
 def _find_namesakes(family: str, name: str) -> list[EntryPoint]:

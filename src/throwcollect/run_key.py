@@ -16,7 +16,13 @@ from datetime import datetime
 from pathlib import Path
 
 from throwcollect.errors import ConfigError
+from throwcollect.extras import lazily
 from throwcollect.files import beside, write_all
+
+# Only processes that make a key need these.
+x509, hashes = lazily("cryptography.x509"), lazily("cryptography.hazmat.primitives.hashes")
+ec = lazily("cryptography.hazmat.primitives.asymmetric.ec")
+serialization = lazily("cryptography.hazmat.primitives.serialization")
 
 KEY_VARIABLE = "THROWCOLLECT_KEY"
 """Environment variable that names the directory of the key of the run that a process belongs to."""
@@ -64,13 +70,10 @@ class RunKey:
     @property
     def secret(self) -> bytes:
         """The 32 bytes from which another machine can make the key again."""
-        from cryptography.hazmat.primitives.asymmetric import ec
-        from cryptography.hazmat.primitives.serialization import load_pem_private_key
-
-        key = load_pem_private_key(_read(self.private_key), None)
+        key = serialization.load_pem_private_key(_read(self.private_key), None)
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise ConfigError(f"{self.private_key}: not a key of a run")
-        return key.private_numbers().private_value.to_bytes(_SECRET_BYTES, "big")
+        return int(key.private_numbers().private_value).to_bytes(_SECRET_BYTES, "big")
 
     def create(self, secret: bytes | None = None) -> None:
         """Make a new key in a directory that need not exist; given a secret, make the key of another machine again.
@@ -136,12 +139,6 @@ def _read(path: Path) -> bytes:
 
 def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
     """Make a private key and its self-signed certificate, both in PEM."""
-    # Imported here, because only the process that makes a key needs it.
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes, serialization
-    from cryptography.hazmat.primitives.asymmetric import ec
-    from cryptography.x509.oid import NameOID
-
     try:
         key = (
             ec.generate_private_key(ec.SECP256R1())
@@ -150,7 +147,7 @@ def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
         )
     except ValueError as error:
         raise ConfigError("there is no key of this secret") from error
-    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, _NAME)])
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, _NAME)])
     certificate = (
         x509.CertificateBuilder()
         .subject_name(name)

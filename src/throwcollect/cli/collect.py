@@ -26,7 +26,7 @@ from throwcollect.cli.printing import display, show, tell
 from throwcollect.cli.streams import ensure_written
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
-from throwcollect.files import write_secret
+from throwcollect.files import write_file
 from throwcollect.own_process import count_interruptions
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
@@ -280,7 +280,7 @@ def _collect(
 def _announce(run: Run, token_file: Path | None, *, view: bool) -> None:
     """Hand out the token of a run that other machines may join, and the address of the page if it is asked for."""
     if token_file is not None:
-        write_secret(token_file, f"{run.token}\n".encode())
+        write_file(token_file, f"{run.token}\n".encode(), mode=0o600)
     elif run.config.run.listen is not None:
         # The token is a secret, so it is not given to a display, which may write to a log.
         tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from throwcollect.tasks.starter import Beginning
 
 
-def init(*, robot: str = "talos", flange: FlangeOption = None, task: str = "throw", sampler: str = "sobol") -> None:
+def init(*, robot: str = "talos", flange: FlangeOption = None, task: str = "throw") -> None:
     """Write a commented throwcollect.yaml, for `throwcollect up`.
 
     For a robot without a default motion, it searches a throw that lands.
@@ -29,20 +29,18 @@ def init(*, robot: str = "talos", flange: FlangeOption = None, task: str = "thro
     Options:
         robot (ROBOT): The robot: its name, a robot.yaml or its directory, or a URDF (--flange).
         task (NAME): What it does: task.name.
-        sampler (NAME): How trials are drawn: sweep.sampler.
     """
     from throwcollect.files import write_file
-    from throwcollect.tasks.starter import begin_at_default, check_choices, make_starter
+    from throwcollect.tasks.starter import begin_at_default, check_task, write_starter
 
-    check_choices(task, sampler)
+    check_task(task)
     section = read_robot(robot, flange)
     beginning = begin_at_default(section.name, task) if robot == section.name else None
-    texts = make_starter(task, sampler, beginning or _search_beginning(robot, section, task))
-    if existing := [name for name in texts if Path(name).exists()]:
-        raise ConfigError(f"{existing[0]}: is there already", hint="move it away, or go to another directory")
-    for name, text in texts.items():
-        write_file(Path(name), text.encode())
-    typer.echo(f"{' and '.join(texts)}: written. Look at the trials with {command('plan')}, and collect them with:")
+    text = write_starter(task, beginning or _search_beginning(robot, section, task))
+    if DEFAULT_CONFIG.exists():
+        raise ConfigError(f"{DEFAULT_CONFIG}: is there already", hint="move it away, or go to another directory")
+    write_file(DEFAULT_CONFIG, text.encode())
+    typer.echo(f"{DEFAULT_CONFIG}: written. Look at the trials with {command('plan')}, and collect them with:")
     typer.echo(f"  {command('up')}")
 
 

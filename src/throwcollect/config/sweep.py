@@ -98,7 +98,7 @@ class TargetConfig(Section):
 class SweepConfig(Section):
     """Which parameters vary from trial to trial, and how they are drawn."""
 
-    sampler: Literal["grid", "uniform", "latin_hypercube", "sobol", "list"] = "sobol"
+    sampler: Literal["grid", "uniform", "sobol", "list"] = "sobol"
     """How points are drawn; `list` reads them from `file`."""
     parameters: dict[str, Parameter] = {}
     """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""

@@ -10,12 +10,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.decision import Judge
 from throwcollect.control.followed_curve import Motion
 from throwcollect.control.interpolation import interpolate
 from throwcollect.control.parameters import ControllerParameters
-from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
-from throwcollect.control.validation import refusal
+from throwcollect.control.tolerances import Tolerances
+from throwcollect.control.validation import find_refusal
 from throwcollect.control.values import (
     ControllerState,
     ErrorCode,
@@ -85,7 +84,7 @@ class JointTrajectoryController:
         self._holds_command = holds_command
         self._topic_aborts_goal = topic_aborts_goal
         self.parameters = parameters
-        self._judge = self._judge_with(self._defaults)
+        self._tolerances = self._defaults
         self.goal_id: Hashable | None = None
         self._results: list[GoalResult] = []
         self._scaling = 1.0
@@ -101,7 +100,7 @@ class JointTrajectoryController:
     @parameters.setter
     def parameters(self, parameters: ControllerParameters) -> None:
         self._parameters = parameters
-        self._defaults = default_tolerances(parameters.constraints, parameters.joints)
+        self._defaults = Tolerances.of(parameters)
         if parameters.cmd_timeout and not parameters.timeout_ns:
             values = f"({parameters.cmd_timeout:g} vs. {parameters.constraints.goal_time:g})"
             problem = f"Command timeout must be higher than goal_time tolerance {values}; it is off."
@@ -147,8 +146,7 @@ class JointTrajectoryController:
             return reason
         self._abort("Current goal preempted by new incoming action.")
         self.goal_id = goal_id
-        tolerances = goal_tolerances(goal, self._defaults, self._parameters.joints, logger=self.logger)
-        self._follow(goal.trajectory, self._judge_with(tolerances))
+        self._follow(goal.trajectory, self._defaults.merge(goal, logger=self.logger))
         return None
 
     def replace(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
@@ -158,7 +156,7 @@ class JointTrajectoryController:
         if self._topic_aborts_goal:
             self._abort("Current goal preempted by a trajectory on the topic.")
         # An open goal keeps its own tolerances, which the new trajectory has to meet.
-        self._follow(trajectory, self._judge if self.goal_id is not None else self._judge_with(self._defaults))
+        self._follow(trajectory, self._tolerances if self.goal_id is not None else self._defaults)
         return None
 
     def refuse(self, reason: TrajectoryRefusal) -> TrajectoryRefusal:
@@ -208,11 +206,11 @@ class JointTrajectoryController:
             Most updates that `take` may make now; the one after them must be made with `update`. `sys.maxsize` if
             nothing is to be decided.
         """
-        if self._holding:
-            return sys.maxsize
         if self._incoming is not None:
             return 0
-        updates = self._judge.updates_to_skip(self._motion, goal=self.goal_id is not None)
+        if self._holding:
+            return sys.maxsize
+        updates = self._tolerances.updates_to_skip(self._motion, goal=self.goal_id is not None)
         return sys.maxsize if updates is None else updates
 
     def take(self, n_updates: int) -> NDArray[np.float64]:
@@ -224,20 +222,8 @@ class JointTrajectoryController:
         Returns:
             Their commands [rad], shape ``(n_updates, n_joints)``, read-only.
         """
-        commands: NDArray[np.float64]
-        before_ns = self._time_ns
-        if self._incoming is None:
-            commands = self._motion.skip(n_updates)
-        else:
-            # Only a stop can be waiting here, and that does not depend on the measured state.
-            self._time_ns = before_ns + self._period_ns
-            self._begin(self._incoming, JointState(self.command))
-            motion, first = self._motion, self._motion.command
-            rows = motion.skip(n_updates - 1)
-            resting = motion.past_end and not motion.curve.end_ns
-            commands = np.broadcast_to(first, (n_updates, len(first))) if resting else np.vstack((first, rows))
-            commands.setflags(write=False)
-        self._time_ns = before_ns + n_updates * self._period_ns
+        commands = self._motion.skip(n_updates)
+        self._time_ns += n_updates * self._period_ns
         self.command = commands[-1]
         return commands
 
@@ -296,20 +282,20 @@ class JointTrajectoryController:
 
     def _decide(self, *, first: bool) -> GoalResult | None:
         motion = self._motion
-        if (decision := self._judge.decide(motion, self._measured, first=first)) is None:
+        if (decision := self._tolerances.decide(motion, self._measured, first=first)) is None:
             return None
         if decision.status is GoalStatus.ABORTED:
             remark = "" if self.goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
             self.logger.warning("%s: %s%s", self.name, decision.error_string, remark)
             self._stop()
         # An end that no goal waits for is judged again in each update until its goal time is over.
-        elif self.goal_id is not None or self._judge.is_settled(motion):
+        elif self.goal_id is not None or self._tolerances.is_settled(motion):
             self._hold(Waypoints.single(*motion.curve.state(motion.curve.end_ns)))
         self._finish(decision)
         return decision
 
-    def _follow(self, trajectory: Trajectory, judge: Judge) -> None:
-        self._incoming, self._judge, self._holding = trajectory, judge, False
+    def _follow(self, trajectory: Trajectory, tolerances: Tolerances) -> None:
+        self._incoming, self._tolerances, self._holding = trajectory, tolerances, False
 
     def _hold(self, waypoints: Waypoints) -> None:
         self._incoming, self._holding = waypoints, True
@@ -331,11 +317,8 @@ class JointTrajectoryController:
             self._results.append(replace(result, goal_id=self.goal_id))
             self.goal_id = None
 
-    def _judge_with(self, tolerances: Tolerances) -> Judge:
-        return Judge(tolerances, self._parameters.timeout_ns, self._parameters.joints)
-
     def _find_refusal(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
-        if reason := refusal(trajectory, self._parameters, now_ns):
+        if reason := find_refusal(trajectory, self._parameters, now_ns):
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns
         if ahead_ns > _FAR_AHEAD_NS:

@@ -33,17 +33,17 @@ class Motion:
         self.first_ns = first_ns
         self._period_ns = period_ns
         self._scaling = scaling
-        self._rebase(first_ns - start_ns)
+        self._sample_from(first_ns - start_ns)
 
     @property
     def clock_ns(self) -> int:
         """The trajectory's clock: time since its start [ns]."""
-        return self._desired.time_ns(self._index)
+        return self._origin_ns + self._index * self._step_ns
 
     @property
     def past_end(self) -> bool:
         """Whether the command of this update is the position of the last point."""
-        return self.clock_ns + self._period_ns >= self.curve.end_ns
+        return self._index >= self._commands.end_index
 
     @property
     def since_end_ns(self) -> int:
@@ -58,12 +58,12 @@ class Motion:
     @property
     def command(self) -> NDArray[np.float64]:
         """Positions to command in this update [rad], shape ``(n_joints,)``, read-only."""
-        return self._commands.position(self._index + self._ahead)
+        return self._commands.position(self._index)
 
     def scale(self, scaling: float) -> None:
         """Let the trajectory's clock go at another speed from now on; 0 stops it."""
         self._scaling = scaling
-        self._rebase(self.clock_ns)
+        self._sample_from(self.clock_ns)
 
     def advance(self) -> None:
         """Go to the next update, one control period later."""
@@ -71,15 +71,13 @@ class Motion:
 
     def skip(self, n_updates: int) -> NDArray[np.float64]:
         """Go on by many control periods. Return their commands [rad], shape ``(n_updates, n_joints)``, read-only."""
-        first = self._index + 1 + self._ahead
+        first = self._index + 1
         self._index += n_updates
         return self._commands.positions(first, n_updates)
 
     def updates_until_end(self) -> int:
         """Count the updates before the one in which `past_end` becomes true; negative if it is true already."""
-        if self.past_end:
-            return -1
-        return _first_index_at(self.curve.end_ns - self._period_ns - self.clock_ns, self._step_ns) - 1
+        return self._commands.end_index - self._index - 1
 
     def updates_until_late(self, tolerance_ns: int) -> int:
         """Count the updates before the one in which `since_end_ns` exceeds the tolerance; negative if it does so."""
@@ -89,14 +87,11 @@ class Motion:
         # This rounds down, because an update exactly at the tolerance is not late.
         return left_ns // self._step_ns if self._step_ns else sys.maxsize
 
-    def _rebase(self, clock_ns: int) -> None:
-        self._index = 0
+    def _sample_from(self, clock_ns: int) -> None:
+        self._index, self._origin_ns = 0, clock_ns
         self._step_ns = round(self._period_ns * self._scaling)
         self._desired = _Grid(self.curve, clock_ns, self._step_ns)
-        # At full speed a command is the desired position of the next update, so that one grid serves both.
-        full_speed = self._step_ns == self._period_ns
-        self._ahead = 1 if full_speed else 0
-        self._commands = self._desired if full_speed else _Grid(self.curve, clock_ns + self._period_ns, self._step_ns)
+        self._commands = _Grid(self.curve, clock_ns + self._period_ns, self._step_ns)
 
 
 class _Grid:
@@ -109,19 +104,12 @@ class _Grid:
     """
 
     def __init__(self, curve: Curve, origin_ns: int, step_ns: int) -> None:
-        self._curve = curve
-        self._origin_ns = origin_ns
-        self._step_ns = step_ns
+        self._curve, self._origin_ns, self._step_ns = curve, origin_ns, step_ns
         self.end_index = _first_index_at(curve.end_ns - origin_ns, step_ns)
-        self._block_start = 0
-        self._block = np.empty((0, 0))
+        self._block_start, self._block = 0, np.empty((0, 0))
         # A clock that stands still never gets to the end, so its last position is the position at the origin.
         self._last = curve.state(curve.end_ns if step_ns else origin_ns)[0]
         self._last.setflags(write=False)
-
-    def time_ns(self, index: int) -> int:
-        """Compute the time of a point, since the trajectory's start [ns]."""
-        return self._origin_ns + index * self._step_ns
 
     def position(self, index: int) -> NDArray[np.float64]:
         """Compute the position at one point [rad], shape ``(n_joints,)``, read-only."""
@@ -129,25 +117,15 @@ class _Grid:
 
     def positions(self, first: int, count: int) -> NDArray[np.float64]:
         """Compute positions at successive points [rad], shape ``(count, n_joints)``, read-only; `first` is an index."""
-        stop = first + count
-        moving_stop = min(stop, self.end_index if self._step_ns else first)
-        if first >= moving_stop:
+        if first >= self.end_index or not self._step_ns:
             return np.broadcast_to(self._last, (count, len(self._last)))
-        if not self._block_start <= first or moving_stop > self._block_start + len(self._block):
-            self._block_start = first
-            self._block = self._compute(first, max(moving_stop, min(first + _BLOCK, self.end_index)) - first)
-        moving = self._block[first - self._block_start : moving_stop - self._block_start]
-        if moving_stop == stop:
-            return moving
-        positions = np.vstack((moving, np.broadcast_to(self._last, (stop - moving_stop, len(self._last)))))
-        positions.setflags(write=False)
-        return positions
-
-    def _compute(self, first: int, count: int) -> NDArray[np.float64]:
-        times_ns = self._origin_ns + np.arange(first, first + count, dtype=np.int64) * self._step_ns
-        positions = self._curve.positions(times_ns)
-        positions.setflags(write=False)
-        return positions
+        begin = first - self._block_start
+        if begin < 0 or begin + count > len(self._block):
+            points = np.arange(first, first + max(count, min(_BLOCK, self.end_index - first)), dtype=np.int64)
+            times_ns = np.minimum(self._origin_ns + points * self._step_ns, self._curve.end_ns)
+            begin, self._block_start, self._block = 0, first, self._curve.positions(times_ns)
+            self._block.setflags(write=False)
+        return self._block[begin : begin + count]
 
 
 def _first_index_at(distance_ns: int, step_ns: int) -> int:

@@ -22,66 +22,49 @@ _FIELDS = {"positions": "Position", "velocities": "Velocity", "accelerations": "
 """Fields of a point that are commanded, with the word for one value of each."""
 
 
-def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> TrajectoryRefusal | None:
+def find_refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> TrajectoryRefusal | None:
     """Find the first rule that a trajectory breaks at the present time [ns]; None if it can be executed."""
-    answers = _judge(trajectory, parameters, now_ns)
-    return next((TrajectoryRefusal(code, text) for code, text in answers if text is not None), None)
+    for check in (_check_joints, _check_numbers, _check_times):
+        for code, text in check(trajectory, parameters, now_ns):
+            return TrajectoryRefusal(code, text)
+    return None
 
 
-def _judge(
-    trajectory: Trajectory, parameters: ControllerParameters, now_ns: int
-) -> Iterator[tuple[ErrorCode, str | None]]:
-    """Check one rule after the other; each may rely on those before it."""
-    yield ErrorCode.INVALID_JOINTS, _too_few_joints(trajectory, parameters)
-    yield ErrorCode.INVALID_GOAL, _no_points(trajectory)
-    yield ErrorCode.INVALID_JOINTS, _wrong_joints(trajectory, parameters)
-    yield ErrorCode.INVALID_GOAL, _wrong_sizes(trajectory, parameters)
-    yield ErrorCode.INVALID_GOAL, _not_finite(trajectory)
-    yield ErrorCode.INVALID_GOAL, _moving_end(trajectory, parameters)
-    yield ErrorCode.OLD_HEADER_TIMESTAMP, _over_already(trajectory, now_ns)
-    yield ErrorCode.INVALID_GOAL, _wrong_times(trajectory)
-    yield ErrorCode.INVALID_GOAL, _effort(trajectory)
+# Each rule may rely on those before it, as only the first that is broken counts.
+_Broken = Iterator[tuple[ErrorCode, str]]
 
 
-def _too_few_joints(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
+def _check_joints(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> _Broken:
     names, joints = trajectory.joint_names, parameters.joints
     if not parameters.allow_partial_joints_goal and len(names) != len(joints):
         counts = f"expected all {len(joints)} of {_join(joints)}; got {len(names)}: {_join(names)}"
-        return f"Joints on incoming trajectory don't match the controller joints. ({counts})"
-    if not len(names):
-        return f"Empty joint names on incoming trajectory. (expected some of {_join(joints)})"
-    return None
-
-
-def _no_points(trajectory: Trajectory) -> str | None:
-    return None if len(trajectory.times_ns) else "Empty trajectory received. (expected at least 1 point; got 0)"
-
-
-def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
-    names, joints = trajectory.joint_names, parameters.joints
+        yield ErrorCode.INVALID_JOINTS, f"Joints on incoming trajectory don't match the controller joints. ({counts})"
+    if not names:
+        text = f"Empty joint names on incoming trajectory. (expected some of {_join(joints)})"
+        yield ErrorCode.INVALID_JOINTS, text
+    if not len(trajectory.times_ns):
+        yield ErrorCode.INVALID_GOAL, "Empty trajectory received. (expected at least 1 point; got 0)"
     for name in names:
         if name not in joints:
-            return f"Incoming joint {name} doesn't match the controller's joints. (expected {_join(joints)})"
+            text = f"Incoming joint {name} doesn't match the controller's joints. (expected {_join(joints)})"
+            yield ErrorCode.INVALID_JOINTS, text
     for index, name in enumerate(names):
         if name in names[:index]:
-            return f"Joint {name} is named more than once on incoming trajectory. (got {_join(names)})"
-    return None
+            text = f"Joint {name} is named more than once on incoming trajectory. (got {_join(names)})"
+            yield ErrorCode.INVALID_JOINTS, text
 
 
-def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
-    expected = len(trajectory.joint_names)
-    integrates = parameters.allow_integration_in_goal_trajectories
+def _check_numbers(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> _Broken:
+    expected, integrates = len(trajectory.joint_names), parameters.allow_integration_in_goal_trajectories
     all_sizes = [list(map(len, getattr(trajectory, field))) for field in _FIELDS]
     for index, sizes in enumerate(zip(*all_sizes, strict=True)):
         if integrates and not any(sizes):
-            return f"The given trajectory has no position, velocity, or acceleration points. (point #{index})"
+            text = f"The given trajectory has no position, velocity, or acceleration points. (point #{index})"
+            yield ErrorCode.INVALID_GOAL, text
         for field, size in zip(_FIELDS, sizes, strict=True):
             if size != expected and (size or (field == "positions" and not integrates)):
-                return f"Mismatch between joint_names size ({expected}) and {field} ({size}) at point #{index}."
-    return None
-
-
-def _not_finite(trajectory: Trajectory) -> str | None:
+                text = f"Mismatch between joint_names size ({expected}) and {field} ({size}) at point #{index}."
+                yield ErrorCode.INVALID_GOAL, text
     for field, word in _FIELDS.items():
         rows: Rows = getattr(trajectory, field)
         present = [index for index, values in enumerate(rows) if len(values)]
@@ -90,47 +73,33 @@ def _not_finite(trajectory: Trajectory) -> str | None:
         if not np.isfinite(table).all():
             row, column = np.argwhere(~np.isfinite(table))[0]
             where = f"{word} of joint {trajectory.joint_names[column]} at point #{present[row]}"
-            return f"{where} is not finite: {table[row, column]}"
-    return None
+            yield ErrorCode.INVALID_GOAL, f"{where} is not finite: {table[row, column]}"
+    if not parameters.allow_nonzero_velocity_at_trajectory_end:
+        for joint, velocity in zip(trajectory.joint_names, trajectory.velocities[-1], strict=False):
+            if abs(velocity) > END_VELOCITY_LIMIT:
+                text = f"Velocity of last trajectory point of joint {joint} is not zero: {velocity:.15f}"
+                yield ErrorCode.INVALID_GOAL, f"{text} (limit {END_VELOCITY_LIMIT:.3g} rad/s)"
 
 
-def _moving_end(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
-    if parameters.allow_nonzero_velocity_at_trajectory_end:
-        return None
-    for joint, velocity in zip(trajectory.joint_names, trajectory.velocities[-1], strict=False):
-        if abs(velocity) > END_VELOCITY_LIMIT:
-            text = f"Velocity of last trajectory point of joint {joint} is not zero: {velocity:.15f}"
-            return f"{text} (limit {END_VELOCITY_LIMIT:.3g} rad/s)"
-    return None
-
-
-def _over_already(trajectory: Trajectory, now_ns: int) -> str | None:
-    if not trajectory.stamp_ns:
-        return None
-    end_ns = trajectory.stamp_ns + trajectory.times_ns[-1]
-    if end_ns >= now_ns:
-        return None
-    times = f"non-zero start time ({trajectory.stamp_ns / 1e9:f}) that ends in the past ({end_ns / 1e9:f})"
-    return f"Received trajectory with {times} (expected an end at {now_ns / 1e9:f} or later)"
-
-
-def _wrong_times(trajectory: Trajectory) -> str | None:
+def _check_times(trajectory: Trajectory, _parameters: ControllerParameters, now_ns: int) -> _Broken:
     times_ns = trajectory.times_ns
+    if trajectory.stamp_ns and (end_ns := trajectory.stamp_ns + times_ns[-1]) < now_ns:
+        times = f"non-zero start time ({trajectory.stamp_ns / 1e9:f}) that ends in the past ({end_ns / 1e9:f})"
+        text = f"Received trajectory with {times} (expected an end at {now_ns / 1e9:f} or later)"
+        yield ErrorCode.OLD_HEADER_TIMESTAMP, text
     if times_ns[0] < 0:
-        return f"Time of point 0 is negative, it is {times_ns[0] / 1e9:f} (expected 0 or more)"
+        text = f"Time of point 0 is negative, it is {times_ns[0] / 1e9:f} (expected 0 or more)"
+        yield ErrorCode.INVALID_GOAL, text
     for index in range(1, len(times_ns)):
         if times_ns[index] <= times_ns[index - 1]:
             values = f"it is {times_ns[index - 1] / 1e9:f} and {times_ns[index] / 1e9:f} respectively"
-            return f"Time between points {index - 1} and {index} is not strictly increasing, {values}"
-    return None
-
-
-def _effort(trajectory: Trajectory) -> str | None:
-    for index, values in enumerate(trajectory.effort):
-        if len(values):
+            text = f"Time between points {index - 1} and {index} is not strictly increasing, {values}"
+            yield ErrorCode.INVALID_GOAL, text
+    for index, row in enumerate(trajectory.effort):
+        if len(row):
             rule = "Trajectories with effort fields are only supported for controllers using the 'effort' command"
-            return f"{rule} interface. (expected none; got {len(values)} values at point #{index})"
-    return None
+            text = f"{rule} interface. (expected none; got {len(row)} values at point #{index})"
+            yield ErrorCode.INVALID_GOAL, text
 
 
 def _join(names: Sequence[str]) -> str:

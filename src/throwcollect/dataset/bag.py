@@ -23,7 +23,7 @@ from throwcollect.dataset.directory import METADATA, PLAN, describe_other, has_f
 from throwcollect.dataset.lock import is_locked
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
-from throwcollect.files import read_text, refuse_pointers
+from throwcollect.files import read_text
 from throwcollect.wording import command
 
 VERSION = 9
@@ -164,7 +164,6 @@ def refuse_other_directory(directory: Path) -> None:
     """Refuse a directory without any file of a dataset, as advice on damaged datasets would not help there."""
     if not has_files(directory):
         raise DatasetError(describe_other(directory), path=directory, hint=_name_nearby(directory))
-    refuse_pointers(directory)
 
 
 def _name_nearby(directory: Path) -> str | None:

@@ -11,7 +11,6 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, config_path, describe_other
 from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import refuse_pointers
 from throwcollect.wording import command
 
 
@@ -31,7 +30,6 @@ def reading_config(directory: Path, file: Path | None = None, overrides: Sequenc
         raise ConfigError(
             f"{directory}: {describe_other(directory)}", expected="a directory that throwcollect up has made"
         )
-    refuse_pointers(directory)
     with ExitStack() as places:
         with nullcontext() if file else _explaining_damage(directory):
             config = places.enter_context(load_locating_errors(file or config_path(directory), overrides))

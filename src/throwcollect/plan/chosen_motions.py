@@ -9,6 +9,8 @@ import numpy as np
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config
 from throwcollect.plan.trials import Points
+from throwcollect.robots.description import robot_of
+from throwcollect.tasks.motions import KEY, SAME, motions_of
 
 
 def count_motions(config: Config) -> int:
@@ -16,9 +18,6 @@ def count_motions(config: Config) -> int:
     family = config.task.trajectory
     if not isinstance(family, MotionFile):
         return 0
-    from throwcollect.robots.description import robot_of
-    from throwcollect.tasks.motions import motions_of
-
     return len(motions_of(family, robot_of(config))) if family.motion is None else 1
 
 
@@ -38,9 +37,6 @@ def add_motions(points: Points, config: Config) -> Points:
     family = config.task.trajectory
     if not isinstance(family, MotionFile):
         return points
-    from throwcollect.robots.description import robot_of
-    from throwcollect.tasks.motions import KEY, SAME, motions_of
-
     motions = motions_of(family, robot_of(config))
     columns = dict(zip(points.keys, points.values.T, strict=True))
     first = motions.number_of(family.motion)

@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from throwcollect.errors import DatasetError
+from throwcollect.extras import lazily
 from throwcollect.files import open_regular, replacing, unreadable
 
+# Nodes import this module, and most of them read no tables.
+pa, pq = lazily("pyarrow"), lazily("pyarrow.parquet")
 _DESCRIPTOR_PATH = "/proc/self/fd/{}"
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
@@ -33,8 +36,6 @@ def write_table(path: Path, table: Any) -> None:
 
 
 def _encode(table: Any, file: BinaryIO) -> None:
-    import pyarrow.parquet as pq
-
     with pq.ParquetWriter(file, table.schema, compression="zstd", write_page_checksum=True) as writer:
         for first in range(0, len(table) or 1, _ROWS_A_GROUP):
             # The bytes must not depend on where a column was cut into pieces; groups are joined one at a time.
@@ -56,9 +57,6 @@ def open_parquet(path: Path) -> Iterator[Any]:
     Yields:
         A `pyarrow.parquet.ParquetFile`, whose values are not validated yet.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     try:
         descriptor = open_regular(path)
     except FileNotFoundError as error:

@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, PlanError, Problem
+from throwcollect.errors import DatasetError, ForeignPlanError, PlanError, Problem
 from throwcollect.files import write_file
+from throwcollect.plan.arrow_column import make_table, nan_where_null, null_where_nan, read_numbers
 from throwcollect.plan.digest import config_digest, trial_digests
 from throwcollect.plan.parquet_file import encode_table, open_parquet
 from throwcollect.plan.slice import Slice
@@ -30,7 +32,7 @@ _JOINED_KEY = b"throwcollect.joined"
 _MOST_REASONS = 5
 
 Check = Callable[[Config], str | None]
-"""Explains why a trial with this configuration cannot be run; None if it can."""
+"""Explains why the plan refuses a trial with this configuration; None if it can be run."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,6 @@ class Plan:
         Columns: ``trial`` int64, ``digest`` string, ``seed`` uint64, ``refused`` string or null, then one float64
         column per swept key, named like it, and one per column of targets, null where a trial has none.
         """
-        from throwcollect.plan.arrow_column import make_table, null_where_nan
-
         trials = self.trials
         columns: list[Any] = [
             np.arange(trials.first, trials.numbers.stop),
@@ -158,14 +158,6 @@ def _make_seed(root: int, number: int) -> int:
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
-def refusal(config: Config, check: Check) -> str | None:
-    """Explain why the plan refuses a trial; None if it does not. A ConfigError of the check is a reason, too."""
-    try:
-        return check(config)
-    except ConfigError as error:
-        return str(error)
-
-
 def check_some_left(found: Sequence[str | None]) -> None:
     """Make sure that a plan has something to run, given for each trial why it is refused; None if it is not."""
     reasons = [reason for reason in found if reason is not None]
@@ -186,8 +178,6 @@ def check_some_left(found: Sequence[str | None]) -> None:
 
 def _read_trials(rows: Any, names: Sequence[str], path: Path) -> Trials:
     """Read the trials of the table of a plan."""
-    from throwcollect.plan.arrow_column import nan_where_null, read_numbers
-
     first = rows["trial"][0].as_py()
     if not np.array_equal(read_numbers(rows["trial"]), np.arange(first, first + len(rows))):
         raise DatasetError("the trials are not numbered without gaps", path=path)
@@ -205,8 +195,6 @@ def _read_trials(rows: Any, names: Sequence[str], path: Path) -> Trials:
 
 
 def _make_schema(names: Sequence[str]) -> Any:
-    import pyarrow as pa
-
     kinds = {"trial": pa.int64(), "digest": pa.string(), "seed": pa.uint64(), "refused": pa.string()}
     kinds |= dict.fromkeys(names, pa.float64())
     nullable = {"refused", *filter(is_target, names)}

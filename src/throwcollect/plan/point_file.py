@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
@@ -17,20 +18,13 @@ from throwcollect.config.task_config import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import suggest_path
+from throwcollect.plan.arrow_column import make_table, null_where_nan
 from throwcollect.plan.chosen_motions import add_motions
 from throwcollect.plan.parquet_file import encode_table
 from throwcollect.plan.trials import Points
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
 """Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
-_BLANKS = re.compile(r"^[ \t]+$", re.MULTILINE)
-"""Lines that hold nothing but blanks."""
-_AROUND = ' \t"'
-"""What may stand around names and numbers; quotes behind blanks are a part of the text for Arrow."""
-
 MOST_PROBLEMS = 20
 
 
@@ -60,28 +54,20 @@ def read_table(path: Path, key: str) -> pa.Table:
 
     Messages name the file by its key or option.
     """
-    import pyarrow as pa
-    import pyarrow.csv
-    import pyarrow.parquet as pq
-
     if path.suffix.lower() not in (".csv", ".parquet"):
         raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", key)])
     try:
-        if path.is_dir():
-            raise ConfigError([Problem(f"should be a file, got the directory {path}", key)])
-        if not path.is_file():
+        if not path.exists():
             raise ConfigError([Problem(f"there is no file {path}{suggest_path(path)}", key)])
-        if not _is_csv(path):
+        if _is_csv(path):
+            # In one block, as the types of columns follow from the first block; errors of one thread have the row.
+            whole = pa.csv.ReadOptions(block_size=path.stat().st_size + 1, use_threads=False)
+            empty = pa.csv.ConvertOptions(null_values=["", " "])
+            table = pa.csv.read_csv(path, read_options=whole, convert_options=empty)
+            table = table.rename_columns([name.strip() for name in table.column_names])
+        else:
             table = pq.ParquetFile(path).read()
             table = table.drop_columns([name for name in table.column_names if _UNNAMED_INDEX.fullmatch(name)])
-        else:
-            # Arrow skips empty lines, but not lines of blanks.
-            data = _BLANKS.sub("", path.read_text(encoding="utf-8")).encode()
-            # In one block, as the types of columns follow from the first block; errors of one thread have the row.
-            whole = pa.csv.ReadOptions(block_size=len(data) + 1, use_threads=False)
-            empty = pa.csv.ConvertOptions(null_values=["", " "])
-            table = pa.csv.read_csv(io.BytesIO(data), read_options=whole, convert_options=empty)
-            table = table.rename_columns([name.strip(_AROUND) for name in table.column_names])
     except (ValueError, OSError) as error:
         raise ConfigError([Problem(f"cannot be read: {error}", key, path)]) from error
     if not len(table):
@@ -91,39 +77,31 @@ def read_table(path: Path, key: str) -> pa.Table:
 
 def read_numbers(table: pa.Table, names: Sequence[str], path: Path) -> NDArray[np.float64]:
     """Read columns of a table of `read_table`, NaN where a cell is empty, shape ``(n_rows, n_names)``."""
-    import pyarrow as pa
-
     numbers = []
     for name in names:
         column, kind = table[name], table.schema.field(name).type
-        if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind):
-            # Integers beyond 2^53 are rounded, as other numbers are.
-            numbers.append(column.cast(pa.float64(), safe=False).to_numpy())
-        elif _is_csv(path):
-            numbers.append(_parse(column.cast(pa.string()).to_pylist(), name, path))
-        else:
+        if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind)):
+            if pa.types.is_string(kind):
+                # One cell that is no number makes the whole column one of strings.
+                for row, cell in enumerate(column.to_pylist()):
+                    if cell is not None and not _is_number(cell):
+                        raise ConfigError([problem_of_row(f"should be a number, got {cell!r}", name, path, row)])
             raise ConfigError([Problem(f"should be a column of numbers, got {kind}", name, path)])
+        # Integers beyond 2^53 are rounded, as other numbers are.
+        numbers.append(column.cast(pa.float64(), safe=False).to_numpy())
     return np.column_stack(numbers)
 
 
-def _parse(cells: Sequence[str | None], name: str, path: Path) -> list[float]:
-    """Read the numbers of a column that Arrow takes for text, as one has quotes behind blanks, or a cell is wrong."""
-    numbers = []
-    for row, cell in enumerate(cells):
-        text = (cell or "").strip(_AROUND)
-        try:
-            numbers.append(float(text or "nan"))
-        except ValueError as error:
-            raise ConfigError([problem_of_row(f"should be a number, got {text!r}", name, path, row)]) from error
-    return numbers
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def encode_points(points: Points) -> bytes:
     """Encode points as Parquet for `read_points`; equal points give equal bytes."""
-    import pyarrow as pa
-
-    from throwcollect.plan.arrow_column import make_table, null_where_nan
-
     schema = pa.schema([(name, pa.float64()) for name in points.names])
     return encode_table(make_table([*map(null_where_nan, points.table.T)], schema))
 

@@ -64,17 +64,6 @@ def _draw_uniform(count: int, dimensions: int, randomness: np.random.Generator) 
     return randomness.random((count, dimensions))
 
 
-def _draw_latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    """Draw points so that each of `count` equal strips along each key holds one; SciPy draws the same points."""
-    # SciPy's samplers spawn a generator from the one that they are given, and draw from the spawned one.
-    (own,) = randomness.spawn(1)
-    places = own.uniform(size=(count, dimensions))
-    strips = np.tile(np.arange(1, count + 1), (dimensions, 1))
-    for strip in strips:
-        own.shuffle(strip)
-    return np.asarray((strips.T - places) / count)
-
-
 def _draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
     if dimensions > MOST_DIMENSIONS:
         raise PlanError(
@@ -85,9 +74,7 @@ def _draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) ->
     return draw_sobol(count, dimensions, own)
 
 
-UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](
-    {"uniform": _draw_uniform, "latin_hypercube": _draw_latin_hypercube, "sobol": _draw_sobol}
-)
+UNIT_SAMPLERS = MappingProxyType[str, UnitSampler]({"uniform": _draw_uniform, "sobol": _draw_sobol})
 """Samplers that fill the unit cube, by their names in `sweep.sampler`."""
 
 
@@ -95,7 +82,7 @@ def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float6
     """Map places from 0 to 1 to values of a parameter; each of a set of values gets an equal share."""
     if isinstance(parameter, Values):
         count = len(parameter.values)
-        # A place in the last strip of a Latin hypercube can be rounded to 1.
+        # A place just below 1 can be rounded to it.
         return np.array(parameter.values)[np.minimum((unit * count).astype(np.int64), count - 1)]
     if parameter.scale == "log":
         low, high = math.log(parameter.min), math.log(parameter.max)

@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass
 
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.wording import format_count
 
 
 @dataclass(frozen=True)
@@ -45,16 +44,7 @@ class Slice:
         """Find the numbers of the slice's trials in a plan of `trials`; slices differ by at most one shard."""
         shards = -(-trials // trials_per_shard)
         if self.count > shards:
-            smaller = f", or shards of at most {trials // self.count}" if self.count <= trials else ""
-            raise ConfigError(
-                [
-                    Problem(
-                        f"{format_count(trials, 'trial')} are {format_count(shards, 'shard')} of {trials_per_shard}, "
-                        f"which cannot be {self.count} slices",
-                        key="record.trials_per_shard",
-                    )
-                ],
-                expected=f"at most {format_count(shards, 'slice')}{smaller}",
-            )
+            problem = f"{trials} trials are {shards} shards of {trials_per_shard}, fewer than {self.count} slices"
+            raise ConfigError([Problem(problem, key="record.trials_per_shard")], expected=f"at most {shards} slices")
         first, last = (shards * bound // self.count for bound in (self.index, self.index + 1))
         return range(first * trials_per_shard, min(last * trials_per_shard, trials))

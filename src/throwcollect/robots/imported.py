@@ -96,7 +96,7 @@ def find_examples() -> Path:
     try:
         return Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
     except PackageNotFoundError as error:
-        raise MissingExtraError("example-robot-data", "collect") from error
+        raise MissingExtraError("example-robot-data") from error
 
 
 def list_shares(package: str) -> Iterator[Path]:

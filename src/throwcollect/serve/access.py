@@ -23,7 +23,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from throwcollect.errors import ConfigError
-from throwcollect.files import write_secret
+from throwcollect.files import write_file
 from throwcollect.serve.problem_responses import problem
 
 _MOST_BODY = 1_000_000
@@ -77,7 +77,7 @@ class Keys:
         try:
             if not path.exists():
                 keys = cls()
-                write_secret(path, f"{keys.full}\n{keys.read_only}\n".encode())
+                write_file(path, f"{keys.full}\n{keys.read_only}\n".encode(), mode=0o600)
             tokens = path.read_text(errors="replace").split()
             is_private = not path.stat().st_mode & 0o077
         except OSError as error:

@@ -20,7 +20,7 @@ from urllib.request import HTTPSHandler, ProxyHandler, Request, build_opener
 from pydantic import TypeAdapter
 
 from throwcollect.errors import WorkerError
-from throwcollect.files import open_log, write_secret
+from throwcollect.files import open_log, write_file
 from throwcollect.own_process import make_command
 from throwcollect.state_directory import is_locked, state_directory
 
@@ -77,7 +77,7 @@ def publish(address: Address) -> Iterator[None]:
             is_first = True
         time.sleep(0 if is_first else _POLL_S)
     if is_first:
-        write_secret(path, _ADDRESS.dump_json(address))
+        write_file(path, _ADDRESS.dump_json(address), mode=0o600)
     try:
         yield
     finally:

@@ -21,6 +21,8 @@ from throwcollect.robots.robot import Robot
 from throwcollect.units import name_sliding
 
 h5py = lazily("h5py")
+# Simulations read no files of motions, and should not load these.
+pa, pc, pq = lazily("pyarrow"), lazily("pyarrow.csv"), lazily("pyarrow.parquet")
 
 MOTION, TIME = "motion", "time_s"
 """Columns of the name of a point's motion, and of the time since the motion's start."""
@@ -48,8 +50,6 @@ def columns_of(joint: str, robot: Robot) -> list[str]:
 
 def read_motion_table(family: MotionFile, robot: Robot) -> Any:
     """Read the Arrow table of all points of a file: `MOTION`, `TIME`, and columns of joints, unchecked."""
-    import pyarrow as pa
-
     path = Path(family.file)
     try:
         if not path.exists():
@@ -77,10 +77,6 @@ def _by_number(path: Path) -> list[str | int]:
 
 def _read_table(path: Path, _family: MotionFile) -> Any:
     """Read a table of CSV or Parquet; a motion without a name gets that of the file."""
-    import pyarrow as pa
-    import pyarrow.csv as pc
-    import pyarrow.parquet as pq
-
     if path.suffix == ".csv":
         table = pc.read_csv(path, convert_options=pc.ConvertOptions(column_types={MOTION: pa.string()}))
         table = table.rename_columns([name.strip() for name in table.column_names])
@@ -118,8 +114,6 @@ def _read_hdf5(path: Path, family: MotionFile) -> _Arrays:
 
 
 def _read_lerobot(path: Path, family: MotionFile) -> _Arrays:
-    import pyarrow.parquet as pq
-
     info = json.loads((path / "meta" / "info.json").read_text(encoding="utf-8"))
     names = info["features"]["action"]["names"]
     # Older datasets have the names below a word such as `motors`.
@@ -144,8 +138,6 @@ def _read_mcap(path: Path, _family: MotionFile) -> _Arrays:
 
 
 def _tabulate(joints: Sequence[str | None], motions: list[_Motion], robot: Robot) -> Any:
-    import pyarrow as pa
-
     names, times, orders = zip(*motions, strict=True)
     blocks = [np.concatenate(each) for each in zip(*orders, strict=True)]
     if any(block.shape[1:] != (len(joints),) for block in blocks):

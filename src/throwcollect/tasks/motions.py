@@ -18,7 +18,7 @@ from throwcollect.config.section import unknown_joint
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.motion_files import MOTION, TIME, columns_of, read_motion_table
+from throwcollect.tasks.motion_files import MOTION, TIME, columns_of, pa, read_motion_table
 from throwcollect.wording import format_count, join_names
 
 KEY = "task.trajectory.motion"
@@ -71,8 +71,6 @@ class Motions:
 
     def table(self) -> Any:
         """Make the Arrow table of all points, which a Parquet file of motions has."""
-        import pyarrow as pa
-
         numbers = np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.offsets))
         return pa.table({MOTION: pa.DictionaryArray.from_arrays(numbers, self.names).cast(pa.string()), **self.columns})
 
@@ -206,32 +204,26 @@ def _read_numbers(table: Any, name: str, path: Path) -> NDArray[np.float64]:
 
 
 def _find_problems(motions: Motions) -> Iterator[str]:
-    """Say what is wrong with the numbers of motions, one after the other."""
+    """Find the first number of each kind that no motion has."""
     times, offsets, names = motions.columns[TIME], motions.offsets, motions.names
     if len(set(names)) < len(names):
         twice = next(name for number, name in enumerate(names) if name in names[:number])
         yield f"the points of motion {twice!r} should follow each other"
-    for name, values in motions.columns.items():
-        wrong = np.flatnonzero(~np.isfinite(values))
-        if len(wrong):
-            yield f"{_place(motions, wrong[0])}: {name} should be a number, got {values[wrong[0]]}"
-    if len(short := np.flatnonzero(np.diff(offsets) < 2)):
-        yield f"motion {names[short[0]]!r}: should have 2 points or more, has 1"
-    if len(late := np.flatnonzero(times[offsets[:-1]] != 0)):
-        yield f"motion {names[late[0]]!r}: should begin at {TIME} 0, begins at {times[offsets[late[0]]]:g}"
-    falling = np.diff(times) <= 0
+    begins, ends = offsets[:-1], offsets[1:] - 1
     # The times of each motion begin at 0 again.
-    falling[offsets[1:-1] - 1] = False
-    if len(wrong := np.flatnonzero(falling)):
-        row = wrong[0] + 1
-        yield f"{_place(motions, row)}: {TIME} should rise, is {times[row]:g} after {times[row - 1]:g}"
-    at_rest = np.append(offsets[:-1], offsets[1:] - 1)
-    for name, values in list(motions.columns.items())[1 + len(motions.joints) : 1 + 2 * len(motions.joints)]:
-        if len(wrong := np.flatnonzero(np.abs(values[at_rest]) > SAME)):
-            row = at_rest[wrong[0]]
-            yield f"{_place(motions, row)}: {name} should be 0, as motions begin and end at rest, got {values[row]:g}"
-
-
-def _place(motions: Motions, row: int) -> str:
-    number = int(np.searchsorted(motions.offsets, row, side="right")) - 1
-    return f"motion {motions.names[number]!r}, point {row - motions.offsets[number] + 1}"
+    rising = np.append(True, np.diff(times) > 0)
+    rising[begins] = True
+    at_rest = np.append(begins, ends)
+    count, columns = len(motions.joints), motions.columns
+    found = [(name, np.flatnonzero(~np.isfinite(values)), "should be a number") for name, values in columns.items()]
+    found.append((TIME, begins[begins == ends], "should be that of 2 points or more"))
+    found.append((TIME, begins[times[begins] != 0], "should begin at 0"))
+    found.append((TIME, np.flatnonzero(~rising), "should rise"))
+    for name in [*columns][1 + count : 1 + 2 * count]:
+        rows = at_rest[np.abs(columns[name][at_rest]) > SAME]
+        found.append((name, rows, "should be 0, as motions begin and end at rest"))
+    for name, rows, sentence in found:
+        if len(rows):
+            number = int(np.searchsorted(offsets, rows[0], side="right")) - 1
+            place = f"motion {names[number]!r}, point {rows[0] - offsets[number] + 1}"
+            yield f"{place}: {name} {sentence}, got {columns[name][rows[0]]:g}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import Field, dataclass, fields, make_dataclass, replace
+from dataclasses import dataclass, fields, make_dataclass, replace
 from enum import Enum
 from functools import cache
 from types import NoneType
@@ -13,13 +13,13 @@ from typing import Any, Generic, TypeVar
 from throwcollect.config.scene import BALL
 from throwcollect.errors import DatasetError
 from throwcollect.tasks.result_columns import (
+    COLUMNS,
     Column,
     Columns,
     JointColumns,
     Number,
     Peak,
     PeakColumns,
-    columns_of,
     measured,
 )
 from throwcollect.units import name_sliding
@@ -96,16 +96,20 @@ class ResultColumns(Generic[AnyResult]):
     ) -> None:
         self._results = results
         self._joints = tuple(joints)
-        declared = [
-            (field, columns, [_say_unit(each, field.name, sliding) for each in columns.declare(field.name, joints)])
-            for field, columns in _list_declared(results)
-        ]
-        self._fields = [(field.name, columns, [each.name for each in found]) for field, columns, found in declared]
-        self.columns = tuple(
-            replace(column, description=column.description.replace("{tool}", tool).replace("{object}", acted_on))
-            for *_, found in declared
-            for column in found
-        )
+        self._fields: list[tuple[str, Columns, list[str]]] = []
+        self.columns: tuple[Column, ...] = ()
+        common = {field.name for field in fields(Result)}
+        for field in sorted(fields(results), key=lambda field: field.name in common):
+            if (columns := field.metadata.get(COLUMNS)) is None:
+                continue
+            found = [each.fill(tool=tool, object=acted_on) for each in columns.declare(field.name, joints)]
+            for place, each in enumerate(found):
+                # A joint that slides has metres where others have radians.
+                if each.name.removesuffix(f"_{field.name}") in sliding:
+                    text = each.description.replace("[rad]", "[m]")
+                    found[place] = replace(each, name=name_sliding(each.name), description=text)
+            self._fields.append((field.name, columns, [each.name for each in found]))
+            self.columns += tuple(found)
 
     def write(self, result: AnyResult) -> dict[str, Any]:
         """Make outcome, reason and the values of all columns, by name; None where nothing was measured."""
@@ -141,17 +145,3 @@ class ResultColumns(Generic[AnyResult]):
             values = [row[column] for column in names]
             measures[name] = None if None in values else columns.join(values, self._joints)
         return self._results(outcome, reason, **measures)
-
-
-def _say_unit(column: Column, field: str, sliding: Collection[str]) -> Column:
-    """Put metres in the place of radians in the column that a field has for a joint that slides."""
-    if column.name.removesuffix(f"_{field}") not in sliding:
-        return column
-    return replace(column, name=name_sliding(column.name), description=column.description.replace("[rad]", "[m]"))
-
-
-def _list_declared(results: type[Result]) -> list[tuple[Field[Any], Columns]]:
-    """List the fields of a result that have columns: first those that the task adds."""
-    common = {field.name for field in fields(Result)}
-    pairs = [(field, columns) for field in fields(results) if (columns := columns_of(field)) is not None]
-    return sorted(pairs, key=lambda pair: pair[0].name in common)

@@ -11,10 +11,12 @@ A description may name the ``{tool}`` and the ``{object}``, by which contacts an
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import Field, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 Vector = tuple[float, float, float]
+COLUMNS = "columns"
+"""Name of the columns in the metadata of a field."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,6 @@ class Peak:
     share: float
 
 
-_DECLARED = "columns"
-
-
 @dataclass(frozen=True)
 class Column:
     """A column of the table.
@@ -62,68 +61,63 @@ class Column:
     kind: Literal["number", "count", "text"]
     description: str
 
+    def fill(self, **words: str) -> Column:
+        """Put words in the place of their names in braces."""
+        name, description = self.name, self.description
+        for word, text in words.items():
+            name, description = name.replace(f"{{{word}}}", text), description.replace(f"{{{word}}}", text)
+        return Column(name, self.kind, description)
+
 
 class Columns:
-    """The columns of one field of a result, by default a single column; all are null where the field is None.
+    """The columns of one field of a result; all are null where the field is None.
 
     Args:
-        columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field.
-        split: Splits a value of the field, which is not None, into one value for each column.
-        join: Makes a value of the field from the columns' values, none of which is null.
+        columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field; those with
+            ``{joint}`` are there for each joint that the task moves.
+        split: Splits a value of the field, which is not None, into one value for each column, given the joints.
+        join: Makes a value of the field from the columns' values, none of which is null, given the joints.
     """
 
     def __init__(
         self,
-        columns: Sequence[Column],
-        split: Callable[[Any], Sequence[object]] = lambda value: (value,),
-        join: Callable[..., Any] = lambda value: value,
+        *columns: Column,
+        split: Callable[[Any, Sequence[str]], Sequence[object]] = lambda value, _: (value,),
+        join: Callable[[Sequence[Any], Sequence[str]], Any] = lambda values, _: values[0],
     ) -> None:
-        self._columns, self._split, self._join = columns, split, join
+        self._columns, self.split, self.join = columns, split, join
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns of the field `name`, for the joints that the task moves."""
-        return [
-            Column(each.name.replace("{field}", name), each.kind, each.description.replace("{field}", name))
-            for each in self._columns
-        ]
-
-    def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
-        """Split a value of the field, which is not None, into one value for each column."""
-        return self._split(value)
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Make the field's value from the columns' values, none of which is null."""
-        return self._join(*values)
+        of_joints = ((each, joints if "{joint}" in each.name else [""]) for each in self._columns)
+        return [each.fill(field=name, joint=joint) for each, own in of_joints for joint in own]
 
 
 class Number(Columns):
     """A number, in a column that has the field's name; the description is one sentence, with the unit."""
 
     def __init__(self, description: str) -> None:
-        super().__init__([Column("{field}", "number", description)])
+        super().__init__(Column("{field}", "number", description))
 
 
 class Count(Columns):
     """An integer, in a column that has the field's name; the description is one sentence."""
 
     def __init__(self, description: str) -> None:
-        super().__init__([Column("{field}", "count", description)])
+        super().__init__(Column("{field}", "count", description))
 
 
 class BodyColumns(Columns):
     """A `ObjectState`: ``<field>_time_s``, ``<field>_x_m`` and so on; `when` ends a sentence with the instant."""
 
     def __init__(self, when: str) -> None:
-        time = Column("{field}_time_s", "number", f"Time since the start of the trial {when} [s].")
         place, speed = (f"{what} of the {{object}} in world {when}" for what in ("Centre", "Velocity"))
         super().__init__(
-            [
-                time,
-                *(Column(f"{{field}}_{axis}_m", "number", f"{place}, {axis} [m].") for axis in "xyz"),
-                *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
-            ],
-            lambda state: (state.time_s, *state.position, *state.velocity),
-            lambda time_s, x, y, z, vx, vy, vz: ObjectState(time_s, (x, y, z), (vx, vy, vz)),
+            Column("{field}_time_s", "number", f"Time since the start of the trial {when} [s]."),
+            *(Column(f"{{field}}_{axis}_m", "number", f"{place}, {axis} [m].") for axis in "xyz"),
+            *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
+            split=lambda state, _: (state.time_s, *state.position, *state.velocity),
+            join=lambda values, _: ObjectState(values[0], (*values[1:4],), (*values[4:],)),
         )
 
 
@@ -132,8 +126,8 @@ class SpinColumns(Columns):
 
     def __init__(self, when: str) -> None:
         spin = f"Angular velocity of the {{object}} in world {when}"
-        columns = [Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz"]
-        super().__init__(columns, tuple, lambda *parts: parts)
+        columns = (Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz")
+        super().__init__(*columns, split=lambda spin, _: spin, join=lambda values, _: tuple(values))
 
 
 class PeakColumns(Columns):
@@ -142,7 +136,12 @@ class PeakColumns(Columns):
     def __init__(self, of: str) -> None:
         share = Column("{field}_share", "number", f"{of} [-]; 1 is at the limit.")
         joint = Column("{field}_joint", "text", "Joint that had {field}_share.")
-        super().__init__([share, joint], lambda peak: (peak.share, peak.joint), lambda share, joint: Peak(joint, share))
+        super().__init__(
+            share,
+            joint,
+            split=lambda peak, _: (peak.share, peak.joint),
+            join=lambda values, _: Peak(values[1], values[0]),
+        )
 
 
 class JointColumns(Columns):
@@ -152,31 +151,13 @@ class JointColumns(Columns):
     """
 
     def __init__(self, description: str) -> None:
-        super().__init__([Column("{joint}_{field}", "number", description)])
-
-    def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
-        """List the columns; see `Columns`."""
-        (each,) = super().declare(name, joints)
-        return [
-            Column(each.name.replace("{joint}", joint), each.kind, each.description.replace("{joint}", joint))
-            for joint in joints
-        ]
-
-    def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
-        """Return the numbers in the order of the joints; see `Columns`."""
-        return [value[joint] for joint in joints]
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Return the numbers by joint; see `Columns`."""
-        return dict(zip(joints, values, strict=True))
+        super().__init__(
+            Column("{joint}_{field}", "number", description),
+            split=lambda value, joints: [value[joint] for joint in joints],
+            join=lambda values, joints: dict(zip(joints, values, strict=True)),
+        )
 
 
 def measured(columns: Columns) -> Any:
     """Make a field of a result that is stored in these columns, and is None where there is nothing to measure."""
-    return field(default=None, metadata={_DECLARED: columns})
-
-
-def columns_of(declared: Field[Any]) -> Columns | None:
-    """Return the columns of a field of a result; None if it was not made by `measured`."""
-    columns: Columns | None = declared.metadata.get(_DECLARED)
-    return columns
+    return field(default=None, metadata={COLUMNS: columns})

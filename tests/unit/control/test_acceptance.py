@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,8 +31,6 @@ from .bench import (
     seconds,
     to,
 )
-from .test_answers import ANSWERS
-from .test_courses import COURSES
 
 
 def test_texts_of_broken_tolerances_name_joint_error_and_tolerance() -> None:
@@ -277,51 +274,3 @@ def test_a_reset_restores_the_initial_speed() -> None:
     bench.controller.scale_speed(0.25)
     bench.controller.reset(bench.now_ns, bench.plant.measure())
     assert bench.controller.state().speed_scaling_factor == 1.0
-
-
-HERE, TRAJECTORIES = "tests/unit/control/test_acceptance.py", "tests/integration/test_trajectories.py"
-
-
-CONTROLLERS = "tests/integration/test_controllers.py"
-
-
-ELSEWHERE = {
-    "C13": (HERE, "test_parameters_changed_during_a_goal_apply_to_the_next_goal"),
-    "D1": (HERE, "test_a_new_goal_preempts_the_old_one_and_starts_from_the_measured_state"),
-    "D2": (HERE, "test_the_result_of_a_goal_is_kept_when_the_next_goal_begins"),
-    "D5": (TRAJECTORIES, "test_goals_that_are_over_or_unknown_are_not_cancelled"),
-    "D6": (HERE, "test_joints_brake_each_from_its_own_speed_after_a_cancel"),
-    "D9": (HERE, "test_a_trajectory_from_the_topic_is_followed_without_a_goal"),
-    "D12": (HERE, "test_a_command_timeout_stops_a_trajectory_from_the_topic"),
-    "D13": (HERE, "test_a_command_timeout_that_is_not_above_the_goal_time_gives_a_warning"),
-    "E1": (TRAJECTORIES, "test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on"),
-    "E2": (HERE, "test_the_controller_state_has_the_fields_of_the_state_interfaces"),
-    "E3": (HERE, "test_the_controller_state_has_reference_feedback_output_and_times"),
-    "F1": (TRAJECTORIES, "test_feedback_is_sent_only_when_time_goes_on"),
-    "F2": (CONTROLLERS, "test_steps_advance_a_trajectory_by_as_many_periods"),
-    "F3": (TRAJECTORIES, "test_a_reset_right_after_a_goal_aborts_it"),
-    "F5": (CONTROLLERS, "test_after_a_reset_the_start_posture_is_held"),
-    "F6": ("tests/unit/sim/test_limb_controller.py", "test_a_result_comes_at_the_same_time_in_stretches_and_in_steps"),
-    "G1": ("tests/integration/test_graph.py", "test_a_controller_has_the_topics_services_and_action_of_the_real_one"),
-    "G2": ("tests/integration/test_play_motion.py", "test_motions_of_the_real_robot_are_played"),
-    "G4": ("tests/integration/test_play_motion.py", "test_joint_states_have_velocity_and_effort_of_every_joint"),
-    "G5": (CONTROLLERS, "test_controllers_are_listed_as_the_controller_manager_does"),
-    "G6": (
-        "tests/integration/test_play_motion.py",
-        "test_the_head_nods_with_its_first_joint_and_turns_with_its_second",
-    ),
-}
-
-
-CASES = (
-    "A1 A2 A3 A4 A5 A6 A7 A8 A9 A10 A11 A13 A14 B1 B2 B3 B5 B7 B8 B9 B11 B12 B14 B16 B17 C1 C2 C3 C5 C6 C8 C9 "
-    "C10 C11 C13 C14 D1 D2 D3 D4 D5 D6 D7 D9 D11 D12 D13 E1 E2 E3 E8 E9 F1 F2 F3 F5 F6 G1 G2 G4 G5 G6"
-)
-
-
-@pytest.mark.parametrize("case", CASES.split())
-def test_every_acceptance_case_has_a_test(case: str) -> None:
-    if case in {each.id.split()[0] for each in (*ANSWERS, *COURSES)}:
-        return
-    path, name = ELSEWHERE[case]
-    assert f"def {name}(" in (Path(__file__).parents[3] / path).read_text(encoding="utf-8")

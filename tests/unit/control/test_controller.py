@@ -165,13 +165,16 @@ def test_a_goal_needs_decisions_only_in_its_first_update_and_at_its_end() -> Non
     bench.plant.position = bench.controller.command
     bench.step()
     assert [result.status for _, result in bench.results] == [4]
+    # The next update begins to hold the end.
+    assert bench.controller.next_decision() == 0
+    bench.step()
     assert bench.controller.next_decision() == sys.maxsize
 
 
 def test_a_goal_with_path_tolerances_needs_a_decision_in_every_update() -> None:
     bench = Bench(constrain(trajectory=0.5))
     bench.send(goal(to(1.0, 2.1)))
-    for _ in range(100):
+    for _ in range(101):
         assert bench.controller.next_decision() == 0
         bench.step()
     assert bench.controller.next_decision() == sys.maxsize

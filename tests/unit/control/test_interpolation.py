@@ -67,16 +67,6 @@ def test_a_segment_has_positions_velocities_and_accelerations_of_both_ends(traje
 
 @settings(max_examples=50, deadline=None)
 @given(trajectory=trajectories())
-def test_a_curve_does_not_depend_on_the_order_of_joints_in_the_trajectory(trajectory: Trajectory) -> None:
-    fields = trajectory.positions, trajectory.velocities, trajectory.accelerations
-    mirrored = Trajectory(("b", "a"), trajectory.times_ns, *([row[::-1] for row in rows] for rows in fields))
-    times_ns = np.linspace(0, trajectory.times_ns[-1] * 1.1, 50).astype(np.int64)
-    one, other = curve_of(trajectory), curve_of(mirrored)
-    assert np.array_equal(one.positions(times_ns), other.positions(times_ns))
-
-
-@settings(max_examples=50, deadline=None)
-@given(trajectory=trajectories())
 def test_a_curve_gives_the_same_positions_for_many_times_and_for_single_times(trajectory: Trajectory) -> None:
     curve = curve_of(trajectory)
     times_ns = np.linspace(0, trajectory.times_ns[-1] * 1.1, 50).astype(np.int64)

@@ -7,8 +7,8 @@ import logging
 import numpy as np
 import pytest
 
-from throwcollect.control.parameters import Constraints, JointConstraints
-from throwcollect.control.tolerances import default_tolerances, goal_tolerances, violations
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
+from throwcollect.control.tolerances import Tolerances, violations
 from throwcollect.control.values import JointTolerance, TrajectoryGoal
 
 from .bench import JOINTS, seconds, through
@@ -20,7 +20,7 @@ LOGGER = logging.getLogger("c")
 
 def resolve(path=(), goal=(), late_ns: int = 0) -> tuple[list[float], list[float], int]:
     asked = TrajectoryGoal(through((), ()), path, goal, late_ns)
-    found = goal_tolerances(asked, default_tolerances(CONSTRAINTS, JOINTS), JOINTS, logger=LOGGER)
+    found = Tolerances.of(ControllerParameters(JOINTS, constraints=CONSTRAINTS)).merge(asked, logger=LOGGER)
     return found.path.tolist(), found.goal.tolist(), found.goal_time_ns
 
 
@@ -62,7 +62,8 @@ def test_a_single_illegal_number_or_joint_restores_all_default_tolerances(path, 
 
 
 def test_joints_without_constraints_are_not_checked() -> None:
-    found = default_tolerances(Constraints(joints={"j2": JointConstraints(goal=0.5)}), JOINTS)
+    constraints = Constraints(joints={"j2": JointConstraints(goal=0.5)})
+    found = Tolerances.of(ControllerParameters(JOINTS, constraints=constraints))
     assert (found.path.tolist(), found.goal.tolist()) == ([0, 0, 0], [0, 0.5, 0])
 
 

@@ -17,7 +17,7 @@ EFFORT = (1.0, 1.0, 1.0)
 
 
 def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> str | None:
-    reason = validation.refusal(trajectory, parameters, now_ns)
+    reason = validation.find_refusal(trajectory, parameters, now_ns)
     return None if reason is None else reason.text
 
 

@@ -59,15 +59,3 @@ def test_resuming_with_the_original_file_restores_a_missing_configuration(datase
         writer.recover()
         writer.finish()
     assert verify(dataset) == []
-
-
-def test_a_dataset_with_pointers_of_git_lfs_is_refused_as_it_is(dataset: Path) -> None:
-    for path in (dataset / "plan.parquet", *dataset.glob("*.mcap")):
-        path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0123\nsize 12345\n")
-    before = {path: path.read_bytes() for path in dataset.iterdir() if path.is_file()}
-    for look in (info, verify, throwcollect.load, prepare_to_resume):
-        with pytest.raises(
-            DatasetError, match=r"/dataset/\S+: a Git LFS pointer is in its place\n  try: git lfs pull$"
-        ):
-            look(dataset)
-    assert before == {path: path.read_bytes() for path in dataset.iterdir() if path.is_file()}

@@ -10,7 +10,7 @@ from tests.unit.plan.own_plan import make_plan
 
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
-from throwcollect.errors import ConfigError, DatasetError, PlanError
+from throwcollect.errors import DatasetError, PlanError
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.trials import Trial
 
@@ -59,15 +59,6 @@ def test_the_check_refuses_single_trials_with_its_reason():
     assert 0 < len(refused) < 8
     for trial in plan.trials:
         assert trial.refused == heavy(plan.config_of(trial))
-
-
-def test_a_configuration_error_of_the_check_refuses_the_trial():
-    def check(config: Config) -> str | None:
-        if reason := heavy(config):
-            raise ConfigError(reason)
-        return None
-
-    assert make_plan(make_config(), check=check) == make_plan(make_config(), check=heavy)
 
 
 def test_a_plan_of_refused_trials_is_an_error_that_lists_the_commonest_reasons():

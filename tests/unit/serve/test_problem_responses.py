@@ -22,7 +22,7 @@ from throwcollect.serve.problem_responses import answer
         (NotFoundError("x"), 404),
         (ConflictError("x"), 409),
         (ConfigError("x"), 422),
-        (MissingExtraError("plotly", "report"), 503),
+        (MissingExtraError("plotly"), 503),
         (WorkerError("x"), 503),
         (DatasetError("x"), 409),
         (ThrowcollectError("x"), 500),

@@ -243,8 +243,10 @@ TILED, BENT = np.tile(TIMES, 3), PATHS[..., 0].ravel()
     [
         ({"arm_rihgt_2_joint_rad": BENT}, "arm_rihgt_2_joint_rad: Talos has no joint 'arm_rihgt_2_joint'; did you"),
         ({f"{ELBOW}_radps": BENT * 0}, f"{WRIST}_radps: the column is missing"),
-        ({"time_s": TILED + 1}, "motion 'a': should begin at time_s 0, begins at 1"),
-        ({"motion": np.arange(78)}, "motion '0': should have 2 points or more, has 1"),
+        ({"time_s": TILED + 1}, "motion 'a', point 1: time_s should begin at 0, got 1"),
+        ({"time_s": replaced(TILED, 30, 0.1)}, "motion 'b', point 5: time_s should rise, got 0.1"),
+        ({f"{joint}_radps": BENT * 0 + 0.5 for joint in JOINTS}, f"motion 'a', point 1: {ELBOW}_radps should be 0, as"),
+        ({"motion": np.arange(78)}, "motion '0', point 1: time_s should be that of 2 points or more, got 0"),
     ],
 )
 def test_numbers_that_are_no_motions_are_refused(columns: dict[str, Any], message: str, tmp_path: Path) -> None:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,20 +12,13 @@ from throwcollect.cli.show import init
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import load
 from throwcollect.errors import ConfigError
-from throwcollect.tasks.starter import begin_at_default, make_starter, samplers
-
-PLUGINS = Path(__file__).parents[2] / "plugins"
-ADD = "; docs/robots.md describes how to add one"
+from throwcollect.tasks.starter import begin_at_default, write_starter
 
 
-@pytest.mark.parametrize("sampler", samplers())
-def test_the_starter_of_every_sampler_gives_a_plan(
-    sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_starter_gives_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    init(sampler=sampler)
+    init()
     config = load(DEFAULT_CONFIG)
-    assert config.sweep.sampler == sampler
     assert len(make_plan(config).trials) == config.trials
 
 
@@ -38,64 +28,33 @@ def test_a_starter_names_mujoco_where_bullet_has_no_wheel(
 ) -> None:
     monkeypatch.setattr("throwcollect.tasks.starter.has_wheel", lambda _package: there)
     path = tmp_path / "throws.yaml"
-    path.write_text(make_starter("throw", "sobol", begin_at_default("talos", "throw"))[str(DEFAULT_CONFIG)])
+    path.write_text(write_starter("throw", begin_at_default("talos", "throw")))
     assert load(path).sim.engine == engine
 
 
 def test_init_does_not_overwrite_an_existing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "throws.csv").write_text("mine")
-    with pytest.raises(ConfigError, match=r"throws\.csv: is there already"):
-        init(sampler="list")
+    DEFAULT_CONFIG.write_text("mine")
+    with pytest.raises(ConfigError, match=r"throwcollect\.yaml: is there already"):
+        init()
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
-def init_with_plugins(directory: Path, *options: str) -> str:
-    """Write a starter where packages of the tests are installed, and print the whole configuration that it makes."""
-    paths = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
-    for command in (("init", *options), ("config",)):
-        done = subprocess.run(
-            [sys.executable, "-m", "throwcollect", *command],
-            cwd=directory,
-            env={**os.environ, "PYTHONPATH": paths},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    return done.stdout
-
-
-def test_a_starter_for_a_robot_of_another_package_has_no_joints_of_talos(tmp_path: Path) -> None:
-    printed = init_with_plugins(tmp_path, "--robot", "planar_arm")
-    assert "name: planar_arm" in printed
-    assert "arm_right" not in printed
-    assert "name: planar_arm # `throwcollect robot list` lists others" in (tmp_path / DEFAULT_CONFIG).read_text(
-        encoding="utf-8"
-    )
-
-
-def test_a_starter_explains_the_keys_of_its_task(tmp_path: Path) -> None:
-    text = make_starter("throw", "sobol", begin_at_default("talos", "throw"))[str(DEFAULT_CONFIG)]
+def test_a_starter_explains_the_keys_of_its_task() -> None:
+    text = write_starter("throw", begin_at_default("talos", "throw"))
     meaning = "The ball counts as released when it has been out of the spoon for this long"
     assert f"  recatch_gap_s: 0.02 # {meaning}\n" in text
-    assert "  tolerance_rad: 0.01\n" in init_with_plugins(tmp_path, "--task", "reach")
-    lines = (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8").splitlines()
-    assert "  tolerance_rad: 0.01 # How far a joint may be from its end in the last sample" in lines
-    assert not [line for line in lines if "recatch_gap_s" in line]
 
 
 @pytest.mark.parametrize(
-    ("names", "said"),
+    ("robot", "task", "said"),
     [
-        (("my.urdf", "throw", "sobol"), "my.urdf: no such robot is installed; known: talos, .*\n.*docs/robots.md"),
-        (("talos", "juggle", "sobol"), f"--task juggle: no such task is installed; known: .*throw.*{ADD}"),
+        ("my.urdf", "throw", "my.urdf: no such robot is installed; known: talos, .*\n.*docs/robots.md"),
+        ("talos", "juggle", "--task juggle: no such task is installed; known: .*throw.*; docs/robots.md describes"),
     ],
 )
-def test_an_unknown_robot_task_or_sampler_is_an_error_with_the_known_ones(
-    names: tuple[str, str, str], said: str
-) -> None:
-    robot, task, sampler = names
+def test_an_unknown_robot_or_task_is_an_error_with_the_known_ones(robot: str, task: str, said: str) -> None:
     # Other tests of the same process may have made further packages known.
     with pytest.raises(ConfigError) as caught:
-        init(robot=robot, task=task, sampler=sampler)
+        init(robot=robot, task=task)
     assert re.match(said, str(caught.value))

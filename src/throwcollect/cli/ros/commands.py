@@ -21,7 +21,7 @@ from throwcollect.cli.ros.graph_session import (
 )
 from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.files import write_secret
+from throwcollect.files import write_file
 from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, is_hidden
 from throwcollect.wording import command
 
@@ -61,7 +61,7 @@ def env(run: ShellRunOption = None) -> None:
     variables = {**connection.environment(), RMW_VARIABLE: middleware.rmw}
     if middleware.is_fast_dds:
         profile = found.key.directory.parent / _PROFILE
-        write_secret(profile, client_profile(connection.endpoint).encode())
+        write_file(profile, client_profile(connection.endpoint).encode(), mode=0o600)
         variables |= {PROFILE_VARIABLE: str(profile), **PLAIN_DISCOVERY}
     typer.echo("export " + " ".join(f"{name}={shlex.quote(value)}" for name, value in variables.items()))
 

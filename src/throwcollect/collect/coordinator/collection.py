@@ -25,7 +25,7 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.plan.conditions import Settings, explain_difference
-from throwcollect.plan.plan import Check, refusal
+from throwcollect.plan.plan import Check
 from throwcollect.tasks.result import LOST, Result
 from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.wording import command, format_count
@@ -262,7 +262,7 @@ class TrialCollection:
         trials = self.writer.plan.trials
         if number not in trials.refused:
             self._check = self._check or feasibility_check(self._config)
-            if (reason := refusal(self.writer.plan.config_of(trials[number]), self._check)) is None:
+            if (reason := self._check(self.writer.plan.config_of(trials[number]))) is None:
                 self._leases.add([number])
                 self.on_change()
                 return True

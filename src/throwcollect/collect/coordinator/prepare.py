@@ -19,7 +19,7 @@ from throwcollect.dataset.creation import create, refuse_many_files, refuse_take
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.plan.plan import Check, Plan, check_some_left, make_trials, refusal
+from throwcollect.plan.plan import Check, Plan, check_some_left, make_trials
 from throwcollect.plan.point_file import read_points
 from throwcollect.plan.samplers import draw_points
 from throwcollect.plan.trials import Points
@@ -109,10 +109,7 @@ def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:
             with suppress(ConfigError):
                 planned[number] = _plan_motion(trial)
         sure = dict(zip(planned, feasibility.find_feasible([*planned.values()]), strict=True))
-        return [
-            None if sure.get(number) else refusal(trial, partial(_check, feasibility))
-            for number, trial in enumerate(trials)
-        ]
+        return [None if sure.get(number) else _check(feasibility, trial) for number, trial in enumerate(trials)]
 
     return find_reasons
 
@@ -126,7 +123,10 @@ def feasibility_check(config: Config) -> Check:
 
 
 def _check(feasibility: Feasibility, trial: Config) -> str | None:
-    return feasibility.check(*_plan_motion(trial))
+    try:
+        return feasibility.check(*_plan_motion(trial))
+    except ConfigError as error:
+        return str(error)
 
 
 def _plan_motion(trial: Config) -> tuple[Config, JointTrajectory]:

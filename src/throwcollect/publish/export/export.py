@@ -59,7 +59,7 @@ def export(
     if to not in formats:
         raise refuse_argument("to", f"unknown format {to!r}{suggest(to, formats)}")
     chosen: Exporter = load_member("exporters", to)
-    require(*chosen.packages, extra="export")
+    require(*chosen.packages)
     directory, output = Path(directory), Path(output)
     way = next(iter(chosen.images)) if images is None else images
     if way not in chosen.images:

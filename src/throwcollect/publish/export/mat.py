@@ -25,7 +25,7 @@ from throwcollect.publish.export.throw_source import ExportSource, ThrowSeries, 
 from throwcollect.robots.trajectory import JointTrajectory, sample_quintic
 from throwcollect.tasks.dmp import FIT_POINTS, fit_motions, kernels, roll_out
 
-scipy_io = lazily("scipy.io", extra="export")
+scipy_io = lazily("scipy.io")
 
 BASIS_FUNCTIONS = 25
 """Number of basis functions of each joint in a fitted DMP."""

@@ -31,7 +31,7 @@ from throwcollect.robots.trajectory import JointTrajectory, sample_positions, sa
 from throwcollect.tasks.task import commanded_trajectory
 from throwcollect.units import NS_PER_S, ascii_unit, name_sliding, unit_of_name
 
-interpolate = lazily("scipy.interpolate", extra="export")
+interpolate = lazily("scipy.interpolate")
 
 
 NO_IMAGES = "none"

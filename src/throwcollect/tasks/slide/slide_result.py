@@ -25,10 +25,9 @@ class SlideOutcome(Outcome):
     """The puck came to rest, but a joint left its position or velocity limits or saturated its effort."""
     TIMEOUT = "timeout"
     """The puck or the arm did not come to rest in time."""
+    # These end trials of every task.
     TRACKING_FAILED = "tracking_failed"
-    """A controller did not carry out its trajectory, or the simulation diverged."""
     LOST = "lost"
-    """No simulation returned an episode."""
 
 
 @dataclass(frozen=True)

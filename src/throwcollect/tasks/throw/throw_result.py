@@ -27,10 +27,9 @@ class ThrowOutcome(Outcome):
     """The ball landed, but a joint left its position or velocity limits or saturated its effort."""
     TIMEOUT = "timeout"
     """The ball was released, but did not cross the landing plane in time."""
+    # These end trials of every task.
     TRACKING_FAILED = "tracking_failed"
-    """A controller did not carry out its trajectory, or the simulation diverged."""
     LOST = "lost"
-    """No simulation returned an episode."""
 
 
 @dataclass(frozen=True)

@@ -26,22 +26,18 @@ class IntoOutcome(Outcome):
     """The ball came down to the height of the rim on this side of the middle of the bin."""
     BEYOND = "beyond"
     """The ball came down to the height of the rim beyond the middle of the bin, or to one side of it."""
+    # These are as in `ThrowOutcome`.
     NOT_RELEASED = "not_released"
-    """The ball never left the tool for good."""
     DROPPED = "dropped"
-    """The ball left the tool by its own weight: the tool did not throw it, or had lost it before the start."""
     RECAUGHT = "recaught"
-    """The tool touched the ball again after its release."""
     SELF_HIT = "self_hit"
-    """The ball touched a link of the robot after its release."""
     LIMIT_VIOLATED = "limit_violated"
     """The ball stayed in the bin, but a joint left its position or velocity limits or saturated its effort."""
     TIMEOUT = "timeout"
     """The ball was released, but neither missed the bin nor came to rest in it in time."""
+    # These end trials of every task.
     TRACKING_FAILED = "tracking_failed"
-    """A controller did not carry out its trajectory, or the simulation diverged."""
     LOST = "lost"
-    """No simulation returned an episode."""
 
 
 @dataclass(frozen=True)

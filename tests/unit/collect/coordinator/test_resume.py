@@ -83,15 +83,6 @@ def test_resume_with_more_trials_continues_the_plan(directory: Path, tmp_path_fa
     assert contents(directory) == contents(fresh)
 
 
-def test_resume_with_more_trials_of_latin_hypercube_is_refused(tmp_path: Path) -> None:
-    sweep = {**SETTINGS["sweep"], "sampler": "latin_hypercube"}
-    prepare(config_with(sweep=sweep), tmp_path / "data", sweep_directory=tmp_path)
-    before = contents(tmp_path / "data")
-    with pytest.raises(ConfigError, match="the sampler latin_hypercube begins with other trials"):
-        resume(config_with(sweep=sweep, trials=5), tmp_path / "data", sweep_directory=tmp_path)
-    assert contents(tmp_path / "data") == before
-
-
 @pytest.mark.parametrize("length", [None, 0, 100])
 def test_a_missing_or_damaged_plan_is_made_again(
     directory: Path, prepared: dict[str, bytes], length: int | None
