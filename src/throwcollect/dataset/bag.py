@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer, ComposerError
@@ -130,29 +130,17 @@ def _parse(text: str) -> Any:
     return yaml.load(text)
 
 
-class NextCommand(NamedTuple):
-    """The state of an unfinished dataset, such as ``is not finished``; a command to go on with, and what it does."""
-
-    state: str
-    command: str
-    purpose: str
-
-
-def find_next_command(directory: Path) -> NextCommand:
-    """Find the state of an unfinished dataset; on file systems without locks, a run that works on it goes unnoticed."""
-    if is_locked(directory):
-        return NextCommand("is being collected", command("wait", "--run", directory), "waits for its end")
-    return NextCommand("is not finished", command("resume", directory), "goes on with it")
-
-
 def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     """Read the fields of the rosbag2 metadata of a finished dataset."""
     refuse_other_directory(directory)
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            found = find_next_command(directory)
-            raise DatasetError(f"the dataset {found.state}: it has no {METADATA}", path=directory, hint=found.command)
+            # On file systems without locks, a run that works on it goes unnoticed.
+            busy = is_locked(directory)
+            state = "is being collected" if busy else "is not finished"
+            hint = command("wait", "--run", directory) if busy else command("resume", directory)
+            raise DatasetError(f"the dataset {state}: it has no {METADATA}", path=directory, hint=hint)
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
     bag = from_yaml(path).get(BAG_SECTION)
     if not isinstance(bag, dict):

@@ -8,9 +8,12 @@ if it had never stopped.
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.directory import (
@@ -30,6 +33,7 @@ from throwcollect.dataset.mcap_reader import open_mcap, scan_file
 from throwcollect.dataset.shard import FinishedShard, OpenShard, rewrite
 from throwcollect.dataset.throws_table import Row, judge_episode, place_columns
 from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import count_indexed
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import remove, unwritable
@@ -43,14 +47,12 @@ _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that look through files side by side saves time."""
 
 
-@dataclass(frozen=True)
-class RecoveredEpisode:
+class RecoveredEpisode(NamedTuple):
     """A whole episode on disk, so that its trial need not run again.
 
     It lies at `place` now, in columns of the table. `run` has its records without their bytes.
     """
 
-    trial: int
     result: Result
     place: Row
     run: RecordGroup
@@ -130,31 +132,42 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> None:
 
 
 def find_episodes(
-    path: Path, plan: Plan, channels: Channels | None = None, *, judge: Judge = judge_episode
+    path: Path, plan: Plan, channels: Channels, *, judge: Judge = judge_episode
 ) -> dict[int, RecoveredEpisode]:
     """Find the whole episodes of a file, by trial.
 
     Args:
         path: The file; if it is missing, it has none.
         plan: The trials; episodes of others, and of refused ones, are left out.
-        channels: What is recorded; None if the file is only read, and then channels are not compared.
+        channels: What is recorded.
         judge: Finds the result of an episode of a trial with this configuration.
     """
     episodes: dict[int, RecoveredEpisode] = {}
     trials_to_run = frozenset(plan.trials.numbers_to_run)
     for episode, run in scan_file(path):
         trial = episode.header.trial
-        if trial not in trials_to_run or trial in episodes:
-            continue
-        try:
-            result = judge(plan.config_of(plan.trial(trial)), episode)
-        except DatasetError:
-            continue
-        recorded = channels is None or channels.numbers == tuple(episode.table.columns)
-        if recorded and episode.header.start_ns == plan.config.trial_start_ns(trial):
-            place = place_columns(path.name, run.offset, episode)
-            episodes[trial] = RecoveredEpisode(trial, result, place, run)
+        if trial in trials_to_run and trial not in episodes:
+            with suppress(DatasetError):
+                result = judge_stored(plan.config_of(plan.trial(trial)), episode, channels, judge)
+                episodes[trial] = RecoveredEpisode(result, place_columns(path.name, run.offset, episode), run)
     return episodes
+
+
+def judge_stored(config: Config, episode: Episode, channels: Channels, judge: Judge = judge_episode) -> Result:
+    """Find the result of a trial from its episode in a file; refuse one that is not recorded by its configuration."""
+    if (found := tuple(episode.table.columns)) != channels.numbers:
+        raise DatasetError(f"has the channels {list(found)} instead of {list(channels.numbers)}")
+    frames, wanted = Counter[int](), Counter[int]()
+    for chunk in episode.sensors:
+        frames.update({number: count_indexed(index) for number, index in chunk.indexes.items()})
+    for name, topics in channels.sensors.items():
+        stride = config.record.rate_hz // config.sensors[name].rate_hz
+        wanted.update(dict.fromkeys(topics, len(range(0, episode.header.samples, stride))))
+    if frames != wanted:
+        raise DatasetError(f"has {dict(frames)} frames on channels of sensors instead of {dict(wanted)}")
+    if (start_ns := config.trial_start_ns(episode.header.trial)) != episode.header.start_ns:
+        raise DatasetError(f"starts at {episode.header.start_ns} ns, the trial's slot of time at {start_ns} ns")
+    return judge(config, episode)
 
 
 def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, RecoveredEpisode]) -> FinishedShard | None:

@@ -5,11 +5,11 @@ What follows from a file that cannot be read is not checked; the manifest still 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,7 +18,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.scene import FileBodyConfig
 from throwcollect.config.schema import BODIES, MOTIONS, Config
-from throwcollect.dataset.bag import read_bag_metadata, refuse_other_directory
+from throwcollect.dataset.bag import FileSummary, read_bag_metadata, refuse_other_directory
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -32,11 +32,13 @@ from throwcollect.dataset.directory import (
     shard_of,
 )
 from throwcollect.dataset.manifest import FileEntry, Finding, find_changed_files, list_promised_names, read_manifest
-from throwcollect.dataset.misses import read_targets
+from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.provenance import find_changes
-from throwcollect.dataset.summary_files import combine_digests, metadata_text
+from throwcollect.dataset.shard import Recording
+from throwcollect.dataset.summary_files import compute_digest, metadata_text
 from throwcollect.dataset.throws_table import ThrowsTable, read_throws
-from throwcollect.dataset.verify_recording import RecordingReport, check_recording
+from throwcollect.dataset.verify_recording import RecordingCheck
+from throwcollect.episode.channels import Channels
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import read_text
 from throwcollect.plan.digest import trial_digests
@@ -47,12 +49,14 @@ from throwcollect.progress_log import log_progress
 from throwcollect.robots.body_files import files_of
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.robots.description import robot_of
-from throwcollect.side_by_side import working_side_by_side
+from throwcollect.side_by_side import work_side_by_side
 from throwcollect.tasks.motions import motions_of
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
 _MOST_BYTES = 100_000_000
+_Checked = tuple[list[Finding], Recording | None]
+"""What `RecordingCheck` has found."""
 
 
 def verify(directory: Path, *, processes: int = 1) -> list[Finding]:
@@ -82,13 +86,14 @@ def verify(directory: Path, *, processes: int = 1) -> list[Finding]:
         findings.append(Finding.of(METADATA, error))
         readable = False
     tables = _read_tables(directory)
-    with _checking_recordings(directory, tables, processes) as checked:
-        reports = list(checked)
-    findings += find_damage(directory, in_full=True, hashed=[report.entry for report in reports if report.entry])
+    checks = [] if tables.throws is None else _check_recordings(directory, tables.plan, tables.throws, processes)
+    recordings = [recording for _, recording in checks if recording is not None]
+    findings += find_damage(directory, in_full=True, hashed=[entry for _, entry in recordings])
     findings += tables.findings
-    findings += [finding for report in reports for finding in report.findings]
-    if readable and tables.throws is not None:
-        findings += _find_metadata_problems(directory, tables.throws, reports)
+    findings += [finding for found, _ in checks for finding in found]
+    # Other findings report the recordings that are damaged; without them, the totals over all files are not known.
+    if readable and recordings and not any(found for found, _ in checks):
+        findings += _find_metadata_problems(directory, tables, [summary for summary, _ in recordings])
     return findings
 
 
@@ -119,10 +124,9 @@ def find_damage(directory: Path, *, in_full: bool, hashed: Collection[FileEntry]
 
 @dataclass
 class _Tables:
-    """The contents of the files next to the recordings, as far as they can be read, and what is wrong with them."""
+    """The plan and the table of throws, as far as they can be read, and what is wrong with them."""
 
-    config: Config | None = None
-    plan: Plan | None = None
+    plan: Any = None
     throws: pa.Table | None = None
     findings: list[Finding] = field(default_factory=list)
 
@@ -131,7 +135,7 @@ def _read_tables(directory: Path) -> _Tables:
     tables = _Tables()
     file = CONFIG
     try:
-        tables.config = config = load(config_path(directory))
+        config = load(config_path(directory))
         file = PLAN
         tables.plan = plan = Plan.read(directory / PLAN, config)
         if isinstance(family := config.task.trajectory, MotionFile):
@@ -167,49 +171,37 @@ def _read_tables(directory: Path) -> _Tables:
     return tables
 
 
-@contextmanager
-def _checking_recordings(directory: Path, tables: _Tables, processes: int) -> Iterator[Iterator[RecordingReport]]:
-    """Start to check the recordings that the plan places trials in, in order; none without plan and table."""
-    if tables.plan is None or tables.throws is None:
-        yield iter(())
-        return
-    plan, pieces, start = tables.plan, list[tuple[str, int, int]](), 0
-    for name, trials in groupby(tables.throws["trial"].to_pylist(), key=lambda trial: shard_of(plan, trial)):
+def _check_recordings(directory: Path, plan: Plan, throws: pa.Table, processes: int) -> list[_Checked]:
+    """Check the recordings that the plan places trials in, in order."""
+    pieces, start = list[tuple[str, int, int]](), 0
+    for name, trials in groupby(throws["trial"].to_pylist(), key=lambda trial: shard_of(plan, trial)):
         pieces.append((name, start, count := sum(1 for _ in trials)))
         start += count
-    with working_side_by_side(
-        pieces,
-        _make_check,
-        (directory, plan, tables.throws),
-        processes=processes if start >= _MANY_EPISODES else 1,
-        doing="checks recordings",
-        fork=True,
-    ) as reports:
-        yield log_progress(reports, len(pieces), "recording", "checked")
+    processes = processes if start >= _MANY_EPISODES else 1
+    checks = work_side_by_side(
+        pieces, _make_check, (directory, plan, throws), processes=processes, doing="checks recordings", fork=True
+    )
+    return list(log_progress(checks, len(pieces), "recording", "checked"))
 
 
-def _make_check(directory: Path, plan: Plan, throws: pa.Table) -> Callable[[tuple[str, int, int]], RecordingReport]:
+def _make_check(directory: Path, plan: Plan, throws: pa.Table) -> Callable[[tuple[str, int, int]], _Checked]:
     """Make the function that checks a recording, given its name, and the first and the number of its rows."""
     robot = robot_is_available(plan.config)
 
-    def check_file(piece: tuple[str, int, int]) -> RecordingReport:
+    def check(piece: tuple[str, int, int]) -> _Checked:
         name, first, count = piece
         rows = throws.slice(first, count).to_pylist()
-        return check_recording(directory / name, plan, {row["trial"]: row for row in rows}, robot=robot)
+        found = RecordingCheck(directory / name, plan, {row["trial"]: row for row in rows}, robot=robot)
+        return found.findings, found.recording
 
-    return check_file
+    return check
 
 
-def _find_metadata_problems(directory: Path, throws: pa.Table, reports: list[RecordingReport]) -> Iterator[Finding]:
+def _find_metadata_problems(directory: Path, tables: _Tables, files: Sequence[FileSummary]) -> Iterator[Finding]:
     """Compare the bag's metadata with those that follow from the recordings."""
-    files = [report for report in reports if report.has_file]
-    summaries = [report.summary for report in files if report.summary is not None]
-    channels = next((report.channels for report in files), None)
-    # Other findings report the files that cannot be read; without them, the totals over all files are not known.
-    if channels is None or len(summaries) < len(files):
-        return
-    digests = (report.digests[trial] for report in reports for trial in sorted(report.digests))
-    expected = metadata_text(summaries, channels, combine_digests(digests, read_targets(throws)))
+    with open_mcap(directory / files[0].path) as contents:
+        channels = Channels(tables.plan.config, contents.read_robot_description())
+    expected = metadata_text(files, channels, compute_digest(tables.throws))
     there = read_text(directory / METADATA, most_bytes=_MOST_BYTES)
     if there != expected:
         lines = zip(there.splitlines(), expected.splitlines(), strict=False)

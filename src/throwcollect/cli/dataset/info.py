@@ -1,4 +1,4 @@
-"""`throwcollect dataset info`, `verify`, `digest` and `replay`, and the summary with which a collection ends."""
+"""`throwcollect dataset info`, `verify` and `replay`, and the summary with which a collection ends."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
-from throwcollect.cli.printing import align, print_progress, show
+from throwcollect.cli.printing import align, show
 from throwcollect.cli.streams import ensure_written
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError, install_command, require, require_engine
@@ -33,14 +33,6 @@ def info(directory: DatasetArgument, *, json: JsonOption = False) -> None:
     show(found, describe(found), json=json)
     # The summary needs only the tables, so it is printed even if recordings are missing.
     check_recordings_are_there(dataset)
-
-
-def digest(directory: DatasetArgument) -> None:
-    """Print the digest of all episodes in trial order."""
-    from throwcollect.dataset.inspect import digest as compute_digest
-
-    print_progress()
-    typer.echo(compute_digest(directory))
 
 
 def verify(
