@@ -16,10 +16,6 @@ from throwcollect.dataset.summary import Info
 from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.errors import DatasetError
 from throwcollect.plan.arrow_column import nan_where_null
-from throwcollect.wording import command, join_names
-
-_MOST_NAMED = 5
-"""Most missing files that a message names."""
 
 
 def info(directory: Path) -> Info:
@@ -72,15 +68,3 @@ def _find_landing_area(throws: pa.Table, task: TaskConfig) -> Mapping[str, tuple
             return None
         found[axis] = float(np.nanmin(ends)), float(np.nanmax(ends))
     return found
-
-
-def check_recordings_are_there(dataset: Dataset) -> None:
-    """Refuse a finished dataset of which recordings are missing; `verify` checks the others."""
-    missing = [name for name in dataset.shards if not (dataset.directory / name).exists()]
-    if missing:
-        raise DatasetError(
-            f"{join_names(missing[:_MOST_NAMED])}{' and more' if len(missing) > _MOST_NAMED else ''} "
-            f"{'is' if len(missing) == 1 else 'are'} missing",
-            path=dataset.directory,
-            hint=f"{command('resume', dataset.directory)} collects the trials of missing recordings again",
-        )

@@ -7,12 +7,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from throwcollect.config.values import column_of
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.manifest import Finding
 from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import McapContents, WholeEpisode, open_mcap, scan
-from throwcollect.dataset.recovery import judge_stored
+from throwcollect.dataset.recovery import check_recorded
 from throwcollect.dataset.shard import Recording, rewrite
 from throwcollect.dataset.throws_table import Row, ThrowsTable, judge_episode, place_columns
 from throwcollect.episode.channels import Channels
@@ -97,20 +96,21 @@ class RecordingCheck:
     def _find_problems(self, stored: WholeEpisode, row: Row, channels: Channels) -> Iterator[str]:
         """Find what is wrong with an episode, given the row of its trial, a sentence each."""
         episode, trial = stored.episode, self._plan.trial(row["trial"])
-        expected = {"trial": trial.number, **{column_of(key): value for key, value in trial.values.items()}}
-        expected |= trial.target
         place = place_columns(self._name, stored.run.offset, episode)
         try:
             if infinite := list(find_infinite_columns(episode.samples())):
                 yield from infinite
                 return
-            result = judge_stored(
-                self._plan.config_of(trial), episode, channels, judge_episode if self._robot else lambda *_: None
-            )
+            config = self._plan.config_of(trial)
+            check_recorded(config, episode, channels)
+            if self._robot:
+                expected = self._table.row(trial, judge_episode(config, episode), place)
+            else:
+                expected = self._table.start_row(trial) | place
         except (ConfigError, DatasetError) as error:
             yield str(error)
             return
-        yield from _compare_rows(row, self._table.row(trial, result, place) if self._robot else expected | place)
+        yield from _compare_rows(row, expected)
         if (distance_m := row.get("ballistic_residual_m")) is not None and distance_m > BALLISTIC_TOLERANCE_M:
             yield f"its flight departs from ballistic motion by {distance_m:.3g} m, where no contact is"
 

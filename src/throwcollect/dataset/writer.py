@@ -23,10 +23,10 @@ from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLA
 from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import Judge, LeftOfShard, find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import LeftOfShard, find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.summary_files import write_description
-from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, judge_episode, place_columns
+from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
@@ -97,14 +97,13 @@ class DatasetWriter:
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, keep: Keep = lambda *_: True, *, judge: Judge = judge_episode, processes: int = 1) -> int:
+    def recover(self, keep: Keep = lambda *_: True, *, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
         A finished dataset then counts as unfinished, even if all its trials have ended; `finish` writes the same files.
 
         Args:
             keep: Called for each trial that has an episode, in order of trials; what it does not keep is removed.
-            judge: Finds the result of an episode.
             processes: How many processes may look through the recordings of a large dataset, as for `find_left`.
 
         Returns:
@@ -123,7 +122,7 @@ class DatasetWriter:
             (path, Plan(self._config, self.plan.trials[members.start - first : members.stop - first]))
             for path, members in zip(begun.values(), map(self._list_members, begun), strict=True)
         ]
-        all_left = find_left(parts, self._channels, judge=judge, processes=processes)
+        all_left = find_left(parts, self._channels, processes=processes)
         for number, found in zip(begun, all_left, strict=True):
             kept = {trial: each for trial, each in sorted(found.episodes.items()) if keep(trial, each.result)}
             left = found if len(kept) == len(found.episodes) else LeftOfShard(found.path, kept, None)

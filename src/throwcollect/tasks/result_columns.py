@@ -69,16 +69,14 @@ class Columns:
     Args:
         columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field.
         split: Splits a value of the field, which is not None, into one value for each column.
-        join: Makes a value of the field from the columns' values, none of which is null.
     """
 
     def __init__(
         self,
         columns: Sequence[Column],
         split: Callable[[Any], Sequence[object]] = lambda value: (value,),
-        join: Callable[..., Any] = lambda value: value,
     ) -> None:
-        self._columns, self._split, self._join = columns, split, join
+        self._columns, self._split = columns, split
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns of the field `name`, for the joints that the task moves."""
@@ -90,10 +88,6 @@ class Columns:
     def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Split a value of the field, which is not None, into one value for each column."""
         return self._split(value)
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Make the field's value from the columns' values, none of which is null."""
-        return self._join(*values)
 
 
 class Number(Columns):
@@ -123,7 +117,6 @@ class BodyColumns(Columns):
                 *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
             ],
             lambda state: (state.time_s, *state.position, *state.velocity),
-            lambda time_s, x, y, z, vx, vy, vz: ObjectState(time_s, (x, y, z), (vx, vy, vz)),
         )
 
 
@@ -133,7 +126,7 @@ class SpinColumns(Columns):
     def __init__(self, when: str) -> None:
         spin = f"Angular velocity of the {{object}} in world {when}"
         columns = [Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz"]
-        super().__init__(columns, tuple, lambda *parts: parts)
+        super().__init__(columns, tuple)
 
 
 class PeakColumns(Columns):
@@ -142,7 +135,7 @@ class PeakColumns(Columns):
     def __init__(self, of: str) -> None:
         share = Column("{field}_share", "number", f"{of} [-]; 1 is at the limit.")
         joint = Column("{field}_joint", "text", "Joint that had {field}_share.")
-        super().__init__([share, joint], lambda peak: (peak.share, peak.joint), lambda share, joint: Peak(joint, share))
+        super().__init__([share, joint], lambda peak: (peak.share, peak.joint))
 
 
 class JointColumns(Columns):
@@ -165,10 +158,6 @@ class JointColumns(Columns):
     def split(self, value: Any, joints: Sequence[str]) -> Sequence[object]:
         """Return the numbers in the order of the joints; see `Columns`."""
         return [value[joint] for joint in joints]
-
-    def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Return the numbers by joint; see `Columns`."""
-        return dict(zip(joints, values, strict=True))
 
 
 def measured(columns: Columns) -> Any:

@@ -25,14 +25,10 @@ if TYPE_CHECKING:
 
 def info(directory: DatasetArgument, *, json: JsonOption = False) -> None:
     """Print what a dataset holds."""
-    from throwcollect.dataset.inspect import check_recordings_are_there, summary
-    from throwcollect.dataset.reader import Dataset
+    from throwcollect.dataset.inspect import info as summarise
 
-    dataset = Dataset.open(directory)
-    found = summary(dataset)
+    found = summarise(directory)
     show(found, describe(found), json=json)
-    # The summary needs only the tables, so it is printed even if recordings are missing.
-    check_recordings_are_there(dataset)
 
 
 def verify(

@@ -50,13 +50,11 @@ class Derived:
 
     Attributes:
         trials: Number of its trials, each of which has an episode.
-        offered: Number of trials of its sources.
         without_episode: Number of trials that were asked for but have no episode, by outcome; they are left out.
         digest: Its digest.
     """
 
     trials: int
-    offered: int
     without_episode: Mapping[str, int]
     digest: str
 
@@ -69,25 +67,19 @@ class Copy(NamedTuple):
     trial: int
 
 
-def derive(sources: Sequence[Dataset], output: Path, *, offered: int, sensors: SensorSections | None = None) -> Derived:
+def derive(sources: Sequence[Dataset], output: Path, *, sensors: SensorSections | None = None) -> Derived:
     """Make the dataset that consists of copies of the throws of some others, at least one, that have an episode.
 
     Args:
         sources: Those throws of each source that are wanted.
         output: Directory of the new dataset, new or empty; nothing is left there after an error.
-        offered: Number of all trials of the sources.
         sensors: Sections of sensors that see the throws in place of those that were recorded; None for these.
     """
     with new_directory(output) as directory:
         copied, digest = _write(sources, directory, sensors)
-    without = sum((Counter(count_without_episode(source)) for source in sources), Counter[str]())
-    return Derived(copied, offered, dict(sorted(without.items())), digest)
-
-
-def count_without_episode(dataset: Dataset) -> dict[str, int]:
-    """Count the throws that have no episode, by outcome."""
-    throws = dataset.throws
-    return dict(sorted(Counter(throws.filter(throws["shard"].is_null())["outcome"].to_pylist()).items()))
+    left_out = (source.throws.filter(source.throws["shard"].is_null()) for source in sources)
+    without = Counter(outcome for throws in left_out for outcome in throws["outcome"].to_pylist())
+    return Derived(copied, dict(sorted(without.items())), digest)
 
 
 def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections | None) -> tuple[int, str]:
@@ -258,8 +250,7 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
     """
     if not directories:
         raise refuse_argument("directories", "got none", expected="at least one dataset")
-    sources = [Dataset.open(directory) for directory in directories]
-    return derive(sources, Path(output), offered=sum(map(len, sources)))
+    return derive([Dataset.open(directory) for directory in directories], Path(output))
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
@@ -269,13 +260,12 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
         ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    dataset = Dataset.open(directory)
-    return derive([_choose(dataset, where)], Path(output), offered=len(dataset))
+    return derive([_choose(Dataset.open(directory), where)], Path(output))
 
 
 def _choose(dataset: Dataset, where: str) -> Dataset:
     """Choose the throws that fulfil a condition; there has to be one with an episode."""
-    chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where").fill_null(False)))
+    chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where")))
     if not len(chosen.recorded):
         raise refuse_argument("where", f"no trial of {dataset.directory} that has an episode fulfils {where!r}")
     return chosen
@@ -298,7 +288,7 @@ def render_sensors(
     """
     dataset = Dataset.open(directory)
     chosen = dataset if where is None else _choose(dataset, where)
-    return derive([chosen], Path(output), offered=len(dataset), sensors=sensors)
+    return derive([chosen], Path(output), sensors=sensors)
 
 
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
@@ -318,4 +308,4 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
         raise refuse_argument("count", f"should be {bounds}, got {count}")
     places = np.sort(np.random.default_rng(seed).permutation(len(candidates))[:count])
     chosen = replace(candidates, throws=candidates.throws.take(places))
-    return derive([chosen], Path(output), offered=len(dataset))
+    return derive([chosen], Path(output))

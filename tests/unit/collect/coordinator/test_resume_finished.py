@@ -149,16 +149,6 @@ def test_finishing_without_simulating_keeps_whole_episodes_and_gives_up_the_othe
     assert contents(dataset) == contents(sound)
 
 
-def test_finishing_without_simulating_takes_results_from_the_table(
-    trials: Trials, dataset: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (dataset / SHARD).unlink()
-    monkeypatch.setattr(
-        "throwcollect.collect.coordinator.resume.judge_episode", lambda *_: pytest.fail("is judged again")
-    )
-    assert trials.finish(dataset).keys() == {2, 3}
-
-
 def test_finishing_without_simulating_keeps_the_reasons_of_trials_that_were_lost(
     trials: Trials, tmp_path: Path
 ) -> None:

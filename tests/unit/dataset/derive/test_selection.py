@@ -34,7 +34,7 @@ def test_a_filtered_dataset_has_the_trials_that_fulfil_the_condition(collected: 
     found = filter_trials(collected, tmp_path / "some", where="trial % 2 == 1")
     after = Dataset.open(tmp_path / "some")
     assert verify(tmp_path / "some") == []
-    assert (found.trials, found.offered, found.without_episode) == (3, 7, {})
+    assert (found.trials, found.without_episode) == (3, {})
     assert found.digest == info(tmp_path / "some").digest
     assert sources(tmp_path / "some") == [(str(collected), number) for number in (1, 3, 5)]
     odd = before.throws.filter(pa.array([False, True, False, True, False, True, False]))
@@ -99,7 +99,7 @@ def test_merged_datasets_of_different_plans_follow_each_other_with_the_bytes_of_
 ) -> None:
     found = merge([collected, other], tmp_path / "all")
     assert verify(tmp_path / "all") == []
-    assert (found.trials, found.offered, found.digest) == (11, 11, info(tmp_path / "all").digest)
+    assert (found.trials, found.digest) == (11, info(tmp_path / "all").digest)
     assert sources(tmp_path / "all") == [
         *((str(collected), number) for number in range(7)),
         *((str(other), number) for number in range(4)),
