@@ -67,8 +67,7 @@ _WHEELS = {
     "pybullet": (
         ((3, 10), (3, 11)),
         "Python 3.11, such as that of `uv venv --python 3.11`; or `up --runtime docker`; or, instead of the default "
-        "engine bullet, `--set sim.engine=mujoco` (for `dataset replay`: --engine mujoco), whose throws land some "
-        "millimetres elsewhere",
+        "engine bullet, `--set sim.engine=mujoco`, whose throws land some millimetres elsewhere",
     ),
     "mujoco": (((3, 11), (3, 99)), "Python 3.11 or later, or `sim.engine: bullet`"),
 }

@@ -1,19 +1,16 @@
-"""Verifies a finished dataset, and simulates its throws again, by their own engine or by another one."""
+"""Verifies a finished dataset, and simulates its throws again."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
-from throwcollect.config.values import column_of, with_values
 from throwcollect.dataset.manifest import Finding
 from throwcollect.dataset.provenance import find_versions, read_provenance
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throws_table import ThrowsTable, judge_episode
 from throwcollect.dataset.verify import verify
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
@@ -21,18 +18,15 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError, check_bounds
 from throwcollect.extras import MissingExtraError, require, require_engine
 from throwcollect.files import StrPath
-from throwcollect.members import names_of
 from throwcollect.plan.trials import choose_trials
 from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
 from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
-from throwcollect.wording import join_names, suggest
+from throwcollect.wording import join_names
 
 SAMPLE, RENDERED = 10, 2
 """Numbers of throws that are simulated again by default, and of those whose frames are rendered again."""
-
-_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True)
@@ -62,16 +56,9 @@ def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
 
 def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
     """Simulate stored throws of a dataset again, and compare them, in the given order."""
-    return simulate_side_by_side(Dataset.open(directory).config.sim.engine, trials, _begin, (directory,))
-
-
-def simulate_side_by_side(
-    engine: str, trials: Sequence[int], begin: Callable[..., Callable[[int], _Found]], arguments: tuple[object, ...]
-) -> Iterator[_Found]:
-    """Simulate trials by an engine on all cores; `begin` and its arguments are those of `work_side_by_side`."""
-    require_simulating(engine)
+    require_simulating(Dataset.open(directory).config.sim.engine)
     processes = limit_processes(count_cores(), len(trials))
-    simulated = work_side_by_side(trials, begin, arguments, processes=processes, doing="simulates")
+    simulated = work_side_by_side(trials, _begin, (directory,), processes=processes, doing="simulates")
     return log_progress(simulated, len(trials), "throw", "simulated")
 
 
@@ -227,92 +214,3 @@ def _begin_rendering(directory: Path) -> Callable[[int], list[str]]:
         return [names[number] for number in sorted(wrong)]
 
     return render
-
-
-@dataclass(frozen=True)
-class Deviation:
-    """How a throw by another engine differs from the stored one.
-
-    Attributes:
-        stored: Its outcome in the dataset.
-        again: Its outcome by the other engine.
-        values: The other engine's value minus the stored one, in the unit of the column, for each column of the table
-            of throws in which both throws have a number.
-    """
-
-    trial: int
-    stored: str
-    again: str
-    values: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Distribution:
-    """How much a column differs in the throws in which it could be compared, in its unit.
-
-    The mean is that of differences with their signs; median and largest are those of absolute differences.
-    """
-
-    column: str
-    throws: int
-    mean: float
-    rms: float
-    median: float
-    largest: float
-
-
-def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
-    """Simulate stored throws of a dataset with another engine; deviations come in the given order.
-
-    Raises:
-        ConfigError: If there is no such engine, or the throws are by it themselves.
-    """
-    own = Dataset.open(directory).config.sim.engine
-    others = [name for name in names_of("engines") if name != own]
-    if engine == own:
-        problem = f"--engine {engine}: the throws of {directory} are by {own} themselves"
-        raise ConfigError(problem, expected=join_names(others, "or"))
-    if engine not in others:
-        raise ConfigError(f"--engine {engine}: there is no such engine{suggest(engine, others)}")
-    return simulate_side_by_side(engine, trials, _begin_other, (directory, engine))
-
-
-def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:
-    """Sum up how much each column differs, in the order of the table."""
-    found = []
-    for column in dict.fromkeys(column for each in deviations for column in each.values):
-        values = np.array([each.values[column] for each in deviations if column in each.values])
-        sizes = np.abs(values)
-        rms = float(np.sqrt(np.mean(values**2)))
-        found.append(
-            Distribution(column, len(values), float(values.mean()), rms, float(np.median(sizes)), float(sizes.max()))
-        )
-    return found
-
-
-def _begin_other(directory: Path, engine: str) -> Callable[[int], Deviation]:
-    """Open dataset and simulation in a process, which keeps both from one trial to the next."""
-    from throwcollect.sim.simulator import Simulator
-
-    dataset = Dataset.open(directory)
-    plan, own = dataset.plan, dataset.config
-    config = own.model_copy(update={"sim": own.sim.model_copy(update={"engine": engine})})
-    table = ThrowsTable(plan.keys, config, plan.trials.points.target_names)
-    simulator = Simulator(config)
-
-    def simulate(number: int) -> Deviation:
-        """Simulate a trial, and compare its row with the stored one."""
-        trial = plan.trial(number)
-        result = judge_episode(with_values(config, trial.values), simulator.run(trial))
-        stored, again = dataset.select([number])[0].row, table.row(trial, result, None)
-        # Columns of strings, and numbers that only one of the two rows has, cannot be compared.
-        compared = [
-            column
-            for column in again
-            if column not in ("trial", *map(column_of, trial.values), *trial.target)
-            and all(isinstance(row.get(column), int | float) for row in (stored, again))
-        ]
-        values = {column: float(again[column]) - float(stored[column]) for column in compared}
-        return Deviation(number, stored["outcome"], again["outcome"], values)
-
-    return simulate

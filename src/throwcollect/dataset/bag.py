@@ -17,7 +17,7 @@ from ruamel.yaml.error import YAMLError
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.document import explain_yaml_error
-from throwcollect.dataset.directory import METADATA, PLAN, describe_other, has_files
+from throwcollect.dataset.directory import METADATA, PLAN, describe_other, is_begun
 from throwcollect.dataset.lock import is_locked
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
@@ -134,7 +134,7 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
 
 def refuse_other_directory(directory: Path) -> None:
     """Refuse a directory without any file of a dataset, as advice on damaged datasets would not help there."""
-    if not has_files(directory):
+    if not is_begun(directory):
         raise DatasetError(describe_other(directory), path=directory)
     refuse_pointers(directory)
 

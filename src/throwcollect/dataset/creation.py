@@ -9,9 +9,8 @@ from pathlib import Path
 from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.bag import MOST_FILES
 from throwcollect.dataset.carried_robot import write_config
-from throwcollect.dataset.directory import CONFIG, PLAN, ROBOT, TRIALS
+from throwcollect.dataset.directory import CONFIG, PLAN, ROBOT, TRIALS, is_begun
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.plan.plan import Plan

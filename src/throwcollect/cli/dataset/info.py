@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
-from throwcollect.cli.printing import align, show
+from throwcollect.cli.printing import show
 from throwcollect.cli.streams import ensure_written
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError, install_command, require, require_engine
@@ -82,7 +81,6 @@ def replay(
     trials: list[int] | None = None,
     everything: bool = False,
     sample: int | None = None,
-    engine: str | None = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs.
@@ -91,7 +89,6 @@ def replay(
         trials (--trial K): Number of a trial; may be repeated.
         everything (--all): All trials.
         sample (N 1..): With --all: N of them, chosen at random.
-        engine (NAME): Simulate them with another engine: how much differs?
     """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.replay import replay_throws, select_trials
@@ -108,9 +105,6 @@ def replay(
         # A trial without an episode is refused here, before any throw is simulated.
         dataset.episode(trial)
     chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
-    if engine is not None:
-        _compare_engines(directory, engine, chosen, json=json)
-        return
     comparisons = list(replay_throws(directory, chosen))
     wrong = [f"trial {each.trial}: {'; '.join(each.differences)}" for each in comparisons if each.differences]
     throws = format_count(len(comparisons), "throw")
@@ -120,20 +114,6 @@ def replay(
             f"{directory}: {len(wrong)} of {throws} came out differently",
             hint="its README.md has the processor and the versions with which it was made",
         )
-
-
-def _compare_engines(directory: Path, engine: str, trials: Sequence[int], *, json: bool) -> None:
-    """Simulate throws with another engine, and print by how much the results differ."""
-    from throwcollect.replay import distributions, simulate_with
-
-    deviations = list(simulate_with(directory, engine, trials))
-    found = distributions(deviations)
-    differ = sum(each.stored != each.again for each in deviations)
-    columns = ("mean", "rms", "median", "largest")
-    rows = [(each.column, f"{each.throws}", *(f"{getattr(each, name):.3g}" for name in columns)) for each in found]
-    counts = f"{directory}: {format_count(len(deviations), 'throw')} by {engine}; {differ} with another outcome"
-    lines = [*align([(f"by {engine}, above stored", "throws", *columns), *rows], numbers=True), counts]
-    show({"throws": deviations, "columns": found}, *lines, json=json)
 
 
 def print_collected(found: Info, directory: Path | None, *, as_json: bool, hint: str | None = None) -> None:

@@ -19,9 +19,8 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.dataset.carried_robot import carry_robot, config_text, find_files, write_config
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import METADATA, PLAN, SOURCES, THROWS, TRIALS, config_path
+from throwcollect.dataset.directory import METADATA, PLAN, SOURCES, THROWS, TRIALS, config_path, is_begun
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_begun
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws, read_throws_table
