@@ -122,7 +122,7 @@ class Dataset(Sequence[Throw]):
 
     @property
     def config(self) -> Config:
-        """Its configuration; that of a single throw is `config_of`."""
+        """Its configuration; that of a single throw is `Throw.config`."""
         return self.plan.config
 
     def to_pandas(self) -> DataFrame:
@@ -186,10 +186,6 @@ class Dataset(Sequence[Throw]):
             DatasetError: If the trial is not among the throws, has no episode, or it is not at the place in the table.
         """
         return self.throw(trial).read_episode()
-
-    def config_of(self, throw: Throw) -> Config:
-        """Make the configuration that one of its throws was simulated with."""
-        return self.plan.config_of(self.plan.trial(throw.trial))
 
     def robot_description(self) -> str | None:
         """Read the URDF of the robot from the first recording; None if there is no recording.

@@ -99,8 +99,10 @@ def _look_with(channels: Channels) -> Callable[[tuple[Path, Plan]], LeftOfShard]
         final = find_episodes(path, plan, channels)
         # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
         if final and final.keys() == set(plan.trials.numbers_to_run):
-            finished = _check_finished(path, channels, final)
-            if finished is not None:
+            with open_mcap(path) as contents:
+                runs = {trial: each.run for trial, each in final.items()}
+                finished, difference = rewrite(contents, channels, runs, name=path.name)
+            if difference is None:
                 return LeftOfShard(path, final, finished)
         unfinished = path_of_part(path)
         begun = find_episodes(unfinished, plan, channels)
@@ -156,11 +158,3 @@ def check_recorded(config: Config, episode: Episode, channels: Channels) -> None
         raise DatasetError(f"has {dict(frames)} frames on channels of sensors instead of {dict(wanted)}")
     if (start_ns := config.trial_start_ns(episode.header.trial)) != episode.header.start_ns:
         raise DatasetError(f"starts at {episode.header.start_ns} ns, the trial's slot of time at {start_ns} ns")
-
-
-def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, RecoveredEpisode]) -> FinishedShard | None:
-    """Describe a finished file; None if it is not, byte for byte, what the writer makes of its episodes."""
-    runs = {trial: each.run for trial, each in episodes.items()}
-    with open_mcap(path) as contents:
-        finished, difference = rewrite(contents, channels, runs, name=path.name)
-    return finished if difference is None else None

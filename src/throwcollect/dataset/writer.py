@@ -115,7 +115,7 @@ class DatasetWriter:
             remove(self._directory / name)
         count = 0
         # Every process gets the trials of the shards that it looks through, and not a whole plan.
-        paths = {number: self._make_path(number) for number in sorted(self._unfinished)}
+        paths = {each: self._directory / shard_name(self._config.name, each) for each in sorted(self._unfinished)}
         begun = {number: path for number, path in paths.items() if path.exists() or path_of_part(path).exists()}
         first = self.plan.trials.first
         parts = [
@@ -129,7 +129,8 @@ class DatasetWriter:
             shard = self._get_shard(number)
             recover_shard(shard, left)
             for trial, each in left.episodes.items():
-                shard.rows[trial] = self._make_row(trial, each.result, {**each.place, "shard": shard.path.name})
+                place = {**each.place, "shard": shard.path.name}
+                shard.rows[trial] = self._table.row(self.plan.trial(trial), each.result, place)
             count += len(left.episodes)
             if left.finished is not None:
                 self._close_shard(number, left.finished)
@@ -185,7 +186,7 @@ class DatasetWriter:
         number = self._find_waiting_shard(trial)
         shard = self._get_shard(number)
         shard.missing.remove(trial)
-        shard.rows[trial] = self._make_row(trial, task_of(self._config).lose(reason), None)
+        shard.rows[trial] = self._table.row(self.plan.trial(trial), task_of(self._config).lose(reason), None)
         self.note("lost", trial=trial, reason=reason)
         self._finish_shard_if_complete(number)
 
@@ -260,19 +261,12 @@ class DatasetWriter:
         """List the trials of a shard that are not refused."""
         return (each for each in self._list_members(number) if each not in self.plan.trials.refused)
 
-    def _make_path(self, number: int) -> Path:
-        """Make the path of a shard once it is finished."""
-        return self._directory / shard_name(self._config.name, number)
-
     def _get_shard(self, number: int) -> OpenShard:
         """Return an unfinished shard, which takes memory only once it has been asked for."""
         if number not in self._shards:
-            self._shards[number] = OpenShard(self._make_path(number), self._channels)
+            self._shards[number] = OpenShard(self._directory / shard_name(self._config.name, number), self._channels)
             self._shards[number].missing.update(self._list_to_run(number))
         return self._shards[number]
-
-    def _make_row(self, trial: int, result: Result, place: Row | None) -> Row:
-        return self._table.row(self.plan.trial(trial), result, place)
 
     def _find_waiting_shard(self, trial: int) -> int:
         shard = self._number_of(trial)

@@ -71,24 +71,18 @@ def split(
 
 
 def render_sensors(
-    directory: DatasetArgument,
-    output: OutputArgument,
-    *,
-    sensors: Path,
-    where: str | None = None,
-    json: JsonOption = False,
+    directory: DatasetArgument, output: OutputArgument, *, sensors: Path, json: JsonOption = False
 ) -> None:
     """Copy a dataset, and let other cameras and lidars see its throws.
 
     Options:
         sensors (FILE): YAML file with the section sensors of a configuration.
-        where (CONDITION): Take only trials that fulfil it, such as: landing_x_m > 1.5
     """
     from throwcollect.config.loader import load_sensors
     from throwcollect.dataset.derive.derivation import render_sensors as render
 
     with load_sensors(sensors) as sections:
-        derived = render(directory, output, sections, where=where)
+        derived = render(directory, output, sections)
     _show(output, derived, json=json)
 
 

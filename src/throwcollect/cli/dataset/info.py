@@ -80,7 +80,6 @@ def replay(
     *,
     trials: list[int] | None = None,
     everything: bool = False,
-    sample: int | None = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs.
@@ -88,15 +87,12 @@ def replay(
     Options:
         trials (--trial K): Number of a trial; may be repeated.
         everything (--all): All trials.
-        sample (N 1..): With --all: N of them, chosen at random.
     """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.replay import replay_throws, select_trials
 
     if bool(trials) == everything:
         raise ConfigError("which throws?", expected="either --trial K, which may be repeated, or --all")
-    if sample is not None and not everything:
-        raise ConfigError("--sample: should be given with --all")
     dataset = Dataset.open(directory)
     known = dataset.throws["trial"].to_pylist()
     for trial in trials or ():
@@ -104,7 +100,7 @@ def replay(
             raise ConfigError(f"{directory}: no trial {trial}", expected=f"trials from {known[0]} to {known[-1]}")
         # A trial without an episode is refused here, before any throw is simulated.
         dataset.episode(trial)
-    chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
+    chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset)
     comparisons = list(replay_throws(directory, chosen))
     wrong = [f"trial {each.trial}: {'; '.join(each.differences)}" for each in comparisons if each.differences]
     throws = format_count(len(comparisons), "throw")

@@ -131,7 +131,7 @@ def test_merged_datasets_of_different_plans_follow_each_other_with_the_bytes_of_
     # A file holds episodes of one plan alone, so times increase in each.
     assert merged.shards == tuple(f"quick_{number:05d}.mcap" for number in range(5))
     card = (tmp_path / "all" / "README.md").read_text()
-    assert f"| other | {other} | 4 | {info(other).digest} |" in card
+    assert f"- `{other}` (other): 4 trials; digest {info(other).digest}\n" in card
 
 
 def test_derived_datasets_can_be_derived_from(collected: Path, other: Path, tmp_path: Path) -> None:
