@@ -65,7 +65,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         *_list_targets(config, throws),
         "## Limits",
         "",
-        _describe_limits(config.sim.engine)
+        _LIMITS.get(config.sim.engine, f"Simulated with the physics engine `{config.sim.engine}`.")
         + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` has the kind of failure."
         + _describe_policy(config),
         "",
@@ -80,23 +80,16 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
     return "\n".join(lines)
 
 
-_RIGID_BODIES = {"bullet": "Bullet", "mujoco": "MuJoCo"}
-"""Engines with the same limits."""
-
-
-def _describe_limits(engine: str) -> str:
-    """Describe what a physics engine leaves out; nothing is known of engines of other packages."""
-    if engine in _RIGID_BODIES:
-        return (
-            f"Simulated with {_RIGID_BODIES[engine]}: rigid bodies, the base of the robot fixed, ideal motors within "
-            "effort limits, no sensor noise."
-        )
-    if engine == "ballistic":
-        return (
-            "Computed without contacts (`sim.engine: ballistic`): the arm is always where it is commanded to be, and "
-            "the ball leaves the tool when the tool would have to pull it. No robot throws like that."
-        )
-    return f"Simulated with the physics engine `{engine}`, without sensor noise."
+_RIGID_BODIES = (
+    "Simulated with {}: rigid bodies, the base of the robot fixed, ideal motors within effort limits, no sensor noise."
+)
+_LIMITS = {
+    "bullet": _RIGID_BODIES.format("Bullet"),
+    "mujoco": _RIGID_BODIES.format("MuJoCo"),
+    "ballistic": "Computed without contacts (`sim.engine: ballistic`): the arm is always where it is commanded to be, "
+    "and the ball leaves the tool when the tool would have to pull it. No robot throws like that.",
+}
+"""What engines leave out; nothing is known of engines of other packages."""
 
 
 def _describe_policy(config: Config) -> str:

@@ -211,12 +211,17 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        # `_extend` compares the trials.
-        if key != "trials" and not key.startswith("until.")
+        if not (key == "trials" or key.startswith("until.")) or not _is_growth(before, after, config)
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
         raise ConfigError(problems, expected=same)
+
+
+def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
+    """Whether a number of trials may replace an earlier one; None stands for no limit."""
+    # Without `until`, `_extend` compares the trials.
+    return config.until is None or after is None or (before is not None and after >= before)
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
