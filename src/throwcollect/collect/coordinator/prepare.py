@@ -7,7 +7,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 from throwcollect.collect.coordinator.reporter import SILENT, Reporter
@@ -75,9 +74,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, reporter: R
     refuse_many_files(config, len(points.values))
     count = count_first(config, len(points.values))
     size = max(_TRIALS_A_PIECE, min(_MOST_A_PIECE, count // 10))
-    # The first pieces are small, so that progress can be reported soon.
-    firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
-    pieces = [points[first:stop] for first, stop in pairwise([*firsts, count])]
+    pieces = [points[first : min(first + size, count)] for first in range(0, count, size)]
     processes = processes if count >= _MANY_TRIALS else 1
     say_at = time.monotonic() + _REPORT_FIRST_S
     reporter.update_plan(0, count)
