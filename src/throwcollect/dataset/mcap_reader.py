@@ -35,8 +35,6 @@ from throwcollect.files import open_regular, unreadable
 from throwcollect.plan.digest import is_digest
 
 _RECORD_PREFIX = struct.Struct("<BQ")
-_EFFORT = 64
-"""Most bytes that are read in vain for each byte of the file; only a file that was made to be slow needs more."""
 
 
 class McapRecord(NamedTuple):
@@ -55,22 +53,16 @@ class WholeEpisode(NamedTuple):
 
 
 class McapContents:
-    """The bytes of a whole file, read record by record.
-
-    Attributes:
-        effort: How much was read and decompressed so far [bytes]; what was read again counts again.
-    """
+    """The bytes of a whole file, read record by record."""
 
     def __init__(self, data: mmap.mmap | bytes) -> None:
         self._data = data
-        self.effort = 0
 
     def __len__(self) -> int:
         return len(self._data)
 
     def slice(self, start: int, end: int) -> bytes:
         """Return the bytes of the file from `start` to `end`, not included."""
-        self.effort += end - start
         return self._data[start:end]
 
     def record(self, offset: int) -> McapRecord:
@@ -145,7 +137,6 @@ class McapContents:
         """Read the episode whose chunk begins at an offset, and compare all its bytes with what the writer writes."""
         episode, end = self.episode(offset, sensors=True)
         episode.chunk.check_size()
-        self.effort += episode.chunk.uncompressed_size
         episode.chunk.check_records()
         for chunk in episode.sensors:
             check_frames(chunk)
@@ -233,14 +224,11 @@ def scan(contents: McapContents) -> Iterator[WholeEpisode]:
     Args:
         contents: The contents of an MCAP file or of its beginning, finished or not.
     """
-    effort = _EFFORT * len(contents)
     offset = contents.next_chunk(0)
-    while offset >= 0 and effort > 0:
-        before = contents.effort
+    while offset >= 0:
         try:
             found = contents.whole_episode(offset)
         except DatasetError:
-            effort -= contents.effort - before
             offset = contents.next_chunk(offset + 1)
             continue
         yield found
