@@ -7,7 +7,6 @@ behind them.
 
 from __future__ import annotations
 
-import errno
 import io
 import mmap
 import os
@@ -146,31 +145,14 @@ class McapContents:
         return WholeEpisode(episode, replace(run, data=b"", offset=offset))
 
 
-def _measure(descriptor: int) -> int:
-    """Find how much of a file is to be read [bytes]: holes, which give zeros, only up to the size of the data."""
-    size, written, end = os.fstat(descriptor).st_size, 0, 0
-    try:
-        while end < size:
-            start = os.lseek(descriptor, end, os.SEEK_DATA)
-            end = os.lseek(descriptor, start, os.SEEK_HOLE)
-            written += end - start
-    except OSError as error:
-        # No data follow. With any other error, the file system does not know where its holes are.
-        if error.errno != errno.ENXIO:
-            return size
-    # One byte more shows that data and file do not end together.
-    return min(size, 2 * written + 1)
-
-
 @contextmanager
 def open_mcap(path: Path) -> Iterator[McapContents]:
-    """Map a file into memory while the block lasts, whatever it contains; one of holes only up to twice its data."""
+    """Map a file into memory while the block lasts, whatever it contains."""
     try:
         descriptor = open_regular(path)
         try:
-            size = _measure(descriptor)
             # An empty file cannot be mapped.
-            data = mmap.mmap(descriptor, size, access=mmap.ACCESS_READ) if size else b""
+            data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if os.fstat(descriptor).st_size else b""
         finally:
             # The mapping keeps the file open.
             os.close(descriptor)

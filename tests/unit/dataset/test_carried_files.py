@@ -201,15 +201,6 @@ def test_files_that_are_lost_come_back_by_the_configuration(
     assert verify_dataset(dataset, replay=1) == []
 
 
-def test_another_shape_is_found_by_its_digest(carrying: Path, tmp_path: Path) -> None:
-    dataset = tmp_path / "dataset"
-    shutil.copytree(carrying, dataset)
-    table = next(body for body in load(dataset / "config.yaml").scene.bodies.values() if isinstance(body, MeshConfig))
-    write_box(Path(table.file), (0, 0, 0), (600, 1200, 51))
-    findings = verify_dataset(dataset, replay=0)
-    assert any("is not the file of the body's sha256" in finding.problem for finding in findings)
-
-
 def test_the_digest_is_that_of_many_simulations(carrying: Path, place: Path, tmp_path: Path) -> None:
     done = call_here(
         "up", "-n", "2", "--runtime", "local", place / "moved" / "small.yaml", "--output", tmp_path / "many"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -74,14 +73,6 @@ def test_a_recording_cut_anywhere_has_the_episodes_before_the_cut(
 def test_a_file_of_noise_has_no_episode(path: Path) -> None:
     assert find_in(path, np.random.default_rng(0).bytes(100_000)) == []
     assert find_in(path, b"") == []
-
-
-def test_a_file_of_holes_is_read_up_to_twice_its_data(path: Path, whole: bytes) -> None:
-    assert find_in(path, whole) == [3, 4, 5]
-    os.truncate(path, 1 << 40)
-    with open_mcap(path) as contents:
-        assert len(whole) < len(contents) < 3 * len(whole)
-    assert [each.episode.header.trial for each in scan_file(path)] == [3, 4, 5]
 
 
 def test_an_episode_with_changed_samples_and_a_fitting_crc_is_not_found(

@@ -71,7 +71,6 @@ def test_a_throw_that_did_not_land_has_no_miss(tmp_path: Path) -> None:
     found = info(tmp_path / "data").misses
     assert found == {"miss_m": MissSummary(3, 0, None, None, None)}
     assert "miss_m    0 of 3 targets\n" in describe(info(tmp_path / "data"))
-    assert "| `miss_m` | 3 | 0 | - | - | - |" in (tmp_path / "data" / "README.md").read_text()
 
 
 def test_targets_can_have_a_height_and_a_hit_angle(tmp_path: Path) -> None:

@@ -54,16 +54,6 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, reporter: 
         reporter: Receives how many trials of a large plan have been checked, and warnings of limits that may be wrong.
     """
     points = draw_points(config, directory=directory)
-    return _check_trials(config, points, processes=processes, reporter=reporter)
-
-
-def count_first(config: Config, trials: int) -> int:
-    """Count the trials, of all trials of a plan, that the dataset has in any case, and that are checked beforehand."""
-    return trials if config.until is None else min(trials, config.until.wanted)
-
-
-def _check_trials(config: Config, points: Points, *, processes: int, reporter: Reporter) -> Plan:
-    """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     for sentence in find_placeholders(robot_of(config)):
         reporter.warn(f"warning: {sentence}")
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
@@ -91,6 +81,11 @@ def _check_trials(config: Config, points: Points, *, processes: int, reporter: R
         check_some_left(reasons)
     refused = {number: reason for number, reason in enumerate(reasons) if reason is not None}
     return Plan(config, replace(make_trials(config, points), refused=refused))
+
+
+def count_first(config: Config, trials: int) -> int:
+    """Count the trials, of all trials of a plan, that the dataset has in any case, and that are checked beforehand."""
+    return trials if config.until is None else min(trials, config.until.wanted)
 
 
 def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:
