@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from throwcollect.dataset.derive.derivation import sample as sample_dataset
     from throwcollect.dataset.derive.split import split as split_dataset
     from throwcollect.dataset.derive.statistics import statistics as compute_statistics
-    from throwcollect.dataset.reader import Dataset, UnfinishedDatasetWarning, load
+    from throwcollect.dataset.reader import Dataset, load
     from throwcollect.dataset.throw import Throw
     from throwcollect.errors import (
         ConfigError,
@@ -55,7 +55,6 @@ __all__ = [
     "Simulator",
     "Throw",
     "ThrowcollectError",
-    "UnfinishedDatasetWarning",
     "WorkerError",
     "__version__",
     "compute_statistics",
@@ -89,7 +88,6 @@ _PLACES = {
     "Simulator": "simulator:Simulator",
     "Throw": "dataset.throw:Throw",
     "ThrowcollectError": "errors:ThrowcollectError",
-    "UnfinishedDatasetWarning": "dataset.reader:UnfinishedDatasetWarning",
     "WorkerError": "errors:WorkerError",
     "compute_statistics": "dataset.derive.statistics:statistics",
     "export_dataset": "publish.export.export:export",

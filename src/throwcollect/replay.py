@@ -45,7 +45,7 @@ class Comparison:
     differences: tuple[str, ...]
 
 
-def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
+def select_trials(dataset: Dataset, *, sample: int | None = None) -> list[int]:
     """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice.
 
     Raises:

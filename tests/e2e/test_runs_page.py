@@ -6,7 +6,7 @@ import pytest
 
 from tests.e2e.collection import FAST
 from tests.pages import find_blocks, read_section
-from throwcollect.dataset.inspect import digest
+from throwcollect.dataset.inspect import info
 from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
@@ -30,6 +30,6 @@ def test_two_runs_of_one_program_are_followed_side_by_side(
     *progress, first, second, third = capsys.readouterr().out.splitlines()
     assert any(line.startswith("6/6 throws: ") for line in progress)
     for line, name in ((first, "first"), (second, "second")):
-        assert line.endswith(f"{{'landed': 6}} {digest(tmp_path / name)}")
-    assert digest(tmp_path / "first") != digest(tmp_path / "second")
+        assert line.endswith(f"{{'landed': 6}} {info(tmp_path / name).digest}")
+    assert info(tmp_path / "first").digest != info(tmp_path / "second").digest
     assert third == "{'landed': 3}"

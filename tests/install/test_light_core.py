@@ -155,7 +155,6 @@ def test_datasets_are_read_exported_and_derived_as_with_all_extras(
     filter_dataset(dataset, second, where="trial >= 3")
     for arguments in (
         ("dataset", "info", dataset),
-        ("dataset", "digest", dataset),
         ("dataset", "export", dataset, tmp_path / "parquet", "--to", "parquet"),
         ("dataset", "export", dataset, tmp_path / "lerobot", "--to", "lerobot"),
         ("dataset", "export", dataset, tmp_path / "npz", "--to", "npz", "--rate", "50"),

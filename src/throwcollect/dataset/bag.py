@@ -10,16 +10,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.composer import Composer, ComposerError
 from ruamel.yaml.error import YAMLError
-from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.document import explain_yaml_error
-from throwcollect.dataset.directory import METADATA, PLAN, describe_other, has_files
+from throwcollect.dataset.directory import METADATA, PLAN, describe_other, is_begun
 from throwcollect.dataset.lock import is_locked
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
@@ -34,8 +32,6 @@ MOST_FILES = 30_000
 """Most files of a bag: with the longest names, their metadata then just stay below the size that `from_yaml` reads."""
 _ROS_DISTRO = "jazzy"
 """Release whose interface definitions the messages follow."""
-_MOST_NEARBY = 5
-"""Most datasets that a message names as those that may be meant."""
 
 
 @dataclass(frozen=True)
@@ -100,18 +96,8 @@ def bag_information(
     }
 
 
-class _PlainComposer(Composer):
-    """Refuses aliases, with which a short text can expand without limit, and tags, whose values are not plain."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        event = self.parser.peek_event()
-        if isinstance(event, AliasEvent) or getattr(event, "tag", None):
-            raise ComposerError(problem="an alias or a tag", problem_mark=event.start_mark)
-        return super().compose_node(parent, index)
-
-
 def from_yaml(path: Path) -> Mapping[str, Any]:
-    """Read a YAML file such as `to_yaml` makes: one mapping, without anchors and tags."""
+    """Read a YAML file such as `to_yaml` makes: one mapping."""
     try:
         document = _parse(read_text(path, most_bytes=_MOST_BYTES))
     except (YAMLError, RecursionError, ValueError) as error:
@@ -125,24 +111,7 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
 @lru_cache(maxsize=8)
 def _parse(text: str) -> Any:
     """Parse YAML; the last strings are cached, because one command reads the metadata of a dataset several times."""
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Composer = _PlainComposer
-    return yaml.load(text)
-
-
-class NextCommand(NamedTuple):
-    """The state of an unfinished dataset, such as ``is not finished``; a command to go on with, and what it does."""
-
-    state: str
-    command: str
-    purpose: str
-
-
-def find_next_command(directory: Path) -> NextCommand:
-    """Find the state of an unfinished dataset; on file systems without locks, a run that works on it goes unnoticed."""
-    if is_locked(directory):
-        return NextCommand("is being collected", command("wait", "--run", directory), "waits for its end")
-    return NextCommand("is not finished", command("resume", directory), "goes on with it")
+    return YAML(typ="safe", pure=True).load(text)
 
 
 def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
@@ -151,9 +120,12 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            found = find_next_command(directory)
-            raise DatasetError(f"the dataset {found.state}: it has no {METADATA}", path=directory, hint=found.command)
-        raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
+            # On file systems without locks, a run that works on it goes unnoticed.
+            busy = is_locked(directory)
+            state = "is being collected" if busy else "is not finished"
+            hint = command("wait", "--run", directory) if busy else command("resume", directory)
+            raise DatasetError(f"the dataset {state}: it has no {METADATA}", path=directory, hint=hint)
+        raise DatasetError("holds no dataset", path=directory)
     bag = from_yaml(path).get(BAG_SECTION)
     if not isinstance(bag, dict):
         raise DatasetError("not the metadata of a rosbag2 bag", path=path)
@@ -162,16 +134,8 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
 
 def refuse_other_directory(directory: Path) -> None:
     """Refuse a directory without any file of a dataset, as advice on damaged datasets would not help there."""
-    if not has_files(directory):
-        raise DatasetError(describe_other(directory), path=directory, hint=_name_nearby(directory))
-
-
-def _name_nearby(directory: Path) -> str | None:
-    """Name datasets that may be meant by a path that is no dataset: the one around it, or those inside it."""
-    if directory.is_file():
-        return str(directory.parent) if (directory.parent / METADATA).is_file() else None
-    found = sorted(str(path.parent) for path in directory.glob(f"*/{METADATA}"))
-    return ", ".join(found[:_MOST_NEARBY]) or None
+    if not is_begun(directory):
+        raise DatasetError(describe_other(directory), path=directory)
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:
@@ -179,7 +143,7 @@ def to_yaml(data: Mapping[str, Any]) -> str:
     yaml = YAML()
     # By default, long values would be broken at 80 characters.
     yaml.width = 4096
-    # A value that occurs twice, such as an infinite duration, would be an alias, which `from_yaml` refuses.
+    # A value that occurs twice, such as an infinite duration, would be an alias, which rosbag2 does not write.
     yaml.representer.ignore_aliases = lambda *_: True
     stream = io.StringIO()
     yaml.dump(data, stream)

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, config_path, describe_other
-from throwcollect.dataset.manifest import is_begun
+from throwcollect.dataset.directory import CONFIG, config_path, describe_other, is_begun
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.wording import command
 

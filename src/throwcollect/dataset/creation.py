@@ -9,9 +9,8 @@ from pathlib import Path
 from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.bag import MOST_FILES
 from throwcollect.dataset.carried_robot import write_config
-from throwcollect.dataset.directory import CONFIG, PLAN, ROBOT, TRIALS
+from throwcollect.dataset.directory import CONFIG, PLAN, ROBOT, TRIALS, is_begun
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.plan.plan import Plan
@@ -35,8 +34,17 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _make_unusable_error(directory, error) from error
-    with hold_lock(directory, needed=False):
-        _fill(directory, plan, listed, made=made)
+    with hold_lock(directory, needed=False), ExitStack() as undo:
+        refuse_taken(directory)
+        undo.callback(remove_plan, directory, made=made)
+        write_config(directory, plan.config)
+        # An empty plan marks the dataset and is made again, so a collection that is killed in the meantime can go on.
+        write_file(directory / PLAN, b"")
+        if listed is not None:
+            write_file(directory / TRIALS, encode_points(listed))
+        plan.write(directory / PLAN)
+        # Everything is written, so nothing is undone.
+        undo.pop_all()
 
 
 def refuse_many_files(config: Config, trials: int) -> None:
@@ -78,20 +86,6 @@ def remove_plan(directory: Path, *, made: bool) -> None:
             shutil.rmtree(directory / name, ignore_errors=True)
         if made:
             directory.rmdir()
-
-
-def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
-    refuse_taken(directory)
-    with ExitStack() as undo:
-        undo.callback(remove_plan, directory, made=made)
-        write_config(directory, plan.config)
-        # An empty plan marks the dataset and is made again, so a collection that is killed in the meantime can go on.
-        write_file(directory / PLAN, b"")
-        if listed is not None:
-            write_file(directory / TRIALS, encode_points(listed))
-        plan.write(directory / PLAN)
-        # Everything is written, so nothing is undone.
-        undo.pop_all()
 
 
 def _make_unusable_error(directory: Path, error: OSError) -> ConfigError:

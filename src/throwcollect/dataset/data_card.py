@@ -12,12 +12,10 @@ from throwcollect.config.shape import unit_of_key
 from throwcollect.config.values import keys_by_column
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
-from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.provenance import Provenance
 from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.plan.arrow_column import find_range
 from throwcollect.robots.description import robot_of
-from throwcollect.units import unit_of_name
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 _MORE = "1M<n<10M"
@@ -62,10 +60,9 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         *([f"- `{MOTIONS}`: the motions of the trials."] if config.task.trajectory.family == "file" else []),
         "",
         *_list_ranges(config, throws),
-        *_list_targets(config, throws),
         "## Limits",
         "",
-        _describe_limits(config.sim.engine)
+        _LIMITS.get(config.sim.engine, f"Simulated with the physics engine `{config.sim.engine}`.")
         + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` has the kind of failure."
         + _describe_policy(config),
         "",
@@ -80,23 +77,16 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
     return "\n".join(lines)
 
 
-_RIGID_BODIES = {"bullet": "Bullet", "mujoco": "MuJoCo"}
-"""Engines with the same limits."""
-
-
-def _describe_limits(engine: str) -> str:
-    """Describe what a physics engine leaves out; nothing is known of engines of other packages."""
-    if engine in _RIGID_BODIES:
-        return (
-            f"Simulated with {_RIGID_BODIES[engine]}: rigid bodies, the base of the robot fixed, ideal motors within "
-            "effort limits, no sensor noise."
-        )
-    if engine == "ballistic":
-        return (
-            "Computed without contacts (`sim.engine: ballistic`): the arm is always where it is commanded to be, and "
-            "the ball leaves the tool when the tool would have to pull it. No robot throws like that."
-        )
-    return f"Simulated with the physics engine `{engine}`, without sensor noise."
+_RIGID_BODIES = (
+    "Simulated with {}: rigid bodies, the base of the robot fixed, ideal motors within effort limits, no sensor noise."
+)
+_LIMITS = {
+    "bullet": _RIGID_BODIES.format("Bullet"),
+    "mujoco": _RIGID_BODIES.format("MuJoCo"),
+    "ballistic": "Computed without contacts (`sim.engine: ballistic`): the arm is always where it is commanded to be, "
+    "and the ball leaves the tool when the tool would have to pull it. No robot throws like that.",
+}
+"""What engines leave out; nothing is known of engines of other packages."""
 
 
 def _describe_policy(config: Config) -> str:
@@ -126,27 +116,6 @@ def _list_ranges(config: Config, throws: pa.Table) -> list[str]:
         "",
         "| key | unit | lowest | highest |",
         "|---|---|---|---|",
-        *rows,
-        "",
-    ]
-
-
-def _list_targets(config: Config, throws: pa.Table) -> list[str]:
-    """Describe how trials missed their targets; no lines if they have none."""
-    found = summarise_misses(config, throws)
-    if not found:
-        return []
-    rows = [
-        f"| `{name}` | {each.targets} | {each.measured} | {' | '.join(each.format_misses(unit_of_name(name)))} |"
-        for name, each in found.items()
-    ]
-    return [
-        "## Targets",
-        "",
-        "Where trials should have ended, and by how much they missed, in simulation.",
-        "",
-        "| column | with a target | measured | median | 9 of 10 below | largest |",
-        "|---|---|---|---|---|---|",
         *rows,
         "",
     ]

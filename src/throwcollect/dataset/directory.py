@@ -68,13 +68,17 @@ def path_of_part(path: Path) -> Path:
     return path.with_name(f"{path.name}.part")
 
 
-def has_files(directory: Path) -> bool:
-    """Whether a file that only a dataset has is in a directory; bags of others have metadata, exports have tables."""
-    return (directory / PLAN).exists() or (directory / MANIFEST).exists()
+def is_begun(directory: Path) -> bool:
+    """Whether a directory holds a dataset that was at least created.
+
+    Bags of others have metadata, exports have tables, and exports and models a ``config.yaml``.
+    """
+    has_journal = (directory / CONFIG).is_file() and (directory / JOURNAL).is_file()
+    return has_journal or (directory / PLAN).exists() or (directory / MANIFEST).exists()
 
 
 def describe_other(directory: Path) -> str:
-    """Describe a directory without any file of a dataset is."""
+    """Describe a directory that holds no dataset."""
     if (directory / METADATA).is_file():
         return "is a rosbag2 bag, but not of throwcollect"
     return f"holds no dataset{suggest_path(directory)}"

@@ -1,4 +1,4 @@
-"""Summaries and digests of datasets."""
+"""Summaries of datasets."""
 
 from __future__ import annotations
 
@@ -10,18 +10,12 @@ import pyarrow as pa
 
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.journal import measure_collected_s
-from throwcollect.dataset.misses import read_targets, summarise_misses
+from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
-from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.dataset.throws_table import count_outcomes
 from throwcollect.errors import DatasetError
 from throwcollect.plan.arrow_column import nan_where_null
-from throwcollect.progress_log import log_progress
-from throwcollect.wording import command, join_names
-
-_MOST_NAMED = 5
-"""Most missing files that a message names."""
 
 
 def info(directory: Path) -> Info:
@@ -74,36 +68,3 @@ def _find_landing_area(throws: pa.Table, task: TaskConfig) -> Mapping[str, tuple
             return None
         found[axis] = float(np.nanmin(ends)), float(np.nanmax(ends))
     return found
-
-
-def check_recordings_are_there(dataset: Dataset) -> None:
-    """Refuse a finished dataset of which recordings are missing; `verify` checks the others."""
-    missing = [name for name in dataset.shards if not (dataset.directory / name).exists()]
-    if missing:
-        raise DatasetError(
-            f"{join_names(missing[:_MOST_NAMED])}{' and more' if len(missing) > _MOST_NAMED else ''} "
-            f"{'is' if len(missing) == 1 else 'are'} missing",
-            path=dataset.directory,
-            hint=f"{command('resume', dataset.directory)} collects the trials of missing recordings again",
-        )
-
-
-def digest(directory: Path) -> str:
-    """Compute the digest of a dataset again from the bytes of its episodes, and from targets if there are some."""
-    dataset = Dataset.open(directory)
-    recorded = dataset.recorded.throws
-    stated = zip(recorded["trial"].to_pylist(), recorded["digest"].to_pylist(), strict=True)
-    digests = []
-    for episode in log_progress(dataset.episodes(), len(recorded), "episode", "checked"):
-        trial, expected = next(stated)
-        try:
-            episode.chunk.check_records()
-        except DatasetError as error:
-            raise error.locate(directory, f"trial {trial}") from error
-        if episode.digest != expected:
-            raise DatasetError(f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=expected)
-        digests.append(episode.digest)
-    combined = combine_digests(digests, read_targets(dataset.throws))
-    if combined != dataset.digest:
-        raise DatasetError(f"digest {combined}", path=directory, expected=f"{dataset.digest} as in metadata.yaml")
-    return combined

@@ -20,7 +20,6 @@ from throwcollect.config.schema import BODIES, MOTIONS
 from throwcollect.dataset.carried_robot import list_carried
 from throwcollect.dataset.directory import (
     CONFIG,
-    JOURNAL,
     MANIFEST,
     METADATA,
     PLAN,
@@ -92,15 +91,6 @@ def entry_of_file(path: Path, name: str | None = None) -> FileEntry:
     return FileEntry(name or path.name, size, digest.hexdigest())
 
 
-def size_of_file(path: Path) -> int:
-    """Find the size of a file on disk [bytes]."""
-    try:
-        with open(open_regular(path), "rb") as file:
-            return os.fstat(file.fileno()).st_size
-    except OSError as error:
-        raise unreadable(path, error) from error
-
-
 def list_promised_names(directory: Path) -> list[str]:
     """List the names of the files in a directory that a manifest has to cover, in order.
 
@@ -138,16 +128,6 @@ def read_manifest(directory: Path) -> tuple[FileEntry, ...]:
     return entries
 
 
-def is_begun(directory: Path) -> bool:
-    """Whether a directory holds a dataset that was at least created; exports and models have a ``config.yaml``, too."""
-    if (directory / PLAN).is_file():
-        return True
-    try:
-        return (directory / CONFIG).is_file() and ((directory / JOURNAL).is_file() or bool(read_manifest(directory)))
-    except DatasetError:
-        return False
-
-
 def find_changed_files(
     directory: Path, entries: Iterable[FileEntry], *, in_full: bool, hashed: Collection[FileEntry] = ()
 ) -> Iterator[Finding]:
@@ -161,7 +141,8 @@ def find_changed_files(
             yield Finding(entry.path, "", f"is missing, {MANIFEST} has it")
             continue
         try:
-            actual = replace(entry, bytes=size_of_file(path))
+            # A link has another size than the file that it leads to.
+            actual = replace(entry, bytes=path.lstat().st_size)
             if in_full and actual == entry and entry not in hashed:
                 actual = entry_of_file(path, entry.path)
         except DatasetError as error:

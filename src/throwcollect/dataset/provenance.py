@@ -36,7 +36,7 @@ HOST_VARIABLE = "THROWCOLLECT_HOST"
 IMAGE_VARIABLE = "THROWCOLLECT_IMAGE"
 """Environment variable with the id of a container's image, which it cannot know either."""
 
-_LIBRARIES = (
+_LIBRARIES = [
     "pybullet",
     "mujoco-core",
     "numpy",
@@ -45,9 +45,8 @@ _LIBRARIES = (
     "pyarrow",
     "pin",
     "example-robot-data",
-)
+]
 _MOST_BYTES = 1_000_000
-_GIT_S = 5.0
 _OWN_HASH = "sha256"
 _CARD_HASH = "card_sha256"
 _OPEN = "any process that reached the router could join, read and disturb the collection"
@@ -179,12 +178,11 @@ def _read_revision() -> str | None:
     root = Path(__file__).parents[3]
     if not (root / ".git").exists():
         return None
-    # The configuration of a foreign clone may name programs that git would run.
-    words = ["git", "-C", str(root), "-c", "core.fsmonitor=false", "describe"]
-    # Without tags, `--always` gives the whole hash of the revision.
-    words += ["--always", "--abbrev=40", "--dirty", "--exclude=*"]
+    # The configuration of a foreign clone may name programs that git would run. Without tags, `--always` gives the
+    # whole hash of the revision.
+    words = ["-c", "core.fsmonitor=false", "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
     with suppress(OSError, subprocess.SubprocessError):
-        described = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)
+        described = subprocess.run(["git", "-C", root, *words], capture_output=True, text=True, timeout=5, check=True)
         return described.stdout.strip() or None
     return None
 

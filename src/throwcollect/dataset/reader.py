@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,13 +14,12 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.section import unknown_joint
-from throwcollect.dataset.bag import find_next_command, read_bag_metadata
+from throwcollect.dataset.bag import read_bag_metadata
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS, list_shards, path_of_part
+from throwcollect.dataset.directory import FORMAT, METADATA, PLAN, THROWS
 from throwcollect.dataset.mcap_reader import EpisodePlace, open_mcap
-from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throw import Throw
-from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, read_throws
+from throwcollect.dataset.throws_table import count_outcomes, read_throws
 from throwcollect.dataset.trajectories import Trajectories, list_columns, read_trajectories
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
@@ -29,7 +27,6 @@ from throwcollect.extras import lazily
 from throwcollect.files import StrPath
 from throwcollect.plan.arrow_column import find_trial
 from throwcollect.plan.plan import Plan
-from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.wording import command, format_count
@@ -38,10 +35,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 pd = lazily("pandas")
-
-
-class UnfinishedDatasetWarning(UserWarning):
-    """A dataset was opened whose collection has not come to its end."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,7 +122,7 @@ class Dataset(Sequence[Throw]):
 
     @property
     def config(self) -> Config:
-        """Its configuration; that of a single throw is `config_of`."""
+        """Its configuration; that of a single throw is `Throw.config`."""
         return self.plan.config
 
     def to_pandas(self) -> DataFrame:
@@ -145,7 +138,7 @@ class Dataset(Sequence[Throw]):
         """Hash over all episodes in order of trials, as it was written.
 
         Raises:
-            DatasetError: If the metadata do not have it, as those of an unfinished dataset.
+            DatasetError: If the metadata do not have it.
         """
         digest = _find_custom(self._bag, "throwcollect.digest")
         if not isinstance(digest, str):
@@ -193,10 +186,6 @@ class Dataset(Sequence[Throw]):
             DatasetError: If the trial is not among the throws, has no episode, or it is not at the place in the table.
         """
         return self.throw(trial).read_episode()
-
-    def config_of(self, throw: Throw) -> Config:
-        """Make the configuration that one of its throws was simulated with."""
-        return self.plan.config_of(self.plan.trial(throw.trial))
 
     def robot_description(self) -> str | None:
         """Read the URDF of the robot from the first recording; None if there is no recording.
@@ -291,46 +280,8 @@ class Dataset(Sequence[Throw]):
 
 
 def load(directory: StrPath) -> Dataset:
-    """Open a dataset for reading.
-
-    Its tables are read and checked against each other; recordings are opened when they are looked at. If the dataset is
-    not finished, its recordings are read through, and its rows are the trials that have ended so far: row i need not be
-    trial i, and `Dataset.digest` raises an error.
-
-    Raises:
-        DatasetError: If the directory holds no dataset, or its tables or plan are damaged.
-        ConfigError: If its ``config.yaml`` is wrong.
-
-    Warns:
-        UnfinishedDatasetWarning: If it is not finished.
-    """
-    path = Path(directory)
-    # If the directory is no dataset at all, `open` explains what is wrong.
-    if (path / METADATA).exists() or not (path / PLAN).exists():
-        return Dataset.open(path)
-    plan = Plan.read(path / PLAN, read_config(path))
-    rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
-    found = find_next_command(path)
-    warnings.warn(
-        f"{path} {found.state}: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
-        f"`{found.command}` {found.purpose}",
-        UnfinishedDatasetWarning,
-        stacklevel=2,
-    )
-    return Dataset(path, plan, ThrowsTable.of(plan).table(rows), {})
-
-
-def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
-    """Make the rows of the refused trials, and of those whose episodes are on disk as `resume` would keep them."""
-    table = ThrowsTable.of(plan)
-    yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
-    names = list_shards(plan)
-    for name in log_progress(names, len(names), "recording", "looked through"):
-        final = directory / name
-        # The unfinished file comes first: when it vanishes in this moment, the final one is there.
-        episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)
-        for found in episodes.values():
-            yield table.row(plan.trial(found.trial), found.result, found.place)
+    """Open a finished dataset for reading; see `Dataset.open`."""
+    return Dataset.open(directory)
 
 
 def _read_column(column: pa.ChunkedArray) -> NDArray[Any]:

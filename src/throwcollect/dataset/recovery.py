@@ -8,9 +8,12 @@ if it had never stopped.
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from throwcollect.config.schema import BODIES, MOTIONS, Config
 from throwcollect.dataset.directory import (
@@ -30,6 +33,7 @@ from throwcollect.dataset.mcap_reader import open_mcap, scan_file
 from throwcollect.dataset.shard import FinishedShard, OpenShard, rewrite
 from throwcollect.dataset.throws_table import Row, judge_episode, place_columns
 from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import count_indexed
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import remove, unwritable
@@ -37,20 +41,16 @@ from throwcollect.plan.plan import Plan
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.tasks.result import Result
 
-Judge = Callable[[Config, Episode], Result]
-
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that look through files side by side saves time."""
 
 
-@dataclass(frozen=True)
-class RecoveredEpisode:
+class RecoveredEpisode(NamedTuple):
     """A whole episode on disk, so that its trial need not run again.
 
     It lies at `place` now, in columns of the table. `run` has its records without their bytes.
     """
 
-    trial: int
     result: Result
     place: Row
     run: RecordGroup
@@ -80,9 +80,7 @@ def remove_unfinished(directory: Path) -> None:
         remove(path)
 
 
-def find_left(
-    parts: Sequence[tuple[Path, Plan]], channels: Channels, *, judge: Judge = judge_episode, processes: int = 1
-) -> Iterator[LeftOfShard]:
+def find_left(parts: Sequence[tuple[Path, Plan]], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, given by final path and trials, side by side if there are many. Changes nothing.
 
     Yields:
@@ -91,21 +89,23 @@ def find_left(
     if sum(len(plan.trials) for _, plan in parts) < _MANY_EPISODES:
         processes = 1
     return work_side_by_side(
-        parts, _look_with, (channels, judge), processes=processes, doing="looks through recordings", fork=True
+        parts, _look_with, (channels,), processes=processes, doing="looks through recordings", fork=True
     )
 
 
-def _look_with(channels: Channels, judge: Judge) -> Callable[[tuple[Path, Plan]], LeftOfShard]:
+def _look_with(channels: Channels) -> Callable[[tuple[Path, Plan]], LeftOfShard]:
     def look(part: tuple[Path, Plan]) -> LeftOfShard:
         path, plan = part
-        final = find_episodes(path, plan, channels, judge=judge)
+        final = find_episodes(path, plan, channels)
         # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
         if final and final.keys() == set(plan.trials.numbers_to_run):
-            finished = _check_finished(path, channels, final)
-            if finished is not None:
+            with open_mcap(path) as contents:
+                runs = {trial: each.run for trial, each in final.items()}
+                finished, difference = rewrite(contents, channels, runs, name=path.name)
+            if difference is None:
                 return LeftOfShard(path, final, finished)
         unfinished = path_of_part(path)
-        begun = find_episodes(unfinished, plan, channels, judge=judge)
+        begun = find_episodes(unfinished, plan, channels)
         # A process that is killed leaves all episodes in one of the two.
         return LeftOfShard(path, final, None) if len(final) > len(begun) else LeftOfShard(unfinished, begun, None)
 
@@ -129,37 +129,32 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> None:
         shard.adopt({trial: each.run for trial, each in left.episodes.items()})
 
 
-def find_episodes(
-    path: Path, plan: Plan, channels: Channels | None = None, *, judge: Judge = judge_episode
-) -> dict[int, RecoveredEpisode]:
-    """Find the whole episodes of a file, by trial.
-
-    Args:
-        path: The file; if it is missing, it has none.
-        plan: The trials; episodes of others, and of refused ones, are left out.
-        channels: What is recorded; None if the file is only read, and then channels are not compared.
-        judge: Finds the result of an episode of a trial with this configuration.
-    """
+def find_episodes(path: Path, plan: Plan, channels: Channels) -> dict[int, RecoveredEpisode]:
+    """Find the whole episodes of trials of a plan that are not refused in a file, by trial; a missing file has none."""
     episodes: dict[int, RecoveredEpisode] = {}
     trials_to_run = frozenset(plan.trials.numbers_to_run)
     for episode, run in scan_file(path):
         trial = episode.header.trial
-        if trial not in trials_to_run or trial in episodes:
-            continue
-        try:
-            result = judge(plan.config_of(plan.trial(trial)), episode)
-        except DatasetError:
-            continue
-        recorded = channels is None or channels.numbers == tuple(episode.table.columns)
-        if recorded and episode.header.start_ns == plan.config.trial_start_ns(trial):
-            place = place_columns(path.name, run.offset, episode)
-            episodes[trial] = RecoveredEpisode(trial, result, place, run)
+        if trial in trials_to_run and trial not in episodes:
+            with suppress(DatasetError):
+                config = plan.config_of(plan.trial(trial))
+                check_recorded(config, episode, channels)
+                place = place_columns(path.name, run.offset, episode)
+                episodes[trial] = RecoveredEpisode(judge_episode(config, episode), place, run)
     return episodes
 
 
-def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, RecoveredEpisode]) -> FinishedShard | None:
-    """Describe a finished file; None if it is not, byte for byte, what the writer makes of its episodes."""
-    runs = {trial: each.run for trial, each in episodes.items()}
-    with open_mcap(path) as contents:
-        finished, difference = rewrite(contents, channels, runs, name=path.name)
-    return finished if difference is None else None
+def check_recorded(config: Config, episode: Episode, channels: Channels) -> None:
+    """Check that an episode has what is recorded of a trial with this configuration, at the time of this trial."""
+    if (found := tuple(episode.table.columns)) != channels.numbers:
+        raise DatasetError(f"has the channels {list(found)} instead of {list(channels.numbers)}")
+    frames, wanted = Counter[int](), Counter[int]()
+    for chunk in episode.sensors:
+        frames.update({number: count_indexed(index) for number, index in chunk.indexes.items()})
+    for name, topics in channels.sensors.items():
+        stride = config.record.rate_hz // config.sensors[name].rate_hz
+        wanted.update(dict.fromkeys(topics, len(range(0, episode.header.samples, stride))))
+    if frames != wanted:
+        raise DatasetError(f"has {dict(frames)} frames on channels of sensors instead of {dict(wanted)}")
+    if (start_ns := config.trial_start_ns(episode.header.trial)) != episode.header.start_ns:
+        raise DatasetError(f"starts at {episode.header.start_ns} ns, the trial's slot of time at {start_ns} ns")

@@ -1,4 +1,4 @@
-"""Rows of the table of throws that fulfil a condition, and numbers computed from its columns.
+"""Rows of the table of throws that fulfil a condition.
 
 Conditions are written as in Python. Python only parses them, and Arrow evaluates them, so they are never run as code.
 """
@@ -53,21 +53,15 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 
 def find_rows(condition: str, table: pa.Table, argument: str) -> Any:
     """Find the rows that fulfil a condition, as an Arrow mask; null, where a number is missing, is not fulfilled."""
-    mask = compute(condition, table, argument)
-    if not pa.types.is_boolean(mask.type):
-        raise refuse_argument(argument, f"{condition!r} is no condition", expected=_EXAMPLE)
-    return mask
-
-
-def compute(expression: str, table: pa.Table, argument: str) -> Any:
-    """Compute an expression in each row, as an Arrow array; a null stays null in comparisons and arithmetic."""
     try:
         # In parentheses, it may go over several lines.
-        value = _evaluate(ast.parse(f"({expression})", mode="eval").body, table)
+        mask = _evaluate(ast.parse(f"({condition})", mode="eval").body, table)
     except (SyntaxError, ValueError, TypeError, OverflowError, MemoryError, RecursionError, pa.ArrowException) as error:
         reason = str(error).partition("\n")[0]
-        raise refuse_argument(argument, f"{expression!r} cannot be evaluated: {reason}", expected=_EXAMPLE) from error
-    return pa.repeat(value, len(table)) if isinstance(value, pa.Scalar) else value
+        raise refuse_argument(argument, f"{condition!r} cannot be evaluated: {reason}", expected=_EXAMPLE) from error
+    if not pa.types.is_boolean(mask.type):
+        raise refuse_argument(argument, f"{condition!r} is no condition", expected=_EXAMPLE)
+    return pa.repeat(mask, len(table)) if isinstance(mask, pa.Scalar) else mask
 
 
 def _evaluate(node: ast.expr, table: pa.Table) -> Any:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from throwcollect.dataset.bag import BAG_SECTION, FileSummary, bag_information, to_yaml
 from throwcollect.dataset.carried_robot import list_carried
@@ -34,11 +33,8 @@ def write_description(
         recordings: The MCAP files, in their order.
     """
     write_table(directory / THROWS, throws)
-    # A million digests as strings would take 100 MB.
-    digests = (digest for chunk in throws["digest"].chunks for digest in chunk.drop_null().to_pylist())
-    digest = combine_digests(digests, read_targets(throws))
     # The manifest covers metadata.yaml, which is written after it, so the entry is made of these bytes.
-    metadata = metadata_text([summary for summary, _ in recordings], channels, digest).encode()
+    metadata = metadata_text([summary for summary, _ in recordings], channels, compute_digest(throws)).encode()
     entries = [
         entry_of(METADATA, metadata),
         *(
@@ -58,16 +54,17 @@ def metadata_text(files: Sequence[FileSummary], channels: Channels, digest: str)
     return to_yaml({BAG_SECTION: bag_information(files, channels.all, custom)})
 
 
-def combine_digests(digests: Iterable[str], targets: Mapping[str, NDArray[np.float64]]) -> str:
-    """Compute SHA-256 over the digests of all episodes in order of trials, each as 32 bytes; digests are hexadecimal.
+def compute_digest(throws: pa.Table) -> str:
+    """Compute SHA-256 over the digests of all episodes in order of trials, each as 32 bytes.
 
     The targets of all trials follow, if trials have some, as no episode contains them: of each column its name, a zero
     byte, and the number of each trial as a little-endian double, the NaN 0x7ff8000000000000 where it has none.
     """
     combined = hashlib.sha256()
-    for digest in digests:
-        combined.update(bytes.fromhex(digest))
-    for name, values in targets.items():
+    # A million digests as strings would take 100 MB.
+    for chunk in throws["digest"].chunks:
+        combined.update(bytes.fromhex("".join(chunk.drop_null().to_pylist())))
+    for name, values in read_targets(throws).items():
         combined.update(name.encode() + b"\0")
         combined.update(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
     return combined.hexdigest()

@@ -70,11 +70,11 @@ def body_state(row: Row, name: str) -> ObjectState | None:
     It is None if the trial came to no such event, or its task knows none.
     """
     values: list[Any] = [row.get(column.name) for column in _STATE.declare(name, ())]
-    return None if None in values else _STATE.join(values, ())
+    return None if None in values else ObjectState(values[0], tuple(values[1:4]), tuple(values[4:]))
 
 
 class ThrowsTable:
-    """The schema of one collection's table; turns results into rows, and rows into results.
+    """The schema of one collection's table; turns results into rows.
 
     Attributes:
         columns: Columns with their types.
@@ -86,7 +86,6 @@ class ThrowsTable:
         self._parameters = tuple(parameters)
         self._misses = Misses(config, targets)
         task = task_of(config)
-        self._outcomes = task.outcomes
         with explain_failure("tasks", config.task.name, "declare its results"):
             self._columns = task.columns
         self.columns = pa.schema(
@@ -131,20 +130,16 @@ class ThrowsTable:
 
     def join(self, trial: Trial, result: Row, place: Row | None) -> Row:
         """Make the row of a trial as `row` does, from the columns of its result (`ResultColumns.write`)."""
-        row = self._start_row(trial) | result
+        row = self.start_row(trial) | result
         row.update(self._misses.measure(trial.target, row))
         return row | (place or {})
 
     def make_refused_row(self, trial: Trial) -> Row:
         """Make the row of a trial that the plan refused."""
-        return {**self._start_row(trial), "outcome": REFUSED, "reason": trial.refused}
+        return {**self.start_row(trial), "outcome": REFUSED, "reason": trial.refused}
 
-    def result(self, row: Row) -> Result:
-        """Make the result of a trial that was run from its row, as `row` wrote it."""
-        result: Result = self._columns.read(self._outcomes(row["outcome"]), row["reason"], row)
-        return result
-
-    def _start_row(self, trial: Trial) -> Row:
+    def start_row(self, trial: Trial) -> Row:
+        """Make the columns of a row that follow from the plan."""
         values = {column_of(key): trial.values[key] for key in self._parameters}
         return {"trial": trial.number, **values, **trial.target}
 

@@ -5,20 +5,16 @@ What follows from a file that cannot be read is not checked; the manifest still 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
-from throwcollect.config.loader import load
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.scene import FileBodyConfig
-from throwcollect.config.schema import BODIES, MOTIONS, Config
-from throwcollect.dataset.bag import read_bag_metadata, refuse_other_directory
+from throwcollect.config.schema import Config
+from throwcollect.dataset.bag import FileSummary, read_bag_metadata
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -28,15 +24,16 @@ from throwcollect.dataset.directory import (
     PROVENANCE,
     THROWS,
     TRIALS,
-    config_path,
     shard_of,
 )
 from throwcollect.dataset.manifest import FileEntry, Finding, find_changed_files, list_promised_names, read_manifest
-from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.provenance import find_changes
-from throwcollect.dataset.summary_files import combine_digests, metadata_text
-from throwcollect.dataset.throws_table import ThrowsTable, read_throws
-from throwcollect.dataset.verify_recording import RecordingReport, check_recording
+from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.shard import Recording
+from throwcollect.dataset.summary_files import compute_digest, metadata_text
+from throwcollect.dataset.throws_table import ThrowsTable
+from throwcollect.dataset.verify_recording import RecordingCheck
+from throwcollect.episode.channels import Channels
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import read_text
 from throwcollect.plan.digest import trial_digests
@@ -47,12 +44,14 @@ from throwcollect.progress_log import log_progress
 from throwcollect.robots.body_files import files_of
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.robots.description import robot_of
-from throwcollect.side_by_side import working_side_by_side
+from throwcollect.side_by_side import work_side_by_side
 from throwcollect.tasks.motions import motions_of
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
 _MOST_BYTES = 100_000_000
+_Checked = tuple[list[Finding], Recording | None]
+"""What `RecordingCheck` has found."""
 
 
 def verify(directory: Path, *, processes: int = 1) -> list[Finding]:
@@ -72,23 +71,17 @@ def verify(directory: Path, *, processes: int = 1) -> list[Finding]:
     Returns:
         What is wrong, file by file; empty when nothing is.
     """
-    refuse_other_directory(directory)
-    findings, readable = [], True
-    try:
+    if not (directory / METADATA).exists():
+        # This raises the error that explains what the directory is.
         read_bag_metadata(directory)
-    except DatasetError as error:
-        if not (directory / METADATA).exists():
-            raise
-        findings.append(Finding.of(METADATA, error))
-        readable = False
-    tables = _read_tables(directory)
-    with _checking_recordings(directory, tables, processes) as checked:
-        reports = list(checked)
-    findings += find_damage(directory, in_full=True, hashed=[report.entry for report in reports if report.entry])
-    findings += tables.findings
-    findings += [finding for report in reports for finding in report.findings]
-    if readable and tables.throws is not None:
-        findings += _find_metadata_problems(directory, tables.throws, reports)
+    dataset, found = _open(directory)
+    checks = [] if dataset is None else _check_recordings(dataset, processes)
+    recordings = [recording for _, recording in checks if recording is not None]
+    findings = find_damage(directory, in_full=True, hashed=[entry for _, entry in recordings])
+    findings += [*found, *(finding for found, _ in checks for finding in found)]
+    # Other findings report the recordings that are damaged; without them, the totals over all files are not known.
+    if dataset is not None and recordings and not any(found for found, _ in checks):
+        findings += _find_metadata_problems(dataset, [summary for summary, _ in recordings])
     return findings
 
 
@@ -117,100 +110,73 @@ def find_damage(directory: Path, *, in_full: bool, hashed: Collection[FileEntry]
     ]
 
 
-@dataclass
-class _Tables:
-    """The contents of the files next to the recordings, as far as they can be read, and what is wrong with them."""
-
-    config: Config | None = None
-    plan: Plan | None = None
-    throws: pa.Table | None = None
-    findings: list[Finding] = field(default_factory=list)
-
-
-def _read_tables(directory: Path) -> _Tables:
-    tables = _Tables()
-    file = CONFIG
+def _open(directory: Path) -> tuple[Dataset | None, list[Finding]]:
+    """Open a dataset and the files that its configuration names; None and what is wrong if one cannot be read."""
+    findings = []
     try:
-        tables.config = config = load(config_path(directory))
-        file = PLAN
-        tables.plan = plan = Plan.read(directory / PLAN, config)
+        dataset = Dataset.open(directory)
+        config, plan = dataset.config, dataset.plan
         if isinstance(family := config.task.trajectory, MotionFile):
-            file = MOTIONS
             motions_of(family, robot_of(config))
         for body in config.scene.bodies.values():
             if isinstance(body, FileBodyConfig):
-                file = f"{BODIES}/{Path(body.file).name}"
                 files_of(body)
         if config.sweep.file == TRIALS:
-            file = TRIALS
             read_list(directory, plan)
-        for trial, digest in find_wrong_trials(plan).items():
-            problem = f"has digest {plan.trial(trial).digest}, its values and seed give {digest}"
-            tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
-        file = THROWS
-        tables.throws = read_throws(directory, plan)
-        # Exports take units over, while descriptions are for people alone.
-        for column, expected in zip(tables.throws.schema, ThrowsTable.of(plan).schema, strict=True):
-            stated, unit = ((each.metadata or {}).get(b"unit") for each in (column, expected))
-            if stated != unit:
-                tables.findings.append(Finding(THROWS, column.name, f"has the unit {stated!r}, should be {unit!r}"))
     except ForeignPlanError:
         problem = f"is not the configuration that {PLAN} was made for; one of the two was changed"
-        tables.findings.append(Finding(CONFIG, "", problem))
+        return None, [Finding(CONFIG, "", problem)]
     except ConfigError as error:
-        tables.findings += [
-            Finding(file, f"line {each.line}" if each.line else "", ": ".join(filter(None, [each.key, each.message])))
-            for each in error.problems
-        ]
+        for each in error.problems:
+            problem = ": ".join(filter(None, [each.key, each.message]))
+            findings.append(Finding(CONFIG, f"line {each.line}" if each.line else "", problem))
+        return None, findings
     except DatasetError as error:
-        tables.findings.append(Finding.of(file, error))
-    return tables
+        path = error.path or directory / CONFIG
+        name = path.relative_to(directory) if path.is_relative_to(directory) else path
+        return None, [Finding.of(str(name), error)]
+    for trial, digest in find_wrong_trials(plan).items():
+        problem = f"has digest {plan.trial(trial).digest}, its values and seed give {digest}"
+        findings.append(Finding(PLAN, f"trial {trial}", problem))
+    # Exports take units over, while descriptions are for people alone.
+    for column, expected in zip(dataset.throws.schema, ThrowsTable.of(plan).schema, strict=True):
+        stated, unit = ((each.metadata or {}).get(b"unit") for each in (column, expected))
+        if stated != unit:
+            findings.append(Finding(THROWS, column.name, f"has the unit {stated!r}, should be {unit!r}"))
+    return dataset, findings
 
 
-@contextmanager
-def _checking_recordings(directory: Path, tables: _Tables, processes: int) -> Iterator[Iterator[RecordingReport]]:
-    """Start to check the recordings that the plan places trials in, in order; none without plan and table."""
-    if tables.plan is None or tables.throws is None:
-        yield iter(())
-        return
-    plan, pieces, start = tables.plan, list[tuple[str, int, int]](), 0
-    for name, trials in groupby(tables.throws["trial"].to_pylist(), key=lambda trial: shard_of(plan, trial)):
+def _check_recordings(dataset: Dataset, processes: int) -> list[_Checked]:
+    """Check the recordings that the plan places trials in, in order."""
+    pieces, start = list[tuple[str, int, int]](), 0
+    for name, trials in groupby(dataset["trial"].tolist(), key=lambda trial: shard_of(dataset.plan, trial)):
         pieces.append((name, start, count := sum(1 for _ in trials)))
         start += count
-    with working_side_by_side(
-        pieces,
-        _make_check,
-        (directory, plan, tables.throws),
-        processes=processes if start >= _MANY_EPISODES else 1,
-        doing="checks recordings",
-        fork=True,
-    ) as reports:
-        yield log_progress(reports, len(pieces), "recording", "checked")
+    processes = processes if start >= _MANY_EPISODES else 1
+    checks = work_side_by_side(
+        pieces, _make_check, (dataset,), processes=processes, doing="checks recordings", fork=True
+    )
+    return list(log_progress(checks, len(pieces), "recording", "checked"))
 
 
-def _make_check(directory: Path, plan: Plan, throws: pa.Table) -> Callable[[tuple[str, int, int]], RecordingReport]:
+def _make_check(dataset: Dataset) -> Callable[[tuple[str, int, int]], _Checked]:
     """Make the function that checks a recording, given its name, and the first and the number of its rows."""
-    robot = robot_is_available(plan.config)
+    robot = robot_is_available(dataset.config)
 
-    def check_file(piece: tuple[str, int, int]) -> RecordingReport:
+    def check(piece: tuple[str, int, int]) -> _Checked:
         name, first, count = piece
-        rows = throws.slice(first, count).to_pylist()
-        return check_recording(directory / name, plan, {row["trial"]: row for row in rows}, robot=robot)
+        rows = dataset.throws.slice(first, count).to_pylist()
+        found = RecordingCheck(dataset.directory / name, dataset.plan, {row["trial"]: row for row in rows}, robot=robot)
+        return found.findings, found.recording
 
-    return check_file
+    return check
 
 
-def _find_metadata_problems(directory: Path, throws: pa.Table, reports: list[RecordingReport]) -> Iterator[Finding]:
+def _find_metadata_problems(dataset: Dataset, files: Sequence[FileSummary]) -> Iterator[Finding]:
     """Compare the bag's metadata with those that follow from the recordings."""
-    files = [report for report in reports if report.has_file]
-    summaries = [report.summary for report in files if report.summary is not None]
-    channels = next((report.channels for report in files), None)
-    # Other findings report the files that cannot be read; without them, the totals over all files are not known.
-    if channels is None or len(summaries) < len(files):
-        return
-    digests = (report.digests[trial] for report in reports for trial in sorted(report.digests))
-    expected = metadata_text(summaries, channels, combine_digests(digests, read_targets(throws)))
-    there = read_text(directory / METADATA, most_bytes=_MOST_BYTES)
+    channels = Channels(dataset.config, dataset.robot_description() or "")
+    expected = metadata_text(files, channels, compute_digest(dataset.throws))
+    there = read_text(dataset.directory / METADATA, most_bytes=_MOST_BYTES)
     if there != expected:
         lines = zip(there.splitlines(), expected.splitlines(), strict=False)
         number, (line, wanted) = next(

@@ -23,10 +23,10 @@ from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLA
 from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import Judge, LeftOfShard, find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import LeftOfShard, find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.summary_files import write_description
-from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, judge_episode, place_columns
+from throwcollect.dataset.throws_table import Row, ThrowsTable, count_outcomes, place_columns
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
@@ -97,14 +97,13 @@ class DatasetWriter:
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, keep: Keep = lambda *_: True, *, judge: Judge = judge_episode, processes: int = 1) -> int:
+    def recover(self, keep: Keep = lambda *_: True, *, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
         A finished dataset then counts as unfinished, even if all its trials have ended; `finish` writes the same files.
 
         Args:
             keep: Called for each trial that has an episode, in order of trials; what it does not keep is removed.
-            judge: Finds the result of an episode.
             processes: How many processes may look through the recordings of a large dataset, as for `find_left`.
 
         Returns:
@@ -116,21 +115,22 @@ class DatasetWriter:
             remove(self._directory / name)
         count = 0
         # Every process gets the trials of the shards that it looks through, and not a whole plan.
-        paths = {number: self._make_path(number) for number in sorted(self._unfinished)}
+        paths = {each: self._directory / shard_name(self._config.name, each) for each in sorted(self._unfinished)}
         begun = {number: path for number, path in paths.items() if path.exists() or path_of_part(path).exists()}
         first = self.plan.trials.first
         parts = [
             (path, Plan(self._config, self.plan.trials[members.start - first : members.stop - first]))
             for path, members in zip(begun.values(), map(self._list_members, begun), strict=True)
         ]
-        all_left = find_left(parts, self._channels, judge=judge, processes=processes)
+        all_left = find_left(parts, self._channels, processes=processes)
         for number, found in zip(begun, all_left, strict=True):
             kept = {trial: each for trial, each in sorted(found.episodes.items()) if keep(trial, each.result)}
             left = found if len(kept) == len(found.episodes) else LeftOfShard(found.path, kept, None)
             shard = self._get_shard(number)
             recover_shard(shard, left)
             for trial, each in left.episodes.items():
-                shard.rows[trial] = self._make_row(trial, each.result, {**each.place, "shard": shard.path.name})
+                place = {**each.place, "shard": shard.path.name}
+                shard.rows[trial] = self._table.row(self.plan.trial(trial), each.result, place)
             count += len(left.episodes)
             if left.finished is not None:
                 self._close_shard(number, left.finished)
@@ -186,7 +186,7 @@ class DatasetWriter:
         number = self._find_waiting_shard(trial)
         shard = self._get_shard(number)
         shard.missing.remove(trial)
-        shard.rows[trial] = self._make_row(trial, task_of(self._config).lose(reason), None)
+        shard.rows[trial] = self._table.row(self.plan.trial(trial), task_of(self._config).lose(reason), None)
         self.note("lost", trial=trial, reason=reason)
         self._finish_shard_if_complete(number)
 
@@ -261,19 +261,12 @@ class DatasetWriter:
         """List the trials of a shard that are not refused."""
         return (each for each in self._list_members(number) if each not in self.plan.trials.refused)
 
-    def _make_path(self, number: int) -> Path:
-        """Make the path of a shard once it is finished."""
-        return self._directory / shard_name(self._config.name, number)
-
     def _get_shard(self, number: int) -> OpenShard:
         """Return an unfinished shard, which takes memory only once it has been asked for."""
         if number not in self._shards:
-            self._shards[number] = OpenShard(self._make_path(number), self._channels)
+            self._shards[number] = OpenShard(self._directory / shard_name(self._config.name, number), self._channels)
             self._shards[number].missing.update(self._list_to_run(number))
         return self._shards[number]
-
-    def _make_row(self, trial: int, result: Result, place: Row | None) -> Row:
-        return self._table.row(self.plan.trial(trial), result, place)
 
     def _find_waiting_shard(self, trial: int) -> int:
         shard = self._number_of(trial)

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 
 from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.dataset.carried_robot import copy_carried
-from throwcollect.dataset.directory import has_files
+from throwcollect.dataset.directory import is_begun
 from throwcollect.errors import ConfigError, DatasetError, check_bounds, read_word, refuse_argument
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
@@ -289,7 +289,7 @@ def load_model(directory: StrPath) -> Model:
         if not isinstance(error.__cause__, FileNotFoundError):
             raise
         # Users easily give a dataset in place of its model, so the hint makes a model of it.
-        dataset = directory if has_files(directory) else "DATASET"
+        dataset = directory if is_begun(directory) else "DATASET"
         hint = command("fit", dataset, "-o", "MODEL")
         problem = f"holds no model: there is no {MODEL}{suggest_path(directory)}"
         raise DatasetError(problem, path=directory, hint=hint) from error

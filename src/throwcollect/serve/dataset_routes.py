@@ -17,7 +17,7 @@ from starlette.background import BackgroundTask
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.dataset.directory import CARD, MANIFEST, PROVENANCE
-from throwcollect.dataset.manifest import FileEntry, read_manifest, size_of_file
+from throwcollect.dataset.manifest import FileEntry, read_manifest
 from throwcollect.errors import ConflictError, NotFoundError
 from throwcollect.files import check_regular, open_regular
 from throwcollect.serve.instances import Instances
@@ -54,7 +54,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
         directory = _find_finished(instances, instance)
         for path in _list_names(directory):
             # Check every file first: once the first bytes are sent, the answer cannot become an error any more.
-            size_of_file(directory / path)
+            _find_file(directory, path)
         name = f'attachment; filename="{instance}.tar"'
         return StreamingResponse(
             _archive(directory, instance), media_type="application/x-tar", headers={"Content-Disposition": name}

@@ -79,7 +79,7 @@ AnyResult = TypeVar("AnyResult", bound=Result)
 
 
 class ResultColumns(Generic[AnyResult]):
-    """Writes the results of a task into the columns of a table, and reads them from there.
+    """Writes the results of a task into the columns of a table.
 
     Attributes:
         columns: First the columns of the measures that the task adds, then the columns that all tasks have.
@@ -94,7 +94,6 @@ class ResultColumns(Generic[AnyResult]):
         acted_on: str = BALL,
         sliding: Collection[str] = (),
     ) -> None:
-        self._results = results
         self._joints = tuple(joints)
         self._fields: list[tuple[str, Columns, list[str]]] = []
         self.columns: tuple[Column, ...] = ()
@@ -137,11 +136,3 @@ class ResultColumns(Generic[AnyResult]):
             return {name: values[name] for name in names}
         except (ValueError, LookupError, TypeError) as error:
             raise DatasetError(f"result of a trial: {error}") from error
-
-    def read(self, outcome: Outcome, reason: str | None, row: Mapping[str, Any]) -> AnyResult:
-        """Make the result whose values stand in a row of the table, by column."""
-        measures = {}
-        for name, columns, names in self._fields:
-            values = [row[column] for column in names]
-            measures[name] = None if None in values else columns.join(values, self._joints)
-        return self._results(outcome, reason, **measures)

@@ -76,16 +76,14 @@ class Columns:
         columns: The columns, in whose names and descriptions ``{field}`` stands for the name of the field; those with
             ``{joint}`` are there for each joint that the task moves.
         split: Splits a value of the field, which is not None, into one value for each column, given the joints.
-        join: Makes a value of the field from the columns' values, none of which is null, given the joints.
     """
 
     def __init__(
         self,
         *columns: Column,
         split: Callable[[Any, Sequence[str]], Sequence[object]] = lambda value, _: (value,),
-        join: Callable[[Sequence[Any], Sequence[str]], Any] = lambda values, _: values[0],
     ) -> None:
-        self._columns, self.split, self.join = columns, split, join
+        self._columns, self.split = columns, split
 
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
         """List the columns of the field `name`, for the joints that the task moves."""
@@ -117,7 +115,6 @@ class BodyColumns(Columns):
             *(Column(f"{{field}}_{axis}_m", "number", f"{place}, {axis} [m].") for axis in "xyz"),
             *(Column(f"{{field}}_v{axis}_mps", "number", f"{speed}, {axis} [m/s].") for axis in "xyz"),
             split=lambda state, _: (state.time_s, *state.position, *state.velocity),
-            join=lambda values, _: ObjectState(values[0], (*values[1:4],), (*values[4:],)),
         )
 
 
@@ -127,7 +124,7 @@ class SpinColumns(Columns):
     def __init__(self, when: str) -> None:
         spin = f"Angular velocity of the {{object}} in world {when}"
         columns = (Column(f"{{field}}_{axis}_radps", "number", f"{spin}, {axis} [rad/s].") for axis in "xyz")
-        super().__init__(*columns, split=lambda spin, _: spin, join=lambda values, _: tuple(values))
+        super().__init__(*columns, split=lambda spin, _: spin)
 
 
 class PeakColumns(Columns):
@@ -140,7 +137,6 @@ class PeakColumns(Columns):
             share,
             joint,
             split=lambda peak, _: (peak.share, peak.joint),
-            join=lambda values, _: Peak(values[1], values[0]),
         )
 
 
@@ -154,7 +150,6 @@ class JointColumns(Columns):
         super().__init__(
             Column("{joint}_{field}", "number", description),
             split=lambda value, joints: [value[joint] for joint in joints],
-            join=lambda values, joints: dict(zip(joints, values, strict=True)),
         )
 
 

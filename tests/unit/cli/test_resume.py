@@ -11,7 +11,7 @@ from tests.unit.dataset.conftest import Collection
 
 WITHOUT = """
 import sys
-sys.modules |= dict.fromkeys(("pinocchio", "pybullet", "mujoco", "example_robot_data", "zenoh", "scipy"))
+sys.modules |= dict.fromkeys(("pybullet", "mujoco", "zenoh"))
 from throwcollect.cli.main import main
 main()
 """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
@@ -19,7 +18,7 @@ from throwcollect.side_by_side import work_side_by_side
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
 from .conftest import Collection
-from .kills import KilledAt, KilledEverywhere
+from .kills import KilledEverywhere
 from .mutations import Mutation, any_mutation, mutate
 
 TRIALS = 4
@@ -149,39 +148,6 @@ def test_recovery_by_several_processes_keeps_the_same_episodes(
     assert asked == [2]
     assert there == {trial: trials.results[trial] for trial in [0, 1, 3]}
     assert trials.go_on(directory) == {0, 1, 3}
-    assert files_of(directory) == expected
-
-
-@settings(
-    max_examples=8,
-    deadline=None,
-    derandomize=True,
-    phases=[Phase.generate],
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
-@given(data=st.data())
-def test_resuming_after_any_crashes_and_power_cuts_gives_the_same_files(
-    data: st.DataObject, trials: Trials, expected: dict[str, bytes], tmp_path: Path
-) -> None:
-    """Power cuts leave files of any length; a resumed collection may be interrupted too."""
-    directory = tmp_path / "dataset"
-    shutil.rmtree(directory, ignore_errors=True)
-    create(directory, trials.plan)
-    for _ in range(data.draw(st.integers(1, 3), label="interruptions")):
-        writer = DatasetWriter.open(directory)
-        there: dict[int, ThrowResult] = {}
-        order = data.draw(st.permutations(range(TRIALS)), label="order")
-        with KilledAt(data.draw(st.integers(0, 80), label="killed at call")):
-            writer.recover(keep_in(there))
-            for trial in order:
-                if trial not in there:
-                    trials.append(writer, trial)
-            writer.finish()
-        abandon(writer)
-        shards = sorted(directory.glob("*.mcap*"))
-        for path in data.draw(st.lists(st.sampled_from(shards), unique=True) if shards else st.just([]), label="cut"):
-            os.truncate(path, data.draw(st.integers(0, path.stat().st_size), label="to"))
-    trials.go_on(directory)
     assert files_of(directory) == expected
 
 

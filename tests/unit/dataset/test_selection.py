@@ -1,7 +1,7 @@
 import pyarrow as pa
 import pytest
 
-from throwcollect.dataset.selection import compute, find_rows
+from throwcollect.dataset.selection import find_rows
 from throwcollect.errors import ConfigError
 
 TABLE = pa.table(
@@ -43,8 +43,7 @@ def test_an_expression_computes_with_real_numbers() -> None:
     assert rows("trial // 2 == 1") == [2, 3]
     assert rows("trial / 2 == 1.5") == [3]
     assert rows("1 / trial > 100") == [0]
-    assert compute("landing_x_m - 2 * landing_y_m", TABLE, "cells").to_pylist() == [1.0, 5.0, -5.0, None]
-    assert compute("2", TABLE, "cells").to_pylist() == [2.0] * 4
+    assert rows("landing_x_m - 2 * landing_y_m == 5") == [1]
 
 
 def test_a_null_value_fulfils_only_comparisons_with_none() -> None:

@@ -193,7 +193,7 @@ def spoil_effort(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Epis
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        (kick_ball, "departs from ballistic motion by"),
+        (kick_ball, "its flight departs from ballistic motion by"),
         (late, "the trial's slot of time"),
         (spoil_effort, "effort holds numbers that are not finite, first in sample 40"),
     ],

@@ -10,7 +10,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TaskConfig, is_target
 from throwcollect.members import load_member, load_part, names_of
 from throwcollect.robots.description import robot_of
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED
 from throwcollect.tasks.starter import begin_at_default
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import unit_of_name
@@ -74,14 +74,6 @@ def test_targets_of_a_task_belong_to_measured_or_given_columns(section: type[Tas
         assert each.miss not in measured
     assert not any(map(is_target, measured))
     assert section.target_columns == () or any(each.required for each in section.target_columns)
-
-
-@of_every_task
-def test_results_of_a_task_can_be_read_back_from_their_columns(section: type[TaskConfig]) -> None:
-    task = make_task(section)
-    lost = task.lose("nobody did it")
-    assert isinstance(lost, Result)
-    assert task.columns.read(lost.outcome, lost.reason, task.columns.write(lost)) == lost
 
 
 @of_every_task

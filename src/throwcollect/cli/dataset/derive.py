@@ -55,56 +55,33 @@ def sample(
 
 
 def split(
-    directory: DatasetArgument,
-    output: OutputArgument,
-    *,
-    fractions: str,
-    cells: list[str] | None = None,
-    seed: int = 0,
-    json: JsonOption = False,
+    directory: DatasetArgument, output: OutputArgument, *, fractions: str, seed: int = 0, json: JsonOption = False
 ) -> None:
-    """Split a dataset so that throws to the same place, by default a square of 5 cm, go to the same part.
+    """Split a dataset so that throws to the same square of 5 cm go to the same part.
 
     Options:
         fractions (NAME=SHARE,...): Such as: train=0.8,test=0.2
-        cells (EXPRESSION=WIDTH): Axis of the cells that stay whole; may be repeated.
         seed (S 0..): Seed of the choice.
     """
-    from throwcollect.dataset.derive.split import SQUARES
     from throwcollect.dataset.derive.split import split as split_dataset
 
-    found = split_dataset(directory, output, fractions=fractions, cells=cells or SQUARES, seed=seed)
-    # Each trial with an episode is in one part, so shares are shares of these.
-    whole = format_count(sum(part.dataset.trials for part in found.parts.values()), "trial")
-    if found.without_episode:
-        whole += " that have an episode,"
-    lines = []
-    for name, part in found.parts.items():
-        elsewhere = f", {part.uncelled} in no cell" if part.uncelled else ""
-        places = format_count(part.cells, "cell") + elsewhere
-        lines.append(f"{output / name}: {part.dataset.trials} of {whole} in {places}")
-        lines.append(f"  digest  {part.dataset.digest}")
-    show(found, *lines, *_list_left_out(found.without_episode), json=json)
+    parts = split_dataset(directory, output, fractions=fractions, seed=seed)
+    lines = (line for name, part in parts.items() for line in _describe(output / name, part))
+    show({name: {"directory": output / name, **vars(part)} for name, part in parts.items()}, *lines, json=json)
 
 
 def render_sensors(
-    directory: DatasetArgument,
-    output: OutputArgument,
-    *,
-    sensors: Path,
-    where: str | None = None,
-    json: JsonOption = False,
+    directory: DatasetArgument, output: OutputArgument, *, sensors: Path, json: JsonOption = False
 ) -> None:
     """Copy a dataset, and let other cameras and lidars see its throws.
 
     Options:
         sensors (FILE): YAML file with the section sensors of a configuration.
-        where (CONDITION): Take only trials that fulfil it, such as: landing_x_m > 1.5
     """
     from throwcollect.config.loader import load_sensors
     from throwcollect.dataset.derive.derivation import render_sensors as render
 
-    derived = render(directory, output, load_sensors(sensors), where=where)
+    derived = render(directory, output, load_sensors(sensors))
     _show(output, derived, json=json)
 
 
@@ -117,14 +94,13 @@ def stats(directory: DatasetArgument, *, json: JsonOption = False) -> None:
 
 
 def _show(output: Path, derived: Derived, *, json: bool) -> None:
-    counts = f"{derived.trials} of {format_count(derived.offered, 'trial')}"
-    lines = [f"{output}: {counts}", f"  digest  {derived.digest}", *_list_left_out(derived.without_episode)]
-    show({"directory": output, **vars(derived)}, *lines, json=json)
+    counts = ", ".join(f"{count} {outcome}" for outcome, count in derived.without_episode.items())
+    left_out = [f"left out, as they have no episode: {counts}"] if counts else []
+    show({"directory": output, **vars(derived)}, *_describe(output, derived), *left_out, json=json)
 
 
-def _list_left_out(without_episode: Mapping[str, int]) -> list[str]:
-    counts = ", ".join(f"{count} {outcome}" for outcome, count in without_episode.items())
-    return [f"left out, as they have no episode: {counts}"] if counts else []
+def _describe(output: Path, derived: Derived) -> list[str]:
+    return [f"{output}: {format_count(derived.trials, 'trial')}", f"  digest  {derived.digest}"]
 
 
 def _make_tables(found: Statistics) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""`throwcollect dataset info`, `verify`, `digest` and `replay`, and the summary with which a collection ends."""
+"""`throwcollect dataset info`, `verify` and `replay`, and the summary with which a collection ends."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
-from throwcollect.cli.printing import print_progress, show
+from throwcollect.cli.printing import show
 from throwcollect.cli.streams import ensure_written
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError, install_command, require, require_engine
@@ -24,22 +24,10 @@ if TYPE_CHECKING:
 
 def info(directory: DatasetArgument, *, json: JsonOption = False) -> None:
     """Print what a dataset holds."""
-    from throwcollect.dataset.inspect import check_recordings_are_there, summary
-    from throwcollect.dataset.reader import Dataset
+    from throwcollect.dataset.inspect import info as summarise
 
-    dataset = Dataset.open(directory)
-    found = summary(dataset)
+    found = summarise(directory)
     show(found, describe(found), json=json)
-    # The summary needs only the tables, so it is printed even if recordings are missing.
-    check_recordings_are_there(dataset)
-
-
-def digest(directory: DatasetArgument) -> None:
-    """Print the digest of all episodes in trial order."""
-    from throwcollect.dataset.inspect import digest as compute_digest
-
-    print_progress()
-    typer.echo(compute_digest(directory))
 
 
 def verify(
@@ -92,7 +80,6 @@ def replay(
     *,
     trials: list[int] | None = None,
     everything: bool = False,
-    sample: int | None = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate stored throws again and compare them bit for bit; exit code 4 if any differs.
@@ -100,15 +87,12 @@ def replay(
     Options:
         trials (--trial K): Number of a trial; may be repeated.
         everything (--all): All trials.
-        sample (N 1..): With --all: N of them, chosen at random.
     """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.replay import replay_throws, select_trials
 
     if bool(trials) == everything:
         raise ConfigError("which throws?", expected="either --trial K, which may be repeated, or --all")
-    if sample is not None and not everything:
-        raise ConfigError("--sample: should be given with --all")
     dataset = Dataset.open(directory)
     known = dataset.throws["trial"].to_pylist()
     for trial in trials or ():
@@ -116,7 +100,7 @@ def replay(
             raise ConfigError(f"{directory}: no trial {trial}", expected=f"trials from {known[0]} to {known[-1]}")
         # A trial without an episode is refused here, before any throw is simulated.
         dataset.episode(trial)
-    chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
+    chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset)
     comparisons = list(replay_throws(directory, chosen))
     wrong = [f"trial {each.trial}: {'; '.join(each.differences)}" for each in comparisons if each.differences]
     throws = format_count(len(comparisons), "throw")

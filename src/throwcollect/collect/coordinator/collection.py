@@ -72,7 +72,6 @@ class TrialCollection:
         self._agreed: set[str] = set()
         """Simulations that have handed over an episode whose motion was compared with that of the plan."""
         self._backlog: deque[tuple[Episode, Row]] = deque()
-        self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
         self._rate = TrialRate()
         self._draining = False
@@ -222,7 +221,6 @@ class TrialCollection:
         self._agreed.add(simulation)
         self._prefetch.end(simulation)
         self._leases.complete(simulation, trial)
-        self._warn_of_set_aside()
         self._backlog.append((episode, result))
         return True
 
@@ -297,7 +295,6 @@ class TrialCollection:
             wanted=self._config.until.wanted if self._config.until else None,
             success=self._config.task.success,
             noun=self._config.task.noun,
-            set_aside={self.name_of(simulation): reason for simulation, reason in self._set_aside.items()},
         )
 
     def finish(self, *, meanwhile: Callable[[], None], say: Callable[[str], object]) -> None:
@@ -341,12 +338,6 @@ class TrialCollection:
         if simulation not in self._agreed:
             motion = trajectory_of(plan.config_of(trial)).digest
         return self._settings.conditions_of(trial.values, motion)
-
-    def _warn_of_set_aside(self) -> None:
-        aside = self._leases.set_aside
-        for simulation in aside.keys() - self._set_aside.keys():
-            self.warn(f"{simulation}: gets no more trials, because {aside[simulation]}")
-        self._set_aside = aside
 
     def _give_back(self, simulation: str, trial: int, reason: str, given_up: list[str] | None) -> None:
         """Report a trial that is tried again, by another simulation if there is one, or record it as lost."""

@@ -33,8 +33,7 @@ class Leases:
     because a trial yields the same wherever it is done.
 
     Some trials are refused by every simulation, and some simulations refuse every trial. So a simulation that refuses
-    trials is doubted at first: others get the trials. It is set aside for good when other simulations could do several
-    of the trials that it refused.
+    several trials in a row is doubted: as long as there are others, these get the trials.
 
     Args:
         trials: Numbers of the trials to do.
@@ -60,8 +59,6 @@ class Leases:
         """Trials that simulations held which are out of sight, and may come back alive."""
         self._refusals: dict[str, list[tuple[int, str]]] = {}
         """Trials that a simulation has refused since it could do one, with the reasons."""
-        self._wrong_refusals: dict[str, int] = {}
-        """Number of trials that each simulation has refused and another one could do."""
         self.total = 0
         self.ended = 0
         self._completed = 0
@@ -76,17 +73,6 @@ class Leases:
     def waiting(self) -> int:
         """Number of trials that no simulation holds, and that are to be done."""
         return self._waiting_fresh + len(self._returned)
-
-    @property
-    def set_aside(self) -> dict[str, str]:
-        """Why simulations get no more trials, by their addresses."""
-        return {name: why for name in self._wrong_refusals if (why := self.why_set_aside(name)) is not None}
-
-    def why_set_aside(self, simulation: str) -> str | None:
-        """Explain why a simulation gets no more trials; None if it gets more."""
-        if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
-            return None
-        return f"it refused trials that other simulations could do: {self._refusals[simulation][-1][1]}"
 
     def explain_hopelessness(self, simulations: Collection[str]) -> str | None:
         """Explain why none of these simulations will ever do a trial: none ever did, and all refuse. Else None."""
@@ -117,7 +103,7 @@ class Leases:
         rivals: list[str] = []
         if self._returned or self._refusals:
             rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
-        if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
+        if rivals and self._is_doubted(simulation):
             return None
         trial = next((trial for trial in sorted(self._returned) if self._may_try(simulation, trial, rivals)), None)
         if trial is not None:
@@ -147,10 +133,6 @@ class Leases:
             self._take_fresh(trial)
         self._end(trial)
         self._refusals.pop(simulation, None)
-        self._wrong_refusals.pop(simulation, None)
-        for other, refused in self._refusals.items():
-            wrong = sum(number == trial for number, _ in refused)
-            self._wrong_refusals[other] = self._wrong_refusals.get(other, 0) + wrong
         self._completed += 1
 
     def fail(
@@ -209,7 +191,6 @@ class Leases:
     def forget(self, simulation: str) -> None:
         """Forget the refusals of a simulation that is gone; a later one of the same name is a different one."""
         self._refusals.pop(simulation, None)
-        self._wrong_refusals.pop(simulation, None)
 
     def _is_doubted(self, simulation: str) -> bool:
         return len(self._refusals.get(simulation, ())) >= _MOST_IN_A_ROW

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 from throwcollect.collect.coordinator.reporter import SILENT, Reporter
@@ -55,16 +54,6 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, reporter: 
         reporter: Receives how many trials of a large plan have been checked, and warnings of limits that may be wrong.
     """
     points = draw_points(config, directory=directory)
-    return _check_trials(config, points, processes=processes, reporter=reporter)
-
-
-def count_first(config: Config, trials: int) -> int:
-    """Count the trials, of all trials of a plan, that the dataset has in any case, and that are checked beforehand."""
-    return trials if config.until is None else min(trials, config.until.wanted)
-
-
-def _check_trials(config: Config, points: Points, *, processes: int, reporter: Reporter) -> Plan:
-    """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     for sentence in find_placeholders(robot_of(config)):
         reporter.warn(f"warning: {sentence}")
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
@@ -75,9 +64,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, reporter: R
     refuse_many_files(config, len(points.values))
     count = count_first(config, len(points.values))
     size = max(_TRIALS_A_PIECE, min(_MOST_A_PIECE, count // 10))
-    # The first pieces are small, so that progress can be reported soon.
-    firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
-    pieces = [points[first:stop] for first, stop in pairwise([*firsts, count])]
+    pieces = [points[first : min(first + size, count)] for first in range(0, count, size)]
     processes = processes if count >= _MANY_TRIALS else 1
     say_at = time.monotonic() + _REPORT_FIRST_S
     reporter.update_plan(0, count)
@@ -94,6 +81,11 @@ def _check_trials(config: Config, points: Points, *, processes: int, reporter: R
         check_some_left(reasons)
     refused = {number: reason for number, reason in enumerate(reasons) if reason is not None}
     return Plan(config, replace(make_trials(config, points), refused=refused))
+
+
+def count_first(config: Config, trials: int) -> int:
+    """Count the trials, of all trials of a plan, that the dataset has in any case, and that are checked beforehand."""
+    return trials if config.until is None else min(trials, config.until.wanted)
 
 
 def _make_checks(config: Config) -> Callable[[Points], list[str | None]]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -28,7 +27,6 @@ class Progress:
         throws_per_s: Trials that ended per second of the last ten seconds.
         hung: Names of the simulations that took too long for a trial and have not been heard of since.
         wanted: Number of trials that are to succeed; None if the collection ends with its plan.
-        set_aside: Why simulations get no more trials, by their names.
         success: Outcome of trials that succeeded.
         noun: Word for a trial.
     """
@@ -40,7 +38,6 @@ class Progress:
     throws_per_s: float
     hung: list[str]
     wanted: int | None = None
-    set_aside: Mapping[str, str] = field(default_factory=dict)
     success: str = "landed"
     noun: str = "throw"
 

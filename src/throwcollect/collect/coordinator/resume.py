@@ -19,23 +19,18 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.dataset.carried_robot import carry_robot, config_text, find_files, write_config
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS, config_path
+from throwcollect.dataset.directory import METADATA, PLAN, SOURCES, THROWS, TRIALS, config_path, is_begun
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_begun
-from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.throws_table import ThrowsTable, find_row, judge_episode, read_throws, read_throws_table
+from throwcollect.dataset.throws_table import read_throws, read_throws_table
 from throwcollect.dataset.verify import find_damage, find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.channels import Channels
-from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem
 from throwcollect.files import check_regular, remove, write_file
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.point_file import encode_points
 from throwcollect.plan.trials import Points
-from throwcollect.robots.description import is_available
 from throwcollect.tasks.result import LOST, REFUSED, Result
 from throwcollect.wording import command
 
@@ -225,10 +220,8 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
 
 def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials may replace an earlier one; None stands for no limit."""
-    if config.until is None:
-        # `_extend` compares the trials.
-        return True
-    return after is None or (before is not None and after >= before)
+    # Without `until`, `_extend` compares the trials.
+    return config.until is None or after is None or (before is not None and after >= before)
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
@@ -259,22 +252,15 @@ def finish_without_simulating(
 ) -> None:
     """Finish a dataset with the episodes that are whole, and give all other trials up as lost; else as `resume`.
 
-    An episode that the table of throws has keeps its result there, so neither the robot nor an engine is needed. A
-    finished dataset of which nothing is missing or damaged stays as it is.
+    A finished dataset of which nothing is missing or damaged stays as it is.
     """
     plan = resume(config, directory, sweep_directory=sweep_directory, reporter=reporter)
     if (directory / METADATA).exists():
         reporter.say(f"{directory}: is finished, and no file of it is missing or damaged")
         return
-    table, provenance = ThrowsTable.of(plan), read_provenance(directory)
-    throws = table.table([])
+    provenance, rows = read_provenance(directory), {}
     with suppress(DatasetError):
-        throws = read_throws_table(directory / THROWS, plan)
-
-    def judge(config: Config, episode: Episode) -> Result:
-        row = find_row(throws, episode.header.trial)
-        return table.result(row) if row and row["digest"] == episode.digest else judge_episode(config, episode)
-
+        rows = {row["trial"]: row for row in read_throws_table(directory / THROWS, plan).to_pylist()}
     there: list[int] = []
     wanted = math.inf if plan.config.until is None else plan.config.until.wanted
 
@@ -287,25 +273,16 @@ def finish_without_simulating(
         wanted -= result.outcome.value == plan.config.task.success
         return True
 
-    with closing(DatasetWriter.open(directory, channels=_read_channels(directory, plan))) as writer:
-        writer.recover(keep, judge=judge)
+    with closing(DatasetWriter.open(directory)) as writer:
+        writer.recover(keep)
+        known = {trial: row["reason"] for trial, row in rows.items() if row["outcome"] in (LOST, REFUSED)}
         if plan.config.until is not None:
             # Where the dataset ends without the missing trials is not known, so it ends with the last known one.
-            known = [] if wanted <= 0 else throws["trial"].drop_null().to_pylist()
-            last = max([*there, *known], default=plan.trials.first)
+            last = max([*there, *(rows if wanted > 0 else ())], default=plan.trials.first)
             for trial in writer.list_missing():
-                if (row := find_row(throws, trial)) and row["outcome"] == REFUSED:
-                    writer.refuse(trial, row["reason"])
+                if trial in known and rows[trial]["outcome"] == REFUSED:
+                    writer.refuse(trial, known[trial])
             writer.end_with(last)
         for trial in writer.list_missing():
-            row = find_row(throws, trial)
-            writer.append_lost(trial, row["reason"] if row and row["outcome"] == LOST else _NO_EPISODE)
+            writer.append_lost(trial, known.get(trial, _NO_EPISODE))
         writer.finish(provenance=provenance)
-
-
-def _read_channels(directory: Path, plan: Plan) -> Channels | None:
-    """Read what is recorded where the robot is not installed, from the first recording that describes it; else None."""
-    for path in sorted(directory.glob(f"*{SHARD_SUFFIX}*")) if not is_available(plan.config) else ():
-        with suppress(DatasetError), open_mcap(path) as contents:
-            return Channels(plan.config, contents.read_robot_description())
-    return None

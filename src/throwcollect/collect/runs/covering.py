@@ -12,8 +12,7 @@ from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import SweepConfig
 from throwcollect.dataset.carried_robot import carry_robot, config_text
-from throwcollect.dataset.directory import ROBOT
-from throwcollect.dataset.manifest import is_begun
+from throwcollect.dataset.directory import ROBOT, is_begun
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file

@@ -75,7 +75,6 @@ class NodeCollection:
         self._host = host
         self._session = session
         self._simulations = self._wanted = host.context.simulations
-        self._set_aside: set[str] = set()
         self._apart_since = math.inf
         self._started_again = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
@@ -140,9 +139,6 @@ class NodeCollection:
         self._session.update(progress)
         self._check_that_nodes_meet(progress)
         self._supervisor.replace(progress.hung)
-        for name in progress.set_aside.keys() - self._set_aside:
-            self._set_aside.add(name)
-            self._session.warn(f"{name} gets no more trials, because {progress.set_aside[name]}")
 
     def _check_that_nodes_meet(self, progress: Progress) -> None:
         """Start all nodes again if they do not see each other, which at times happens on DDS."""

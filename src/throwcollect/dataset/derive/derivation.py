@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -50,44 +49,32 @@ class Derived:
 
     Attributes:
         trials: Number of its trials, each of which has an episode.
-        offered: Number of trials of its sources.
         without_episode: Number of trials that were asked for but have no episode, by outcome; they are left out.
         digest: Its digest.
     """
 
     trials: int
-    offered: int
     without_episode: Mapping[str, int]
     digest: str
 
 
-class Copy(NamedTuple):
-    """A trial of the new dataset: its number there, the place of its source among all sources, and its number there."""
-
-    number: int
-    source: int
-    trial: int
+Copy = tuple[int, int, int]
+"""A trial of the new dataset: its number there, the place of its source among all sources, and its number there."""
 
 
-def derive(sources: Sequence[Dataset], output: Path, *, offered: int, sensors: SensorSections | None = None) -> Derived:
+def derive(sources: Sequence[Dataset], output: Path, *, sensors: SensorSections | None = None) -> Derived:
     """Make the dataset that consists of copies of the throws of some others, at least one, that have an episode.
 
     Args:
         sources: Those throws of each source that are wanted.
         output: Directory of the new dataset, new or empty; nothing is left there after an error.
-        offered: Number of all trials of the sources.
         sensors: Sections of sensors that see the throws in place of those that were recorded; None for these.
     """
     with new_directory(output) as directory:
         copied, digest = _write(sources, directory, sensors)
-    without = sum((Counter(count_without_episode(source)) for source in sources), Counter[str]())
-    return Derived(copied, offered, dict(sorted(without.items())), digest)
-
-
-def count_without_episode(dataset: Dataset) -> dict[str, int]:
-    """Count the throws that have no episode, by outcome."""
-    throws = dataset.throws
-    return dict(sorted(Counter(throws.filter(throws["shard"].is_null())["outcome"].to_pylist()).items()))
+    left_out = (source.throws.filter(source.throws["shard"].is_null()) for source in sources)
+    without = Counter(outcome for throws in left_out for outcome in throws["outcome"].to_pylist())
+    return Derived(copied, dict(sorted(without.items())), digest)
 
 
 def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections | None) -> tuple[int, str]:
@@ -105,7 +92,7 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
             "the datasets have different sensors", hint=f"{command('dataset', 'render-sensors')} makes them alike"
         )
     copies = sorted(
-        Copy(first + trial, number, trial)
+        (first + trial, number, trial)
         for number, (source, first) in enumerate(zip(sources, firsts, strict=True))
         for trial in source.recorded.throws["trial"].to_pylist()
     )
@@ -115,9 +102,9 @@ def _write(sources: Sequence[Dataset], directory: Path, sensors: SensorSections 
     carry_robot(placed, directory)
     table = ThrowsTable.of(plan)
     tables, recordings = [], []
-    numbers = (copy.number for copy in log_progress(copies, len(copies), "trial", "written"))
-    taken = [sources[copy.source].throw(copy.trial) for copy in copies]
-    configs = map(replace(plan, config=placed).config_of, (plan.trial(copy.number) for copy in copies))
+    numbers = (number for number, *_ in log_progress(copies, len(copies), "trial", "written"))
+    taken = [sources[source].throw(trial) for _, source, trial in copies]
+    configs = map(replace(plan, config=placed).config_of, (plan.trial(number) for number, *_ in copies))
     # Episodes are read in order, one after the other, as they are written; pictures are rendered by all cores.
     episodes = work_side_by_side(
         [*zip(taken, configs, strict=True)],
@@ -162,7 +149,7 @@ def _check_copies(copies: Sequence[Copy], plan: Plan) -> None:
     """Refuse a dataset without a trial, and one that would have a trial twice, whatever its numbers in the sources."""
     if not copies:
         raise ConfigError("no trial with an episode is left", expected="at least one")
-    different = {plan.trials.digests[copy.number].tobytes() for copy in copies}
+    different = {plan.trials.digests[number].tobytes() for number, *_ in copies}
     if len(different) < len(copies):
         raise ConfigError(
             f"{len(copies) - len(different)} of {len(copies)} trials are in more than one of the datasets",
@@ -178,23 +165,18 @@ def _read_channels(sources: Sequence[Dataset], config: Config) -> Channels:
     return Channels(config, *robots)
 
 
-def _read(throw: Throw) -> Episode:
-    with throw.locating_damage():
-        episode = throw.read_episode(sensors=True)
-        # The copy gets hashes of its own, which would make damage look as if it had been recorded.
-        episode.chunk.check_records()
-        if episode.digest != throw["digest"]:
-            raise DatasetError(f"digest {episode.digest}", expected=f"{throw['digest']} as in throws.parquet")
-        return episode
-
-
 def _begin_reading(channels: Channels | None) -> Callable[[tuple[Throw, Config]], Episode]:
     """Make the function that reads the episode of a throw; with channels, their sensors see it anew."""
     recorder = None if channels is None else SensorRecorder(channels)
 
     def read(piece: tuple[Throw, Config]) -> Episode:
         throw, config = piece
-        episode = _read(throw)
+        with throw.locating_damage():
+            episode = throw.read_episode(sensors=True)
+            # The copy gets hashes of its own, which would make damage look as if it had been recorded.
+            episode.chunk.check_records()
+            if episode.digest != throw["digest"]:
+                raise DatasetError(f"digest {episode.digest}", expected=f"{throw['digest']} as in throws.parquet")
         if recorder is not None:
             seen = recorder.record(config, episode.header.trial, episode.samples())
             episode = Episode(episode.header, episode.chunk, sensors=seen)
@@ -213,26 +195,20 @@ def _make_row(plan: Plan, number: int, row: Row) -> Row:
 def _tabulate_sources(copies: Sequence[Copy], sources: Sequence[Dataset]) -> pa.Table:
     """Make a table with one row a trial: the dataset and trial that it comes from."""
     facts = [(source.config.name, str(source.directory), source.digest) for source in sources]
-    rows = [(copy.number, *facts[copy.source], copy.trial) for copy in copies]
+    rows = [(number, *facts[source], trial) for number, source, trial in copies]
     return pa.Table.from_pylist([dict(zip(_SOURCES.names, row, strict=True)) for row in rows], schema=_SOURCES)
 
 
 def _describe_sources(sources: Sequence[Dataset]) -> str:
     """Write the section of the data card on the datasets that the trials come from."""
-    lines = [
-        "",
-        "## Sources",
-        "",
-        "Derived from other datasets, in whose data cards the provenance of the simulations is; `sources.parquet` "
-        "has the trial and episode of them that each trial is.",
-        "",
-        "| dataset | directory | trials taken | digest |",
-        "|---|---|---|---|",
-    ]
-    for source in sources:
-        cells = (source.config.name, source.directory, len(source.recorded), source.digest)
-        lines.append(f"| {' | '.join(str(cell).replace('|', chr(92) + '|') for cell in cells)} |")
-    return "\n".join([*lines, ""])
+    listed = "".join(
+        f"- `{source.directory}` ({source.config.name}): {len(source.recorded)} trials; digest {source.digest}\n"
+        for source in sources
+    )
+    return (
+        "\n## Sources\n\nDerived from other datasets, in whose data cards the provenance of the simulations is; "
+        f"`sources.parquet` has the trial of them that each trial is.\n\n{listed}"
+    )
 
 
 _SOURCES = pa.schema(
@@ -258,8 +234,7 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
     """
     if not directories:
         raise refuse_argument("directories", "got none", expected="at least one dataset")
-    sources = [Dataset.open(directory) for directory in directories]
-    return derive(sources, Path(output), offered=sum(map(len, sources)))
+    return derive([Dataset.open(directory) for directory in directories], Path(output))
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
@@ -270,35 +245,25 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
     dataset = Dataset.open(directory)
-    return derive([_choose(dataset, where)], Path(output), offered=len(dataset))
-
-
-def _choose(dataset: Dataset, where: str) -> Dataset:
-    """Choose the throws that fulfil a condition; there has to be one with an episode."""
-    chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where").fill_null(False)))
+    chosen = replace(dataset, throws=dataset.throws.filter(find_rows(where, dataset.throws, "where")))
     if not len(chosen.recorded):
         raise refuse_argument("where", f"no trial of {dataset.directory} that has an episode fulfils {where!r}")
-    return chosen
+    return derive([chosen], Path(output))
 
 
-def render_sensors(
-    directory: StrPath, output: StrPath, sensors: SensorSections, *, where: str | None = None
-) -> Derived:
+def render_sensors(directory: StrPath, output: StrPath, sensors: SensorSections) -> Derived:
     """Copy a dataset, and let other sensors see its throws, as if it had been collected with them.
 
     Args:
         directory: The dataset.
         output: Directory of the new one.
         sensors: Sections of sensors by name, as below the key ``sensors`` of a configuration; may be empty.
-        where: Condition on columns of the table of throws; None for all trials.
 
     Raises:
-        ConfigError: If a section or the condition is wrong, or the directory cannot be used.
+        ConfigError: If a section is wrong, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    dataset = Dataset.open(directory)
-    chosen = dataset if where is None else _choose(dataset, where)
-    return derive([chosen], Path(output), offered=len(dataset), sensors=sensors)
+    return derive([Dataset.open(directory)], Path(output), sensors=sensors)
 
 
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
@@ -318,4 +283,4 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
         raise refuse_argument("count", f"should be {bounds}, got {count}")
     places = np.sort(np.random.default_rng(seed).permutation(len(candidates))[:count])
     chosen = replace(candidates, throws=candidates.throws.take(places))
-    return derive([chosen], Path(output), offered=len(dataset))
+    return derive([chosen], Path(output))

@@ -137,7 +137,7 @@ def _gather_throws(source: ExportSource, throws: Dataset) -> dict[str, Any]:
     moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
     paths, motions, targets, measured, balls = [], [], [], [], []
     for throw in source.read(throws):
-        config = source.dataset.config_of(throw.throw)
+        config = throw.throw.config
         # The last time is the first one at which the motion is over.
         times = np.arange(int(np.ceil(throw.trajectory.times[-1] * source.rate_hz - 1e-9)) + 1) / source.rate_hz
         paths.append(np.column_stack([times, *sample_quintic(throw.trajectory, times)]))

@@ -246,7 +246,7 @@ class ExportSource:
         """Read the time series of a throw."""
         config, (header, recorded) = self.dataset.config, throw.read_samples()
         samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
-        trajectory = commanded_trajectory(self.dataset.config_of(throw), recorded)
+        trajectory = commanded_trajectory(throw.config, recorded)
         time_s = samples.seconds_since(header.start_ns)
         joints = (samples.position, samples.velocity, samples.effort, *sample_quintic(trajectory, time_s))
         signals = {"time_s": time_s, **dict(zip(_JOINT_SIGNALS, joints, strict=True))}

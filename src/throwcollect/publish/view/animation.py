@@ -132,7 +132,7 @@ def _prepare(
     own, recorded = chosen.config, chosen.robot_description()
     throws, cameras = [], []
     for throw in chosen:
-        config = chosen.config_of(throw)
+        config = throw.config
         # The recorded description has the tool of the configuration; a tool that is swept is described anew.
         scene = Scene.of(config, description=recorded if config.tool == own.tool else None, triangles=FINE)
         throws.append(DrawnThrow(throw, config, scene))

@@ -67,8 +67,8 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         path = scratch / RECORDING
         with path.open("wb") as stream:
             recording = ViewRecording(stream, config)
-            paths = [throw for throw, _ in _schedule(dataset, some)]
-            recording.write(paths, log_progress(_schedule(dataset, throws), len(throws), "throw", "written"))
+            paths = [throw for throw, _ in _schedule(some)]
+            recording.write(paths, log_progress(_schedule(throws), len(throws), "throw", "written"))
             summary = recording.finish(RECORDING)
         information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
         (scratch / METADATA).write_text(to_yaml(information), encoding="utf-8")
@@ -95,12 +95,12 @@ def choose_throws(dataset: Dataset, trials: Iterable[int] | None) -> Dataset:
     return throws
 
 
-def _schedule(dataset: Dataset, throws: Dataset) -> Iterator[tuple[ShownThrow, Samples]]:
+def _schedule(throws: Dataset) -> Iterator[tuple[ShownThrow, Samples]]:
     """Schedule throws one after another with a pause, regardless of their times in the dataset."""
     start = _FIRST_NS
     for throw in throws:
         _, samples = throw.read_samples()
-        yield ShownThrow(throw, dataset.config_of(throw), start, samples.object_position.copy()), samples
+        yield ShownThrow(throw, throw.config, start, samples.object_position.copy()), samples
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
 
 

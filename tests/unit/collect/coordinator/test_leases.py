@@ -140,11 +140,13 @@ def do_all(leases: Leases) -> list[int]:
     return given_up
 
 
-def test_a_simulation_that_refuses_every_trial_is_set_aside_and_loses_none() -> None:
+def test_a_simulation_that_refuses_every_trial_gets_no_more_and_loses_none() -> None:
     leases = Leases(range(60), retries=3)
     assert do_all(leases) == []
-    assert leases.why_set_aside("hole") == "it refused trials that other simulations could do: no"
-    assert leases.why_set_aside("well") is None
+    leases.add([60])
+    assert leases.lease("hole", others=BOTH) is None
+    leases.forget("hole")
+    assert leases.lease("hole", others=BOTH) == 60
 
 
 def test_a_returned_trial_goes_to_another_simulation_while_there_is_one() -> None:
@@ -162,7 +164,7 @@ def test_a_simulation_that_is_alone_gets_its_failed_trial_back() -> None:
     assert leases.lease("a", others="a") == 0
 
 
-def test_trials_that_every_simulation_refuses_set_no_simulation_aside() -> None:
+def test_trials_that_every_simulation_refuses_keep_no_simulation_from_others() -> None:
     leases = Leases(range(30), retries=3)
     lost = []
     while leases.ended < leases.total:
@@ -176,8 +178,6 @@ def test_trials_that_every_simulation_refuses_set_no_simulation_aside() -> None:
             else:
                 leases.complete(name, trial)
     assert sorted(lost) == list(range(1, 20))
-    assert leases.why_set_aside("a") is None
-    assert leases.why_set_aside("b") is None
 
 
 def test_a_collection_is_hopeless_once_every_simulation_only_refuses_trials() -> None:
@@ -197,12 +197,3 @@ def test_a_collection_with_a_completed_trial_is_never_hopeless() -> None:
     for _ in range(9):
         leases.fail("a", leases.lease("a", others="a"), "no", refused=True)
     assert leases.explain_hopelessness("a") is None
-
-
-def test_a_restarted_simulation_is_not_set_aside_for_earlier_refusals() -> None:
-    leases = Leases(range(60), retries=3)
-    do_all(leases)
-    leases.add([60])
-    leases.forget("hole")
-    assert leases.why_set_aside("hole") is None
-    assert leases.lease("hole", others=BOTH) == 60

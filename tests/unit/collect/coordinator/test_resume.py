@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import shutil
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.unit.dataset.damage import change_table
-from tests.unit.dataset.kills import KilledAt
+from tests.unit.dataset.kills import KilledEverywhere
 
 from throwcollect.collect.coordinator.prepare import prepare
 from throwcollect.collect.coordinator.resume import prepare_or_resume, resume
@@ -139,22 +138,20 @@ def test_a_kill_at_any_moment_of_planning_leaves_a_dataset_that_can_go_on(listed
     more.write_text(text.format(3))
     prepare_or_resume(few, listed / "begun")
     wanted = prepare_or_resume(more, listed / "wanted")
+    directory = listed / "data"
+    if begun:
+        shutil.copytree(listed / "begun", directory)
+    with KilledEverywhere(directory, listed / "copies") as killed:
+        prepare_or_resume(more, directory)
+    assert len(killed.left) > 10
     # A file takes more calls than these steps, so the process dies before and after each.
-    for call in count(step=3):
-        directory = listed / f"data-{call}"
-        if begun:
-            shutil.copytree(listed / "begun", directory)
-        with KilledAt(call) as kill:
-            prepare_or_resume(more, directory)
-        if not kill.died:
-            break
+    for left, _ in killed.left[::3]:
         # Until then, there is nothing but the configuration, and nothing to go on with.
-        if begun or (directory / "plan.parquet").exists():
-            assert prepare_or_resume(more, directory) == wanted
-            assert contents(directory) == contents(listed / "wanted")
+        if begun or (left / "plan.parquet").exists():
+            assert prepare_or_resume(more, left) == wanted
+            assert contents(left) == contents(listed / "wanted")
         else:
-            assert not (directory / "trials.parquet").exists()
-    assert call > 10
+            assert not (left / "trials.parquet").exists()
 
 
 def test_a_growing_plan_can_be_resumed_with_higher_but_not_lower_numbers(tmp_path: Path) -> None:

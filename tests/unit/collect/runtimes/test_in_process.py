@@ -14,7 +14,7 @@ from throwcollect import load, runs
 from throwcollect.collect.coordinator import replay_check
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.runs.records import Records
-from throwcollect.dataset.inspect import digest, info
+from throwcollect.dataset.inspect import info
 from throwcollect.errors import Interrupted, WorkerError
 from throwcollect.sim.simulator import Simulator as OneSimulator
 from throwcollect.simulator import Simulator
@@ -63,7 +63,7 @@ def test_an_inprocess_run_gives_the_throws_of_a_simulator(yaml: Path) -> None:
     reporter = Reporter()
     summary = collect(yaml, reporter=reporter)
     assert dict(os.environ) == before
-    assert (summary.episodes, summary.digest) == (3, digest(yaml.parent / "data"))
+    assert (summary.episodes, summary.digest) == (3, info(yaml.parent / "data").digest)
     with Simulator(yaml) as simulator:
         for throw in load(yaml.parent / "data"):
             again = simulator.throw({"task.duration_s": throw.row["task_duration_s"]}, trial=throw.trial)

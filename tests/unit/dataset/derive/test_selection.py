@@ -16,7 +16,7 @@ from throwcollect.collect.coordinator.resume import resume
 from throwcollect.config.loader import load
 from throwcollect.dataset.derive.derivation import filter_trials, merge, sample
 from throwcollect.dataset.derive.statistics import statistics
-from throwcollect.dataset.inspect import digest
+from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
 from throwcollect.episode.record import EpisodeHeader, Samples
@@ -34,8 +34,8 @@ def test_a_filtered_dataset_has_the_trials_that_fulfil_the_condition(collected: 
     found = filter_trials(collected, tmp_path / "some", where="trial % 2 == 1")
     after = Dataset.open(tmp_path / "some")
     assert verify(tmp_path / "some") == []
-    assert (found.trials, found.offered, found.without_episode) == (3, 7, {})
-    assert found.digest == digest(tmp_path / "some")
+    assert (found.trials, found.without_episode) == (3, {})
+    assert found.digest == info(tmp_path / "some").digest
     assert sources(tmp_path / "some") == [(str(collected), number) for number in (1, 3, 5)]
     odd = before.throws.filter(pa.array([False, True, False, True, False, True, False]))
     columns = [name for name in odd.column_names if name != "chunk_offset"]
@@ -99,7 +99,7 @@ def test_merged_datasets_of_different_plans_follow_each_other_with_the_bytes_of_
 ) -> None:
     found = merge([collected, other], tmp_path / "all")
     assert verify(tmp_path / "all") == []
-    assert (found.trials, found.offered, found.digest) == (11, 11, digest(tmp_path / "all"))
+    assert (found.trials, found.digest) == (11, info(tmp_path / "all").digest)
     assert sources(tmp_path / "all") == [
         *((str(collected), number) for number in range(7)),
         *((str(other), number) for number in range(4)),
@@ -131,7 +131,7 @@ def test_merged_datasets_of_different_plans_follow_each_other_with_the_bytes_of_
     # A file holds episodes of one plan alone, so times increase in each.
     assert merged.shards == tuple(f"quick_{number:05d}.mcap" for number in range(5))
     card = (tmp_path / "all" / "README.md").read_text()
-    assert f"| other | {other} | 4 | {digest(other)} |" in card
+    assert f"- `{other}` (other): 4 trials; digest {info(other).digest}\n" in card
 
 
 def test_derived_datasets_can_be_derived_from(collected: Path, other: Path, tmp_path: Path) -> None:
@@ -175,7 +175,7 @@ def test_nothing_is_collected_into_a_derived_dataset(collected: Path, tmp_path: 
     assert {path: path.read_bytes() for path in (tmp_path / "some").iterdir()} == before
 
 
-@pytest.mark.parametrize("name", ["throws.parquet", "sources.parquet", "quick_00001.mcap", "trials.parquet"])
+@pytest.mark.parametrize("name", ["sources.parquet", "trials.parquet"])
 def test_verify_finds_changes_of_a_merged_dataset(collected: Path, other: Path, tmp_path: Path, name: str) -> None:
     merge([collected, other], tmp_path / "all")
     path = tmp_path / "all" / name

@@ -14,21 +14,29 @@ from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError
 
 HALVES = "train=0.5,test=0.5"
-WIDE = ["landing_x_m=0.2"]
 
 
 def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     return samples, replace(header, contacts=(Contact("spoon", header.start_ns, None),))
 
 
-def cells(directory: Path) -> list[int | None]:
-    landings = Dataset.open(directory).throws["landing_x_m"].to_pylist()
-    return [None if x is None else int(x // 0.2) for x in landings]
+WIDE_M = 0.2
+"""Squares that are wide enough for several throws."""
 
 
-def train(directory: Path, *, seed: int, fractions: str = HALVES, axis: str = "trial=1") -> list[int]:
+@pytest.fixture(autouse=True)
+def _wide_squares(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.dataset.derive.split.SQUARE_M", WIDE_M)
+
+
+def squares(directory: Path) -> list[tuple[int, int] | None]:
+    rows = Dataset.open(directory).throws.select(["landing_x_m", "landing_y_m"]).to_pylist()
+    return [None if None in row.values() else tuple(math.floor(part / WIDE_M) for part in row.values()) for row in rows]
+
+
+def train(directory: Path, *, seed: int, fractions: str = HALVES) -> list[int]:
     """The trials of the part of this name."""
-    return list(assign(Dataset.open(directory), fractions=fractions, cells=[axis], seed=seed)["train"])
+    return assign(Dataset.open(directory), fractions=fractions, seed=seed)["train"]
 
 
 @pytest.fixture(scope="module")
@@ -44,21 +52,19 @@ def some(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def test_the_parts_of_a_split_are_datasets_that_share_no_cell(some: Path, tmp_path: Path) -> None:
-    found = split(some, tmp_path / "parts", fractions=HALVES, cells=WIDE, seed=1)
+def test_the_parts_of_a_split_are_datasets_that_share_no_square(some: Path, tmp_path: Path) -> None:
+    found = split(some, tmp_path / "parts", fractions=HALVES, seed=1)
     held, trials = {}, []
-    for name, part in found.parts.items():
+    for name, part in found.items():
         directory = tmp_path / "parts" / name
         # No physics holds the ball as `held` does; everything else has to fit.
         assert [finding for finding in verify(directory) if not finding.place.startswith("trial ")] == []
         dataset = Dataset.open(directory)
-        held[name] = set(cells(directory)) - {None}
-        assert (part.cells, part.uncelled) == (len(held[name]), cells(directory).count(None))
-        assert part.cells
-        assert part.uncelled
-        assert part.dataset.trials == len(dataset)
+        held[name] = set(squares(directory)) - {None}
+        assert part.trials == len(dataset)
         trials += pq.read_table(directory / "sources.parquet")["source_trial"].to_pylist()
     assert not held["train"] & held["test"]
+    assert len(set(squares(some))) < len(trials)
     assert sorted(trials) == list(range(12))
 
 
@@ -67,8 +73,8 @@ def test_adding_trials_moves_no_trial_from_one_part_of_a_split_to_another(some: 
     merge([other, some], tmp_path / "more")
     shift = len(Dataset.open(other))
     for seed in range(6):
-        before = train(some, seed=seed, axis=WIDE[0])
-        after = [number - shift for number in train(tmp_path / "more", seed=seed, axis=WIDE[0])]
+        before = train(some, seed=seed)
+        after = [number - shift for number in train(tmp_path / "more", seed=seed)]
         assert before == [number for number in after if number >= 0]
 
 
@@ -80,25 +86,11 @@ def test_the_seed_decides_which_part_a_trial_belongs_to(some: Path) -> None:
     assert train(some, seed=1) == train(some, seed=1) != train(some, seed=2)
 
 
-def test_cells_can_be_defined_by_any_expression(some: Path) -> None:
-    axes = ["hypot(landing_x_m, landing_y_m)=0.3", "hit_angle_rad=0.2"]
-    found = assign(Dataset.open(some), fractions=HALVES, cells=axes, seed=1)
-    rows = Dataset.open(some).throws.to_pylist()
-    chosen = {trial: cell for part in found.values() for trial, cell in part.items()}
-    expected = {
-        row["trial"]: (int(math.hypot(row["landing_x_m"], row["landing_y_m"]) // 0.3), int(row["hit_angle_rad"] // 0.2))
-        for row in rows
-        if row["landing_x_m"] is not None
-    }
-    assert len(expected) == 8
-    assert chosen == dict.fromkeys(range(8, 12)) | expected
-
-
 @pytest.mark.parametrize(
     ("fractions", "message"),
     [
-        ("train=0.8,test=0.1", "should add up to 1, add up to 0.9"),
-        ("train=0.5,test", "should be a part and its share, such as train=0.8, got 'test'"),
+        ("train=0.8,test=0.1", "should be shares above 0 of two parts or more, which add up to 1"),
+        ("train=0.5,test", r"got 'train=0.5,test'\n.*names and shares: train=0.8,test=0.2"),
     ],
 )
 def test_a_split_by_wrong_fractions_is_refused_with_a_reason(

@@ -79,7 +79,7 @@ def show_examples(
     views = (Panel("side", "The ball from the side", side), Panel("above", "The ball from above", above))
     middle = succeeded[len(succeeded) // 2] if succeeded else throws[0]
     release = middle.events.release
-    trajectory = commanded_trajectory(dataset.config_of(middle), middle.read_samples()[1])
+    trajectory = commanded_trajectory(middle.config, middle.read_samples()[1])
     note = f"Joints of trial {middle.trial}: measured (blue) and commanded (orange, dashed)"
     note += "; the vertical line is the release." if release is not None else "."
     sliding, joints = robot_of(dataset.config).sliding, list[Panel]()
@@ -168,7 +168,7 @@ def measure_residuals(dataset: Dataset) -> NDArray[np.float64]:
     for trial in log_progress(chosen.tolist(), len(chosen), "flight", "compared"):
         throw = dataset.throw(trial)
         header, samples = throw.read_samples()
-        distance = flight_residual(samples, header, config=dataset.config_of(throw))
+        distance = flight_residual(samples, header, config=throw.config)
         if distance is not None:
             distances.append(distance)
     return np.array(distances)

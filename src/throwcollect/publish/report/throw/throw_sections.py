@@ -43,7 +43,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     landings = Points.read(throws, outcomes, "landing", None, "release_speed_mps")
     planned = landings[outcomes.are(outcomes.success)[landings.row]]
     examples = list(dataset.select(choose_examples(dataset, planned, outcomes)))
-    configs = [dataset.config_of(throw) for throw in examples] or [dataset.config]
+    configs = [throw.config for throw in examples] or [dataset.config]
     bodies = tuple(dict.fromkeys(body for config in configs for body in looks_of(config)[:-1]))
     target = dataset.config.sweep.target
     cells = tuple(_show_cells(planned, throws, target, outcomes.verbs[1])) if len(planned) else ()
