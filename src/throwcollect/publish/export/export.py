@@ -49,8 +49,8 @@ def export(
     ``hdf5``). Each sample then has a frame of each sensor, so that the rate is that of the sensors.
 
     Raises:
-        ConfigError: If there is no such format, it has no such images, the rate is above the recorded one or not one
-            at which all sensors have frames, or `output` exists.
+        ConfigError: If there is no such format, it has no such images, the rate does not divide the recorded one and
+            those of all sensors, or `output` exists.
         MissingExtraError: If a library that the format needs is not installed.
         DatasetError: If the dataset is unfinished, damaged or without episodes, or `output` cannot be written.
         MemberError: If the format is of another package and fails.

@@ -124,16 +124,9 @@ def _explain_rate(source: ExportSource) -> str:
     recorded_hz = source.dataset.config.record.rate_hz
     if source.rate_hz == recorded_hz:
         return f"The samples are those that were recorded, at {recorded_hz} Hz."
-    if recorded_hz % source.rate_hz == 0:
-        how = f"Each is one of the {recorded_hz} Hz record, unchanged: every {recorded_hz // source.rate_hz}th."
-    else:
-        how = (
-            f"They lie between those of the {recorded_hz} Hz record: positions of joints and bodies on the cubic "
-            "through positions and velocities of both neighbours, all else linear, orientations normalised."
-        )
     return (
-        f"The samples are at {source.rate_hz} Hz. {how} Nothing is filtered: what is faster than "
-        f"{source.rate_hz / 2:g} Hz is aliased. Commanded values are computed at the very instants."
+        f"The samples are every {recorded_hz // source.rate_hz}th of those recorded at {recorded_hz} Hz, unchanged. "
+        f"Nothing is filtered: what is faster than {source.rate_hz / 2:g} Hz is aliased."
     )
 
 
