@@ -37,7 +37,6 @@ def fit(
     targets: str | None = None,
     parameters: str | None = None,
     given: str | None = None,
-    kind: str = "local",
     where: str | None = None,
     onnx: bool = False,
     json: JsonOption = False,
@@ -48,7 +47,6 @@ def fit(
         targets (COLUMN,...): Where a trial ended; by default, those of the task.
         parameters (KEY,...): What aiming chooses; by default, all of task.
         given (KEY,...): What is given with a target; by default, those of the task.
-        kind: local, by the nearest throws, too; or polynomial.
         where (CONDITION): Learn only from throws that fulfil it.
         onnx: Write model.onnx, too: target to parameters, for a robot's controller.
     """
@@ -59,7 +57,6 @@ def fit(
         require("onnx")
     model = fit(
         dataset,
-        kind=kind,
         targets=_split(targets),
         parameters=_split(parameters),
         given=_split(given),
@@ -76,11 +73,10 @@ def fit(
     for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
         if names:
             lines.append(f"{what}: {', '.join(names)}")
-    folds = trained.folds_error.items()
-    errors = ", ".join(f"degree {degree}: {format_length(error, model.targets)}" for degree, error in folds)
-    lines.append(f"error for throws that it was not fitted to, in simulation, median: {errors}")
+    each = (f"degree {degree}: {format_length(error, model.targets)}" for degree, error in model.errors.items())
+    lines.append(f"error for throws that it was not fitted to, in simulation, median: {', '.join(each)}")
     lines.append(f"model: {output}\naim with it: {command('aim', output, '--at', _write_example(model))}")
-    show(model.model_dump(mode="json", include={"kind", "targets", "axes", "trained_on"}), *lines, json=json)
+    show(model.model_dump(mode="json", include={"targets", "axes", "errors", "trained_on"}), *lines, json=json)
 
 
 def aim(
@@ -98,7 +94,7 @@ def aim(
         at (X,Y): A target, and what is given with it; may be repeated.
         targets (FILE): CSV file of targets, with a header line.
         output (--output -o FILE): CSV file to write, for the sampler `list`.
-        choose: Which of several throws: nearest, least-effort or least-sensitive.
+        choose: Which of several throws: nearest or least-effort.
     """
     from throwcollect.config.loader import load as load_config
     from throwcollect.learning.aiming import explain_reach
@@ -125,7 +121,7 @@ def aim(
     show([aim.as_dict() for aim in aims], *lines, json=json)
     for number, aim in enumerate(aims, start=1):
         if not aim.reachable:
-            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
+            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model, aim)}")
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
 
@@ -261,8 +257,8 @@ def _split(names: str | None) -> tuple[str, ...]:
 
 
 def _write_example(model: Model) -> str:
-    middle = model.learned.outputs[len(model.learned.outputs) // 2]
-    given = [axis.nominal for axis in model.learned.axes if axis.key in model.given]
+    middle = model.outputs[len(model.outputs) // 2]
+    given = [axis.nominal for axis in model.axes if axis.key in model.given]
     return ",".join(f"{value:.2f}" for value in (*middle.tolist(), *given))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from throwcollect.learning.learned_map import (
     EFFORT,
     Axis,
     KeyRole,
-    Kind,
     LearnedMap,
     count_needed_throws,
     find_nearest,
@@ -138,7 +136,7 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
         if name in datasets[0].throws.column_names
     }
     places = grid.measure(columns)
-    learned, _, _ = fit_throws(Kind.LOCAL, axes, grid.names, values[landed], places, columns[EFFORT])
+    learned = fit_throws(axes, grid.names, values[landed], places, columns[EFFORT])
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(number, 0)))
     found = _aim(learned, (values, ~landed), parameters, grid, count, randomness)
     if not len(found):
@@ -253,5 +251,5 @@ def _start_from(learned: LearnedMap, throws: NDArray[np.intp], noise: Array) -> 
     values = learned.values[throws].copy()
     values[:, columns] = learned.unscale(KeyRole.PARAMETER, parameters)
     # Where nothing has moved, the map predicts nothing better than what was measured.
-    outputs = learned.predict(parameters, context) if noise.any() else learned.outputs[throws]
-    return replace(learned, values=values, outputs=outputs, efforts=learned.efforts[throws])
+    outputs = learned.predict_ends(parameters, context) if noise.any() else learned.outputs[throws]
+    return learned.begin_from(values, outputs, learned.efforts[throws])

@@ -16,23 +16,19 @@ from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.carried_robot import config_text
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.selection import find_rows
-from throwcollect.errors import ConfigError, DatasetError, read_word, refuse_argument
+from throwcollect.errors import ConfigError, DatasetError, refuse_argument
 from throwcollect.files import StrPath
-from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, LearnedMap, count_needed_throws, fit_throws
+from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, count_needed_throws, fit_throws
 from throwcollect.learning.model import MODEL, Model, load_model
 from throwcollect.learning.model_card import TrainedOn
 from throwcollect.learning.polynomial import Array
 from throwcollect.version import __version__
 from throwcollect.wording import format_count, suggest
 
-_WORTH_KNOWING = 2.0
-"""Latents are worth knowing if predictions without them are at least this many times worse."""
-
 
 def fit(
     dataset: Dataset | StrPath,
     *,
-    kind: str = Kind.LOCAL.value,
     targets: Sequence[str] = (),
     parameters: Sequence[str] = (),
     given: Sequence[str] = (),
@@ -42,20 +38,17 @@ def fit(
 
     Args:
         dataset: The dataset, or its directory.
-        kind: ``local``: predict by a polynomial, corrected by the nearest throws; or ``polynomial``: by the polynomial
-            alone.
         targets: Columns that say where a trial ended; those of the task by default.
         parameters: Swept keys that aiming chooses; all of the task by default. The others belong to the world.
         given: Swept keys whose values are given with a target; those that the task names by default.
         where: A condition on throws, as `Dataset.select` takes it.
 
     Raises:
-        ConfigError: If there is no such kind, nothing to aim at, a key was not swept, no throw fulfils the condition,
+        ConfigError: If there is nothing to aim at, a key was not swept, no throw fulfils the condition,
             or too few throws succeeded.
         DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
     _check_names(targets, parameters, given)
-    chosen = read_word("kind", kind, Kind)
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
     config, selected = dataset.config, _select(dataset, where)
@@ -69,16 +62,9 @@ def fit(
     _check_amount(selected, throws, axes)
     outputs = np.column_stack([_read_numbers(throws, column, dataset) for column in columns])
     values = np.column_stack([_read_numbers(throws, column_of(axis.key), dataset) for axis in axes])
-    efforts = _read_numbers(throws, EFFORT, dataset)
-    learned, errors, blind = fit_throws(chosen, axes, columns, values, outputs, efforts)
     return Model(
+        **dict(fit_throws(axes, columns, values, outputs, _read_numbers(throws, EFFORT, dataset))),
         version=__version__,
-        kind=chosen,
-        axes=axes,
-        targets=columns,
-        forward=learned.forward,
-        effort=learned.effort,
-        correction=learned.correction,
         trained_on=TrainedOn(
             name=config.name,
             robot=config.robot.name,
@@ -88,12 +74,7 @@ def fit(
             throws=len(throws),
             ignored=len(selected) - len(throws),
             selection=where,
-            folds_error=errors,
-            without_latents=blind,
-            latents_count=blind is not None and blind >= _WORTH_KNOWING * min(errors.values()),
         ),
-        adaptation=None,
-        points=_tabulate(throws, learned),
         config=config_text(config),
         source=dataset.directory,
     )
@@ -162,14 +143,6 @@ def _choose_role(config: Config, key: str, parameters: Sequence[str], context: S
     return KeyRole.PARAMETER if chosen else KeyRole.LATENT
 
 
-def _tabulate(throws: pa.Table, learned: LearnedMap) -> pa.Table:
-    """Make a table of the throws that a map was learned from."""
-    columns = {"trial": throws["trial"].to_numpy()}
-    columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
-    columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
-    return pa.table({**columns, EFFORT: learned.efforts})
-
-
 def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
     """Refuse a dataset that no model can be learned from."""
     chosen = [axis.key for axis in axes if axis.role is KeyRole.PARAMETER]
@@ -207,7 +180,7 @@ def read_ends(directory: Path) -> Array:
         DatasetError: If there is neither, or it is damaged.
     """
     if (directory / MODEL).exists():
-        return load_model(directory).learned.outputs
+        return load_model(directory).outputs
     dataset = Dataset.open(directory)
     task = dataset.config.task
     throws = keep_informative(task, dataset.throws, task.targets)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
-from pydantic import Field, FiniteFloat
-
 from throwcollect.learning.adapting import Adaptation, Method
 from throwcollect.learning.distilling import DistilledMap
-from throwcollect.learning.learned_map import Axis, Correction, Kind
-from throwcollect.learning.polynomial import ModelEntry, Polynomial
+from throwcollect.learning.learned_map import LearnedMap
+from throwcollect.learning.polynomial import ModelEntry
 from throwcollect.learning.score import SCORE_HEAD, Score, format_length, list_units
 from throwcollect.units import format_distance
 from throwcollect.wording import format_count
@@ -62,9 +60,6 @@ class TrainedOn(ModelEntry):
         throws: Number of throws that it was learned from.
         ignored: Number of throws that did not succeed.
         selection: The condition on throws; None for all.
-        folds_error: By degree: median distance of throws from their prediction by polynomials fitted to others.
-        without_latents: The same distance when latents are no inputs; None if there are no latents.
-        latents_count: Whether latents have an effect that is worth knowing.
     """
 
     name: str
@@ -75,27 +70,13 @@ class TrainedOn(ModelEntry):
     throws: int
     ignored: int
     selection: str | None
-    folds_error: dict[int, FiniteFloat] = Field(min_length=1)
-    without_latents: FiniteFloat | None
-    latents_count: bool
-
-    @property
-    def error(self) -> float:
-        """The smallest of the errors, which belongs to the chosen degree."""
-        return min(self.folds_error.values())
 
 
-class ModelCard(ModelEntry):
-    """``model.json``: a learned map without the throws that it was learned from; `describe` makes its card.
+class ModelCard(LearnedMap):
+    """A learned map, and where it comes from: ``model.json``; `describe` makes its card.
 
     Attributes:
         version: Version of throwcollect that made it.
-        kind: How predictions are made.
-        axes: The inputs: parameters, then context, then latents.
-        targets: Columns of the table of throws that say where a trial ended.
-        forward: The polynomial: all inputs to targets.
-        effort: The polynomial of the largest share of a joint's torque limit.
-        correction: How the world differs from the dataset's.
         trained_on: The throws that it was learned from.
         adaptation: How it was adapted; None if it was not.
         distilled: A polynomial from targets to parameters; None if it was not distilled.
@@ -103,23 +84,17 @@ class ModelCard(ModelEntry):
 
     format: Literal["1"] = "1"
     version: str
-    kind: Kind
-    axes: tuple[Axis, ...] = Field(min_length=1)
-    targets: tuple[str, ...] = Field(min_length=1)
-    forward: Polynomial
-    effort: Polynomial
-    correction: Correction
     trained_on: TrainedOn
-    adaptation: Adaptation | None
+    adaptation: Adaptation | None = None
     distilled: DistilledMap | None = None
 
     def describe(self, score: Score | None) -> str:
         """README.md of the model; its score is None if it has none."""
         trained, targets = self.trained_on, self.targets
         selected = f" (those with `{trained.selection}`)" if trained.selection else ""
-        folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in trained.folds_error.items())
-        if trained.without_latents is not None:
-            folds += f"; without latents: {format_length(trained.without_latents, targets)}"
+        folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in self.errors.items())
+        if self.blind_error is not None:
+            folds += f"; without latents: {format_length(self.blind_error, targets)}"
         axes = (
             [f"`{axis.key}`", axis.role.value]
             + [f"{number:.6g}" for number in (axis.minimum, axis.maximum, axis.nominal)]
@@ -140,7 +115,7 @@ class ModelCard(ModelEntry):
             "is extrapolated beyond the ranges.",
             "",
             "Predictions for throws that polynomials were not fitted to are off by "
-            f"{format_length(trained.error, targets)} (median, in simulation); by degree: {folds}.",
+            f"{format_length(self.error, targets)} (median, in simulation); by degree: {folds}.",
             "",
         ]
         if self.adaptation is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,13 +13,12 @@ from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.misses import find_median, find_share90
-from throwcollect.learning.adapting import Adaptation, Method, adapt
+from throwcollect.learning.adapting import Adaptation, Method
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.score import Errors, Score
 from throwcollect.learning.scoring import draw_targets, score_model, spread_first
 
 SHIFT = np.array([0.1, 0.12])
-ADAPT = partial(adapt, scatter=0.002, latents_count=False)
 
 
 class World:
@@ -47,7 +45,7 @@ class World:
 
 
 def score(world: World, other: World | None = None, *, seeds: range = range(1), scatter: float = 0.0) -> Score:
-    options = {"count": 25, "adapt_map": ADAPT, "distilled": None, "processes": 1}
+    options = {"count": 25, "distilled": None, "processes": 1}
     return score_model(learn(), world, seeds=seeds, world=other, scatter=scatter, **options)
 
 
@@ -96,7 +94,6 @@ def test_scoring_in_the_world_of_the_dataset_ignores_an_earlier_adaptation() -> 
         "count": 25,
         "seeds": range(1),
         "scatter": 0.0,
-        "adapt_map": ADAPT,
         "distilled": None,
         "processes": 1,
     }
@@ -160,7 +157,7 @@ def test_errors_in_metres_and_radians_are_summarised_separately() -> None:
 
 def test_a_distilled_map_is_scored_at_the_same_targets() -> None:
     learned, world = learn(), World()
-    options = {"count": 25, "seeds": range(1), "scatter": 0.0, "adapt_map": ADAPT, "processes": 1}
+    options = {"count": 25, "seeds": range(1), "scatter": 0.0, "processes": 1}
     found = score_model(learned, world, world=None, distilled=distil(learned), **options)
     assert world.calls == 1
     assert (found.trained, found.throws) == (score(World()).trained, score(World()).throws)

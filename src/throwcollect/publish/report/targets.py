@@ -172,7 +172,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
             expected=f"a model of this dataset, digest {dataset.digest[:10]}",
             hint=command("fit", dataset.directory, "-o", "MODEL"),
         )
-    error = format_length(trained.error, model.targets)
+    error = format_length(model.error, model.targets)
     text = (
         f"Learned from {format_count(trained.throws, noun)}: {', '.join(model.parameters)} to "
         f"{', '.join(model.targets)}. "
@@ -216,7 +216,7 @@ def _show_misses(key: str, shown: str, model: Model, throws: Sequence[ThrowAtTar
     shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
     targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
     places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(shape)
-    return _show_miss_map(key, shown, model.learned.outputs, targets, places, model.targets, task)
+    return _show_miss_map(key, shown, model.outputs, targets, places, model.targets, task)
 
 
 def _show_errors(
