@@ -264,7 +264,7 @@ def draw_map(points: Points, outcomes: Outcomes, bodies: Sequence[BodyLook] = ()
         hover="x %{x:.3f} m, y %{y:.3f} m" + (f", {speed} %{{marker.color:.2f}} m/s" if speed is not None else ""),
         scale_title=None if speed is None else f"{speed} [m/s]",
     )
-    draw_bodies(figure, bodies, "above_m")
+    _draw_bodies(figure, bodies)
     places = np.column_stack([points.x_m, points.y_m])
     room = max(0.08 * float(np.ptp(places, axis=0).max()), _LEAST_ROOM_M)
     low, high = places.min(axis=0) - room, places.max(axis=0) + room
@@ -281,11 +281,11 @@ def draw_map(points: Points, outcomes: Outcomes, bodies: Sequence[BodyLook] = ()
     return figure.update_layout(height=460)
 
 
-def draw_bodies(figure: go.Figure, bodies: Sequence[BodyLook], outline: str) -> None:
-    """Draw one of the outlines of bodies behind all that a figure shows; the more of a name, the paler each is."""
+def _draw_bodies(figure: go.Figure, bodies: Sequence[BodyLook]) -> None:
+    """Draw the outlines of bodies behind all that a figure shows; the more of a name, the paler each is."""
     shown, same = len(figure.data), Counter(body.name for body in bodies)
     for body in bodies:
-        first, *others = getattr(body, outline)
+        first, *others = body.above_m
         x, y = zip(first, *others, first, strict=True)
         red, green, blue = bytes.fromhex(body.color[1:])
         fill = f"rgba({red}, {green}, {blue}, {0.2 / same[body.name]:.3f})"

@@ -1,4 +1,4 @@
-"""The sections that the task of throwing adds to a report: landings and releases, and those on single flights."""
+"""The sections that the task of throwing adds to a report: landings, releases and flights."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.publish.report.contents import Panel, ReportSection, TaskReport
 from throwcollect.publish.report.figures import BLUE, SCALE, Points, colour_bar, draw_coloured, draw_map, place_bars
 from throwcollect.publish.report.measured import MOST_POINTS, Outcomes, read_numbers
-from throwcollect.publish.report.throw.flights import choose_examples, measure_residuals, show_examples, show_physics
+from throwcollect.publish.report.throw.flights import measure_residuals, show_physics
 from throwcollect.robots.surroundings import BodyLook, looks_of
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_task import ThrowTask
@@ -28,6 +28,8 @@ _HEIGHTS = frozenset((LANDING_HEIGHT, "task.bin.height_m", "task.bin.depth_m"))
 _FEW = 8
 """Up to this many throws in a cell, the scale has a mark for each number of throws; plotly would also mark halves."""
 _BINS = 14
+_EXAMPLES = 9
+"""Throws whose bodies are drawn."""
 _TITLES = {
     "distance_m": ("landing distance", "landing distance [m]"),
     "hit_angle_rad": ("hit angle", "hit angle below the horizontal [°]"),
@@ -42,9 +44,8 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     height_m = None if varies else cast("ThrowTask", task_of(dataset.config)).landing_height_m
     landings = Points.read(throws, outcomes, "landing", None, "release_speed_mps")
     planned = landings[outcomes.are(outcomes.success)[landings.row]]
-    examples = list(dataset.select(choose_examples(dataset, planned, outcomes)))
-    configs = [dataset.config_of(throw) for throw in examples] or [dataset.config]
-    bodies = tuple(dict.fromkeys(body for config in configs for body in looks_of(config)[:-1]))
+    few = dataset[:: -(-len(dataset) // _EXAMPLES)]
+    bodies = tuple(dict.fromkeys(body for throw in few for body in looks_of(dataset.config_of(throw))[:-1]))
     target = dataset.config.sweep.target
     cells = tuple(_show_cells(planned, throws, target, outcomes.verbs[1])) if len(planned) else ()
     return TaskReport(
@@ -53,10 +54,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
             _show_landings(landings, planned, outcomes, cells, height_m=height_m, bodies=bodies),
             _show_releases(landings, np.degrees(read_numbers(throws, "release_elevation_rad")[landings.row]), outcomes),
         ),
-        episodes=(
-            show_examples(dataset, examples, outcomes, height_m=height_m, bodies=bodies),
-            show_physics(measure_residuals(dataset), len(dataset.recorded)),
-        ),
+        episodes=(show_physics(measure_residuals(dataset), len(dataset.recorded)),),
     )
 
 
