@@ -168,9 +168,9 @@ def _load_world(plan: Plan, pictures: Path | None, *, quiet: bool) -> None:
     if not quiet:
         tell(cost.words)
     if pictures is not None:
-        from throwcollect.publish.view.sensor_pictures import write_frames
+        from throwcollect.publish.view.sensor_pictures import write_first_frames
 
-        write_frames([(name, frames, 0) for name, frames in cost.first.items()], pictures)
+        write_first_frames(cost.first, pictures)
 
 
 def doctor(*, json: JsonOption = False) -> None:

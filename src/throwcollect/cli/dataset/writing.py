@@ -1,4 +1,4 @@
-"""`throwcollect dataset export`, `report`, `view`, `render` and `images`: files for other programs and people."""
+"""`throwcollect dataset export`, `report`, `view` and `render`: files for other programs and people."""
 
 from __future__ import annotations
 
@@ -126,19 +126,3 @@ def render(
         f"{written.duration_s:.1f} s, {written.size_bytes / 1e6:.2f} MB"
     )
     show(written, text, json=json)
-
-
-def images(
-    directory: DatasetArgument, *, output: Path, sensor: str, trials: str | None = None, json: JsonOption = False
-) -> None:
-    """Write the frames of a sensor as PNG files.
-
-    Options:
-        output (-o --output DIR): Directory to write; must be new or empty.
-        sensor (NAME): Name of the sensor.
-        trials (3,5,7-9): Trials to write; all if not given.
-    """
-    from throwcollect.publish.view.sensor_pictures import write_images
-
-    count = write_images(directory, output, sensor=sensor, trials=None if trials is None else read_trials(trials))
-    show({"directory": output, "pictures": count}, f"{output}: {format_count(count, 'picture')}", json=json)
