@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from ruamel.yaml import YAML
 from tests.unit.publish.export.conftest import FORMATS, MOVING, Export
 from typer.testing import CliRunner
 
@@ -80,19 +79,6 @@ def test_the_configuration_in_an_export_of_a_list_gives_the_same_trials(to: str,
     )
     assert plan.trials.points == Dataset.open(tmp_path / "sample").plan.trials.points
     assert "- `trials.parquet`: " in (tmp_path / "export" / "README.md").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("to", ["parquet", "lerobot"])
-def test_the_card_of_a_hub_dataset_names_its_data_in_the_header(to: str, exported: Export) -> None:
-    directory = exported(to)
-    _, header, _ = (directory / "README.md").read_text(encoding="utf-8").split("---\n", 2)
-    fields = YAML(typ="safe").load(header)
-    assert fields["license"] == "apache-2.0"
-    assert fields["task_categories"] == ["robotics"]
-    assert ("LeRobot" in fields["tags"]) == (to == "lerobot")
-    assert fields["configs"]
-    for each in fields["configs"]:
-        assert list(directory.glob(each["data_files"])), each
 
 
 @pytest.mark.parametrize("to", FORMATS)
