@@ -15,7 +15,6 @@ import numpy as np
 import plotly.graph_objects as go
 import pyarrow as pa
 from numpy.typing import NDArray
-from plotly.subplots import make_subplots
 
 from throwcollect.publish.report.contents import Tile
 from throwcollect.publish.report.measured import (
@@ -43,7 +42,6 @@ _LEAST_ROOM_M = 0.15
 _INTERVALS = 40
 """Most intervals of time in which trials are counted."""
 _CELL_PX = 128
-_CELL_GAP = 0.012
 
 
 SCALE = "Viridis"
@@ -53,56 +51,27 @@ _MOST_SVG_POINTS = 1500
 
 
 def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) -> go.Figure:
-    """Draw each pair of at most `MOST_KEYS` swept keys below the diagonal, and on it how often each value occurs."""
-    count = len(parameters)
+    """Draw each pair of swept keys, of which there are two to `MOST_KEYS`, below the diagonal."""
     chosen = choose_points(len(outcomes.codes), count_matrix_points(parameters))
-    cells: list[list[dict[str, Any] | None]] = [
-        [{} if column <= row else None for column in range(count)] for row in range(count)
-    ]
-    figure = make_subplots(count, count, specs=cells, horizontal_spacing=_CELL_GAP, vertical_spacing=_CELL_GAP)
-    figure.update_xaxes(showticklabels=False, tickangle=0).update_yaxes(showticklabels=False)
-    for row, parameter in enumerate(parameters):
-        figure.add_bar(
-            **place_bars(parameter.edges),
-            y=parameter.counts.sum(axis=1),
-            row=row + 1,
-            col=row + 1,
-            marker={"color": NEUTRAL, "opacity": 0.55},
-            showlegend=False,
-            hovertemplate="%{y} trials near %{x:.4g}<extra></extra>",
+    figure = go.Figure()
+    for code, name in enumerate(outcomes.names):
+        trials = chosen[outcomes.codes[chosen] == code]
+        style, dimensions = outcomes.style_of(name), []
+        for each in parameters:
+            above, _, last = each.key.rpartition(".")
+            label = f"{last}<br>{above} [{each.unit or '-'}]"
+            axis = {"type": "log" if each.logarithmic else "linear"}
+            dimensions.append({"label": label, "values": single_precision(each.values[trials]), "axis": axis})
+        figure.add_splom(
+            dimensions=dimensions,
+            customdata=trials,
+            diagonal_visible=False,
+            showupperhalf=False,
+            marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
+            name=describe(name),
+            hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{describe(name)}</extra>",
         )
-        figure.update_yaxes(row=row + 1, col=row + 1, showgrid=False, rangemode="tozero")
-        above, _, last = parameter.key.rpartition(".")
-        above = f"{above} [{parameter.unit or '-'}]".strip()
-        ends = parameter.edges[[0, -1]]
-        low, high = (np.log10(ends) if parameter.logarithmic else ends).tolist()
-        room = 0.04 * (high - low)
-        axis: dict[str, Any] = {"range": [low - room, high + room], "nticks": 4, "tickfont": {"size": 9}}
-        axis |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
-        labels = {"title": {"text": f"{last}<br>{above}", "font": {"size": 10}}, "showticklabels": True}
-        figure.update_xaxes(axis, col=row + 1)
-        figure.update_xaxes(labels, row=count, col=row + 1)
-        for column in range(row):
-            figure.update_yaxes({**axis, **(labels if column == 0 else {})}, row=row + 1, col=column + 1)
-            for code, name in enumerate(outcomes.names):
-                trials = chosen[outcomes.codes[chosen] == code]
-                style = outcomes.style_of(name)
-                figure.add_scatter(
-                    x=single_precision(parameters[column].values[trials]),
-                    y=single_precision(parameter.values[trials]),
-                    customdata=trials,
-                    row=row + 1,
-                    col=column + 1,
-                    mode="markers",
-                    marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
-                    name=describe(name),
-                    legendgroup=name,
-                    # An outcome is in every panel of the matrix, but in the legend only once.
-                    showlegend=row == 1,
-                    hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{describe(name)}</extra>",
-                )
-    legend = {"x": 1, "y": 1, "xanchor": "right", "yanchor": "top"}
-    return figure.update_layout(height=90 + _CELL_PX * max(count, 2), bargap=0, legend=legend)
+    return figure.update_layout(height=90 + _CELL_PX * len(parameters), legend=LEGEND_ABOVE)
 
 
 def count_matrix_points(parameters: Sequence[SweptKey]) -> int:

@@ -171,15 +171,10 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
     notes = []
     if len(shown) < len(parameters):
         notes.append(f"The first {len(shown)} of {len(parameters)} swept keys.")
-    if len(shown) > 1 and trials > (most := figures.count_matrix_points(shown)):
-        notes.append(f"{most:,} of {trials:,} trials, chosen at random; the diagonal counts all.")
-    panel = Panel(
-        key="pairs",
-        title="Values of all trials" if len(shown) == 1 else "Each pair of keys, and on the diagonal each key alone",
-        figure=figures.draw_parameter_matrix(shown, outcomes),
-        text=" ".join(notes),
-        width_px=90 + 105 * len(shown),
-    )
+    if trials > (most := figures.count_matrix_points(shown)):
+        notes.append(f"{most:,} of {trials:,} trials, chosen at random.")
+    matrix, width_px = figures.draw_parameter_matrix(shown, outcomes), 90 + 105 * len(shown)
+    panel = Panel("pairs", "Each pair of keys", matrix, " ".join(notes), width_px)
     table = Table(
         head=("swept key", "lowest", "highest", "unit"),
         rows=tuple(
@@ -189,7 +184,7 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
         number_columns=(1, 2),
     )
     text = f"{len(parameters)} key{'s' if len(parameters) > 1 else ''} varied from trial to trial."
-    return ReportSection("parameters", "Parameters", title, text, ((panel,), table))
+    return ReportSection("parameters", "Parameters", title, text, (*([(panel,)] if len(shown) > 1 else []), table))
 
 
 def _show_outcomes(

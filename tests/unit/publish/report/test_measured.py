@@ -11,7 +11,7 @@ import pytest
 
 from throwcollect.dataset.journal import JournalLine
 from throwcollect.dataset.reader import Dataset
-from throwcollect.publish.report.figures import draw_limit_boxes, draw_throughput
+from throwcollect.publish.report.figures import draw_limit_boxes, draw_parameter_matrix, draw_throughput
 from throwcollect.publish.report.measured import (
     Outcomes,
     SweptKey,
@@ -32,6 +32,21 @@ def test_the_values_of_a_swept_key_are_those_of_the_trials(collection: Any, tmp_
     (parameter,) = parameters_of(collection.collect(tmp_path / "dataset", lost=[2]))
     assert (parameter.key, parameter.unit, parameter.counts.sum(axis=0).tolist()) == ("task.duration_s", "s", [6, 1])
     assert parameter.values.tolist() == [trial.values["task.duration_s"] for trial in collection.plan.trials]
+
+
+def test_the_matrix_shows_each_trial_at_its_values_in_the_colour_of_its_outcome(
+    make_collection: Any, tmp_path: Path
+) -> None:
+    swept = {"task.duration_s": {"min": 0.8, "max": 1.2}, "ball.mass_kg": {"min": 0.01, "max": 0.1, "scale": "log"}}
+    settings = {"trials": 5, "sweep": {"sampler": "uniform", "parameters": swept}}
+    dataset = Dataset.open(make_collection(settings).collect(tmp_path / "dataset", lost=[2]))
+    outcomes = Outcomes.of(dataset["outcome"].tolist())
+    landed, lost = draw_parameter_matrix(read_parameters(dataset.config, dataset.throws, outcomes), outcomes).data
+    assert (landed.customdata.tolist(), lost.customdata.tolist()) == ([0, 1, 3, 4], [2])
+    duration, mass = landed.dimensions
+    assert (duration.label, mass.label) == ("duration_s<br>task [s]", "mass_kg<br>ball [kg]")
+    assert mass.values == pytest.approx(dataset["ball_mass_kg"][[0, 1, 3, 4]], rel=1e-6)
+    assert (duration.axis.type, mass.axis.type) == ("linear", "log")
 
 
 def test_peaks_are_grouped_by_the_joint_that_had_them() -> None:
