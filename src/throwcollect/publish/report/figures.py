@@ -26,6 +26,7 @@ from throwcollect.publish.report.measured import (
 )
 from throwcollect.robots.surroundings import BodyLook
 from throwcollect.tasks.outcome_styles import LANDED, style_of
+from throwcollect.wording import format_count
 
 BLUE = style_of(LANDED).colour
 NEUTRAL = "#8a8f98"
@@ -106,27 +107,19 @@ def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:
 
 def draw_limit_boxes(peaks: Mapping[str, NDArray[np.float64]]) -> go.Figure:
     """Draw the peaks of each joint over their limit, as `summarise_peaks` finds them, the first joint on top."""
-    rows = [*peaks.items()][::-1]
-    low, first, median, third, high = np.transpose(
-        [np.percentile(shares, [0, 25, 50, 75, 100]) for _, shares in rows]
-    ).tolist()
-    figure = go.Figure(
-        go.Box(
-            y=[f"{joint}<br>{len(shares)} trial{'s' if len(shares) > 1 else ''}" for joint, shares in rows],
-            lowerfence=low,
-            q1=first,
-            median=median,
-            q3=third,
-            upperfence=high,
-            orientation="h",
+    figure = go.Figure()
+    for joint, shares in [*peaks.items()][::-1]:
+        figure.add_box(
+            x=single_precision(shares[choose_points(len(shares))]),
+            name=f"{joint}<br>{format_count(len(shares), 'trial')}",
+            boxpoints=False,
             line_color=BLUE,
             showlegend=False,
-            name="",
         )
-    )
     figure.add_vline(x=1, line=LIMIT_LINE)
-    figure.update_xaxes(title="peak over limit [-]", range=[0, max(1.08, 1.05 * max(high))])
-    return figure.update_layout(height=120 + 46 * len(rows))
+    most = max(float(shares.max()) for shares in peaks.values())
+    figure.update_xaxes(title="peak over limit [-]", range=[0, max(1.08, 1.05 * most)])
+    return figure.update_layout(height=120 + 46 * len(peaks))
 
 
 def draw_throughput(times: Mapping[str, list[float]], total_s: float, noun: str) -> go.Figure:
