@@ -15,7 +15,7 @@ from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError, PlanError
 from throwcollect.extras import require
 from throwcollect.side_by_side import count_cores
-from throwcollect.wording import command, format_count, join_names
+from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
     from throwcollect.learning.model import Model
@@ -25,8 +25,7 @@ ModelOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="MODEL", help="Directory to write; must be new or empty.")
 ]
 ScatterOption = Annotated[
-    float,
-    typer.Option("--scatter", help="Standard deviation of where throws with the same parameters end, in their unit."),
+    float, typer.Option("--scatter", min=0, help="Standard deviation of where equal throws end, in its unit.")
 ]
 
 
@@ -55,13 +54,8 @@ def fit(
 
     if onnx:
         require("onnx")
-    model = fit(
-        dataset,
-        targets=_split(targets),
-        parameters=_split(parameters),
-        given=_split(given),
-        where=where,
-    )
+    names = {"targets": _split(targets), "parameters": _split(parameters), "given": _split(given)}
+    model = fit(dataset, **names, where=where)
     if onnx:
         model = model.distil()
     model.save(output)
@@ -181,9 +175,9 @@ def score(
     """Throw at targets in simulation, and note in the model how well it hits.
 
     Options:
-        targets (N): Number of targets for each seed.
-        seed: First seed; targets are chosen by it.
-        seeds (N): Number of seeds; their medians count.
+        targets (N 1..): Number of targets for each seed.
+        seed (N 0..): First seed; targets are chosen by it.
+        seeds (N 1..): Number of seeds; their medians count.
         world (--config CONFIG): Another world, in which the model is adapted by a few throws.
         policy (MODULE:FUNCTION): Score this policy instead; MODEL may be a dataset.
         hit: With --policy: largest miss of a hit, in its unit.
@@ -224,14 +218,13 @@ def adapt(
         throws (THROWS): CSV file with what was thrown and where it ended, or a dataset.
         method: What the world may differ by: auto, offset, bias, latent or none.
     """
-    from throwcollect.learning.lists import read_rows
+    from throwcollect.learning.lists import read_throws
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
 
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
-    names = (*keys, *model.targets)
-    rows = _read_dataset(throws, names, model) if throws.is_dir() else read_rows(throws, names, "THROWS")
+    rows = read_throws(throws, model)
     adapted = model.adapt(
         [dict(zip(keys, row[: len(keys)], strict=True)) for row in rows],
         [row[len(keys) :] for row in rows],
@@ -271,27 +264,6 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
     if len(values) != len(names):
         raise ConfigError(f"--at {text}", expected=f"{format_count(len(names), 'number')}: {','.join(names)}")
     return values
-
-
-def _read_dataset(directory: Path, names: Sequence[str], model: Model) -> list[list[float]]:
-    """Read the throws of a dataset that a model can learn from: keys and columns of each."""
-    from throwcollect.config.values import column_of
-    from throwcollect.dataset.reader import Dataset
-    from throwcollect.learning.fitting import keep_informative
-
-    dataset = Dataset.open(directory)
-    trained, config = model.trained_on, dataset.config
-    if (config.robot.name, config.task.name) != (trained.robot, trained.task):
-        raise ConfigError(
-            f"{directory}: the task {config.task.name} of the robot {config.robot.name}",
-            expected=f"{trained.task} of {trained.robot}, as the model has it",
-        )
-    throws = keep_informative(config.task, dataset.throws, model.targets)
-    if missing := [name for name in names if column_of(name) not in throws.column_names]:
-        raise ConfigError(
-            f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
-        )
-    return [list(row) for row in zip(*(throws[column_of(name)].to_pylist() for name in names), strict=True)]
 
 
 def _score_policy(

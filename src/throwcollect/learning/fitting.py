@@ -48,7 +48,6 @@ def fit(
             or too few throws succeeded.
         DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
-    _check_names(targets, parameters, given)
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
     config, selected = dataset.config, _select(dataset, where)
@@ -89,14 +88,6 @@ def keep_informative(task: TaskConfig, throws: pa.Table, targets: Sequence[str])
         if name in throws.column_names:
             throws = throws.filter(pc.is_valid(throws[name]))
     return throws
-
-
-def _check_names(targets: Sequence[str], parameters: Sequence[str], given: Sequence[str]) -> None:
-    for argument, names in (("targets", targets), ("parameters", parameters), ("given", given)):
-        if twice := [name for name in names if names.count(name) > 1]:
-            raise ConfigError(f"{argument}: {twice[0]} is named twice", expected="each name once")
-    if both := [key for key in parameters if key in given]:
-        raise ConfigError(f"parameters and given: {both[0]} is in both", expected="each key in one of them")
 
 
 def _select(dataset: Dataset, where: str | None) -> Dataset:

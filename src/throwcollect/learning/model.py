@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.dataset.carried_robot import copy_carried
 from throwcollect.dataset.directory import has_files
-from throwcollect.errors import ConfigError, DatasetError, check_bounds, read_word, refuse_argument
+from throwcollect.errors import ConfigError, DatasetError, read_word, refuse_argument
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
 from throwcollect.learning.adapting import Method, adapt, refuse_far_throws
@@ -80,7 +80,7 @@ class Model(ModelCard):
             points: For each throw, values by key of all `parameters` and all `given`.
 
         Raises:
-            ConfigError: If a key is missing or unknown, or a value is not finite.
+            ConfigError: If a key is missing or unknown.
         """
         parameters, context = self._read_inputs(points)
         return self.predict_ends(parameters, context)
@@ -138,13 +138,8 @@ class Model(ModelCard):
             processes: How many processes simulate.
 
         Raises:
-            ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
-        for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
-            check_bounds(name, number, least=1)
-        check_bounds("seed", seed, least=0)
-        _check_scatter(scatter)
         distilled = None if self.distilled is None else distil(self.correct(None))
         return score_model(
             self,
@@ -174,8 +169,8 @@ class Model(ModelCard):
             scatter: Standard deviation of the measured ends, in the unit of the targets.
 
         Raises:
-            ConfigError: If there are no throws, or not one place for each; a key is missing or unknown, a value is not
-                finite, there is no such method, or a parameter, context or place is far outside the dataset.
+            ConfigError: If there are no throws, or not one place for each; a key is missing or unknown, there is no
+                such method, or a parameter, context or place is far outside the dataset.
         """
         parameters, context = self._read_inputs(points)
         measured = _read_places("places", places, self.targets)
@@ -183,7 +178,6 @@ class Model(ModelCard):
             raise ConfigError(
                 f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
             )
-        _check_scatter(scatter)
         chosen = None if method is None else read_word("method", method, Method)
         if chosen is Method.LATENT and not self.latents:
             raise refuse_argument(
@@ -240,20 +234,12 @@ class Model(ModelCard):
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points."""
         names = (*self.parameters, *self.given)
-        rows = []
         for number, point in enumerate(points):
             if wrong := sorted(set(point) ^ set(names), key=str):
-                state = "is missing" if wrong[0] in names else "is no key that this model takes"
-                raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
-            rows.append([point[name] for name in names])
-        values = np.array(rows, np.float64).reshape(-1, len(names))
-        if not np.isfinite(values).all():
-            number, column = np.argwhere(~np.isfinite(values))[0].tolist()
-            value = values[number, column]
-            raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
-        split = len(self.parameters)
-        parameters = self.scale(KeyRole.PARAMETER, values[:, :split])
-        return parameters, self.scale(KeyRole.CONTEXT, values[:, split:])
+                raise ConfigError(f"throw {number}: {', '.join(wrong)}", expected=f"values of {', '.join(names)}")
+        values = np.array([[point[name] for name in names] for point in points], np.float64).reshape(-1, len(names))
+        parameters, context = np.split(values, [len(self.parameters)], axis=1)
+        return self.scale(KeyRole.PARAMETER, parameters), self.scale(KeyRole.CONTEXT, context)
 
 
 def load_model(directory: StrPath) -> Model:
@@ -310,10 +296,3 @@ def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequenc
             wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
             raise refuse_argument(argument, f"got {row}", expected=wanted)
     return np.array(rows, np.float64).reshape(-1, len(names))
-
-
-def _check_scatter(scatter: float) -> None:
-    """Refuse a number that is no standard deviation."""
-    if not 0.0 <= scatter <= LARGEST_TARGET:
-        expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"
-        raise refuse_argument("scatter", f"got {scatter}", expected=expected)

@@ -66,18 +66,10 @@ def score_model(
     distilled: DistilledMap | None,
     processes: int,
 ) -> Score:
-    """Throw at targets, in the world of the dataset and in another one.
+    """Throw at `count` targets of each seed, in the world of the dataset and in another one; see `Model.score`.
 
-    Args:
-        learned: The map. If it was adapted already, adapting to the other world begins with its correction, and the
-            throws in the world of the dataset leave the correction out.
-        simulator: Simulates the world of the dataset.
-        count: Number of targets of each seed.
-        seeds: Seeds of their choice, of the throws that smaller models are learned from, and of the noise.
-        world: Simulates the other world; None for none.
-        scatter: Standard deviation of noise on the measured ends of throws in the other world.
-        distilled: The map that is distilled for the world of the dataset; None for none.
-        processes: How many processes simulate.
+    If the map was adapted already, adapting to the other world begins with its correction, and the throws in the world
+    of the dataset leave the correction out.
     """
     context = _find_nominal_context(learned)
     plain = learned.correct(None)

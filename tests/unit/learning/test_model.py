@@ -133,19 +133,6 @@ def test_a_score_is_stored_in_the_model_and_shown_in_its_card(model: Model, tmp_
     assert "with a scatter of 2.00 cm" in card
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"targets": [*TARGETS, TARGETS[0]]}, "targets: landing_x_m is named twice"),
-    ],
-)
-def test_fit_refuses_wrong_options_and_too_few_throws(
-    dataset: Dataset, options: dict[str, object], message: str
-) -> None:
-    with pytest.raises(ConfigError, match=message.replace("(", r"\(")):
-        fit(dataset, **options)
-
-
 def test_fit_leaves_out_throws_that_did_not_land(dataset: Dataset) -> None:
     found = fit(change(dataset, "outcome", ["self_hit"] * 20 + ["landed"] * (COUNT - 20)))
     assert (found.trained_on.throws, found.trained_on.ignored) == (COUNT - 20, 20)
