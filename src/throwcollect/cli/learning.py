@@ -54,8 +54,8 @@ def fit(
 
     if onnx:
         require("onnx")
-    names = {"targets": _split(targets), "parameters": _split(parameters), "given": _split(given)}
-    model = fit(dataset, **names, where=where)
+    columns = {"targets": _split(targets), "parameters": _split(parameters), "given": _split(given)}
+    model = fit(dataset, **columns, where=where)
     if onnx:
         model = model.distil()
     model.save(output)
