@@ -98,7 +98,6 @@ def render(
     camera: str | None = None,
     size: str | None = None,
     slow: float = 1.0,
-    strip: int = 1,
     json: JsonOption = False,
 ) -> None:
     """Draw throws as an animated picture, a video or a picture, from what was recorded.
@@ -109,7 +108,6 @@ def render(
         camera (NAME): Camera of the configuration that sees them; a place to their right if not given.
         size (WIDTHxHEIGHT): Size of the picture of a throw in pixels.
         slow (FACTOR 0.5..20): How many times slower than it was.
-        strip (COUNT 1..50): Pictures of a throw in a .png, from its start to its end.
     """
     from throwcollect.publish.view.animation import render as render_throws
 
@@ -120,7 +118,7 @@ def render(
         if min(pixels) < 8:
             raise ConfigError(f"--size: got {size!r}", expected="pixels such as 640x400, each from 8 to 9999")
     chosen = None if trials is None else read_trials(trials)
-    written = render_throws(directory, output, trials=chosen, camera=camera, size=pixels, slow=slow, strip=strip)
+    written = render_throws(directory, output, trials=chosen, camera=camera, size=pixels, slow=slow)
     text = (
         f"{written.file}: {format_count(len(written.trials), 'throw')}, {format_count(written.pictures, 'picture')}, "
         f"{written.duration_s:.1f} s, {written.size_bytes / 1e6:.2f} MB"

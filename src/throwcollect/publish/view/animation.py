@@ -6,7 +6,6 @@ import io
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +48,7 @@ class Rendering:
     Attributes:
         file: The file.
         trials: Numbers of the trials in it.
-        pictures: Number of pictures, one after another or in a row.
+        pictures: Number of pictures, one after another.
         duration_s: How long it moves [s], without the time of the last picture.
         size_bytes: Its size.
     """
@@ -69,27 +68,23 @@ def render(
     camera: str | None = None,
     size: tuple[int, int] | None = None,
     slow: float = 1.0,
-    strip: int = 1,
 ) -> Rendering:
     """Draw throws of a dataset.
 
     Args:
         directory: The dataset.
-        output: A ``.webp``, ``.gif``, ``.mp4`` or ``.png`` file, which is replaced if it exists. All but the last show
-            the throws from start to end.
+        output: A ``.webp``, ``.gif``, ``.mp4`` or ``.png`` file, which is replaced if it exists. A PNG shows
+            the end of the throws, all others show them from start to end.
         trials: Numbers of the trials, which begin at the same time, side by side; the first one that has an episode by
             default.
         camera: Name of a camera of the configuration, which draws what it sees; by default a place from which all of
             the throws can be seen, with the path of the object and where it ended.
         size: Width and height of the picture of a throw [pixels].
         slow: How many times slower than real time it is.
-        strip: Number of pictures in a PNG file, from the start to the end of the throws; a single one shows the end.
     """
     kind = output.suffix.lower()
     if kind not in _KINDS:
         raise ConfigError(f"{output}: no picture ends like this", expected=f"a name with {' or '.join(_KINDS)}")
-    if strip > 1 and kind != ".png":
-        raise ConfigError(f"{output}: a strip of {strip} pictures", expected="a name with .png")
     require("PIL", *(("av",) if kind == ".mp4" else ()))
     dataset = Dataset.open(directory)
     chosen = choose_throws(dataset, trials)
@@ -99,25 +94,15 @@ def render(
         raise ConfigError(f"trials: {len(chosen)} throws", expected=f"at most {_MOST_THROWS} in one picture")
     throws, cameras = _prepare(chosen, camera, size)
     last_s = max(float(each.times_s[-1]) for each in throws)
-    still = kind == ".png"
-    times = [*np.arange(0, last_s, _FRAME_MS / 1000 / slow), last_s]
-    if still:
-        times = np.linspace(0, last_s, strip).tolist() if strip > 1 else [last_s]
-    # A strip has a row for each throw; an animated picture has all throws at each time.
-    sheets = [list(product(range(len(throws)), [time_s])) for time_s in times]
-    columns = math.ceil(math.sqrt(len(throws)))
-    if still:
-        sheets, columns = [list(product(range(len(throws)), times))], strip if strip > 1 else columns
+    times = [last_s] if kind == ".png" else [*np.arange(0, last_s, _FRAME_MS / 1000 / slow), last_s]
 
-    def draw(number: int, time_s: float) -> Picture:
-        each = throws[number]
-        lines = [f"{each.throw.trial}: {each.throw.outcome.replace('_', ' ')}"] if len(throws) > 1 else []
-        lines += [f"{time_s:.2f} s"] if still and strip > 1 else []
-        return _label(each.draw(cameras[number], time_s, marks=camera is None), lines)
+    def draw(each: DrawnThrow, seen_by: Camera, time_s: float) -> Picture:
+        words = f"{each.throw.trial}: {each.throw.outcome.replace('_', ' ')}" if len(throws) > 1 else ""
+        return _label(each.draw(seen_by, time_s, marks=camera is None), words)
 
     pictures = [
-        _arrange([draw(number, time_s) for number, time_s in sheet], columns)
-        for sheet in log_progress(sheets, len(sheets), "picture", "drawn")
+        _arrange([draw(each, seen_by, time_s) for each, seen_by in zip(throws, cameras, strict=True)])
+        for time_s in log_progress(times, len(times), "picture", "drawn")
     ]
     data = _encode(kind, pictures, {HELD, *(each.color for each in throws)})
     write_file(output, data)
@@ -150,21 +135,20 @@ def _prepare(
     return throws, cameras
 
 
-def _label(picture: Picture, lines: Sequence[str]) -> Picture:
-    """Write lines into the upper left corner of a picture."""
-    if not lines:
+def _label(picture: Picture, words: str) -> Picture:
+    """Write words into the upper left corner of a picture."""
+    if not words:
         return picture
     image = images.fromarray(picture)
-    font = fonts.load_default(max(11, image.width // 26))
-    drawing.Draw(image).text((6, 4), "\n".join(lines), _INK, font)
+    drawing.Draw(image).text((6, 4), words, _INK, fonts.load_default(max(11, image.width // 26)))
     return np.asarray(image)
 
 
-def _arrange(pictures: Sequence[Picture], columns: int) -> Picture:
-    """Put pictures of one size side by side, row by row, with lines between them."""
+def _arrange(pictures: Sequence[Picture]) -> Picture:
+    """Put pictures of one size side by side, in about as many rows as columns, with lines between them."""
     if len(pictures) == 1:
         return pictures[0]
-    height, width, _ = pictures[0].shape
+    (height, width, _), columns = pictures[0].shape, math.ceil(math.sqrt(len(pictures)))
     rows = -(-len(pictures) // columns)
     sheet = np.full((rows * (height + _GAP) - _GAP, columns * (width + _GAP) - _GAP, 3), _PAPER, np.uint8)
     for number, picture in enumerate(pictures):
