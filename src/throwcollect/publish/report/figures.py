@@ -129,32 +129,17 @@ def draw_throughput(times: Mapping[str, list[float]], total_s: float, noun: str)
     rate_per_s = np.histogram(commits, edges_s)[0] / np.diff(edges_s)
     unit, seconds = ("h", 3600) if total_s > 7200 else ("min", 60) if total_s > 120 else ("s", 1)
     edges = edges_s / seconds
-    figure = go.Figure(
-        go.Scatter(
-            # Each rate is a step from one edge to the next, so each edge appears twice, but the first and last once.
-            x=np.repeat(edges, 2)[1:-1],
-            y=np.repeat(rate_per_s, 2),
-            mode="lines",
-            fill="tozeroy",
-            line={"color": BLUE, "width": 1.5},
-            name=f"{noun}s",
-            hovertemplate=f"%{{y:.1f}} {noun}s/s<extra></extra>",
-        )
-    )
-    for kind, name, symbol, colour in (
-        ("fail", "a simulation did not bring a trial back", "x", "#D55E00"),
-        ("lost", "a trial was lost", "diamond", NEUTRAL),
-    ):
-        if times[kind]:
-            x = np.array(times[kind])[choose_points(len(times[kind]), 500)] / seconds
-            marker = {"symbol": symbol, "color": colour, "size": 9}
-            figure.add_scatter(x=x, y=np.zeros(len(x)), mode="markers", name=name, marker=marker, cliponaxis=False)
+    line = {"color": BLUE, "width": 1.5, "shape": "hv"}
+    hover = f"%{{y:.1f}} {noun}s/s<extra></extra>"
+    # Each rate holds from one edge to the next.
+    figure = go.Figure(go.Scatter(x=edges, y=[*rate_per_s, rate_per_s[-1]], line=line, hovertemplate=hover))
+    figure.update_traces(mode="lines", fill="tozeroy")
     # The first opening began the collection; each later one resumed it.
     for time_s in times["opened"][1:]:
         figure.add_vline(x=time_s / seconds, line=MOMENT_LINE)
     figure.update_xaxes(title=f"time spent collecting [{unit}]", range=[0, edges[-1]])
     figure.update_yaxes(title=f"{noun}s per second [1/s]", rangemode="tozero")
-    return figure.update_layout(height=300, legend=LEGEND_ABOVE, showlegend=len(figure.data) > 1)
+    return figure.update_layout(height=300, showlegend=False)
 
 
 def place_bars(edges: NDArray[np.float64]) -> dict[str, Any]:
@@ -212,8 +197,8 @@ class Points:
         if not len(self):
             return ()
         return (
-            Tile(f"{self.distance_m.min():.2f}–{self.distance_m.max():.2f} m", distance),
-            Tile(f"{self.speed_mps.min():.2f}–{self.speed_mps.max():.2f} m/s", speed),
+            (f"{self.distance_m.min():.2f}–{self.distance_m.max():.2f} m", distance),
+            (f"{self.speed_mps.min():.2f}–{self.speed_mps.max():.2f} m/s", speed),
         )
 
 

@@ -175,12 +175,12 @@ def summarise_peaks(throws: pa.Table, kind: str) -> dict[str, NDArray[np.float64
 
 
 def measure_times(events: Iterable[JournalLine]) -> tuple[dict[str, list[float]], float]:
-    """Find when trials came in (``commit``), failed or were lost, and when the journal was ``opened``, without pauses.
+    """Find when trials came in (``commit``), and when the journal was ``opened``, without pauses.
 
     Returns:
         The times of these entries of a journal, which are in order, since the first one [s]; and that of the last one.
     """
-    times: dict[str, list[float]] = {kind: [] for kind in ("commit", "opened", "fail", "lost")}
+    times: dict[str, list[float]] = {"commit": [], "opened": []}
     elapsed = 0.0
     last: float | None = None
     for event in events:

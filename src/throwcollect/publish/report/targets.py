@@ -113,21 +113,15 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
     ]
     text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
     text += f"{'; '.join(medians)}, in simulation." if medians else "None of them ended anywhere."
-    panels = [
-        _show_map(dataset, targets),
-        *(
-            Panel(name, f"Share of misses below a distance: {name}", _draw_share(dataset, name))
-            for name, each in misses.items()
-            if each.measured
-        ),
-    ]
     rows = (
         (name, f"{each.targets:,}", f"{each.measured:,}", *each.format_misses(unit_of_name(name)))
         for name, each in misses.items()
     )
     head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
     table = Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
-    return (ReportSection("misses", "Targets", "How targets are missed", text, (tuple(panels), table)),)
+    return (
+        ReportSection("misses", "Targets", "How targets are missed", text, ((_show_map(dataset, targets),), table)),
+    )
 
 
 def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> Panel:
@@ -142,24 +136,6 @@ def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> P
     aimed = ~np.isnan(goals).any(axis=1)
     columns = [declared[name].of for name in shown]
     return _show_miss_map("map", "Targets", places[~aimed], goals[aimed], places[aimed], columns, dataset.config.task)
-
-
-def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
-    scale, unit = choose_shown_unit(unit_of_name(miss))
-    values: NDArray[np.float64] = np.sort(dataset.throws[miss].drop_null().to_numpy()) * scale
-    figure = go.Figure()
-    chosen = choose_points(len(values))
-    figure.add_scatter(
-        x=values[chosen],
-        # The values are sorted, so this share of them is not greater than the value at this index.
-        y=(chosen + 1) / len(values),
-        mode="lines+markers",
-        line={"color": BLUE, "width": 2},
-        marker={"color": BLUE, "size": 4, "symbol": "circle"},
-    )
-    figure.update_xaxes(title=f"distance from the target [{unit}]", rangemode="tozero")
-    figure.update_yaxes(title="share of trials", range=[0, 1.02])
-    return figure.update_layout(height=420, showlegend=False)
 
 
 def show_model(directory: Path, dataset: Dataset) -> ReportSection:

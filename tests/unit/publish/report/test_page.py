@@ -23,10 +23,10 @@ from throwcollect.publish.report.sections import Report, render_page, report_dat
 SECTIONS = [
     "landing",
     "release",
+    "physics",
     "parameters",
     "outcomes",
     "limits",
-    "physics",
     "throughput",
     "provenance",
 ]

@@ -29,14 +29,12 @@ def test_the_section_shows_targets_misses_and_their_spread(tmp_path: Path) -> No
         f"3 of 4 throws should end at a target. miss_m: median {100 * misses[1]:.2f} cm, "
         f"9 of 10 below {100 * share90:.2f} cm, in simulation."
     )
-    above, spread = section.blocks[0]
+    (above,) = section.blocks[0]
     others, targets, lines = above.figure.data
     assert (len(others.x), sorted(targets.x)) == (1, [1.4, 1.5, 1.6])
     ends = np.array(lines.x, np.float64)[1::3], np.array(lines.y, np.float64)[1::3]
     thrown = [throw for throw in dataset if throw.target]
     assert np.allclose(ends[0], [throw.row["landing_x_m"] for throw in thrown])
-    assert np.allclose(spread.figure.data[0].x, [100 * miss for miss in misses])
-    assert np.allclose(spread.figure.data[0].y, [1 / 3, 2 / 3, 1])
     assert "misses" in [each.key for each in report_dataset(dataset).sections]
 
 

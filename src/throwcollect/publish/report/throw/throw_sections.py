@@ -50,11 +50,11 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     cells = tuple(_show_cells(planned, throws, target, outcomes.verbs[1])) if len(planned) else ()
     return TaskReport(
         tiles=planned.show_ranges("landing distance", "release speed"),
-        results=(
+        sections=(
             _show_landings(landings, planned, outcomes, cells, height_m=height_m, bodies=bodies),
             _show_releases(landings, np.degrees(read_numbers(throws, "release_elevation_rad")[landings.row]), outcomes),
+            show_physics(measure_residuals(dataset), len(dataset.recorded)),
         ),
-        episodes=(show_physics(measure_residuals(dataset), len(dataset.recorded)),),
     )
 
 

@@ -74,8 +74,8 @@ def test_a_report_on_throws_into_a_bin_shows_the_bin_and_which_throws_stayed_in_
     outcomes = Outcomes.of(dataset["outcome"].tolist(), list(IntoOutcome))
     assert outcomes.counts["in_bin"] == 2
     report = report_throws(dataset, outcomes)
-    assert [tile.label for tile in report.tiles] == ["landing distance", "release speed"]
-    landing, _ = report.results
+    assert [label for _, label in report.tiles] == ["landing distance", "release speed"]
+    landing, *_ = report.sections
     assert landing.text.startswith(
         "2 of 6 throws stayed in the bin; the balls crossed the plane of the rim at z = 0.25 m"
     )
