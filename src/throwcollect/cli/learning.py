@@ -36,7 +36,6 @@ def fit(
     targets: str | None = None,
     parameters: str | None = None,
     given: str | None = None,
-    where: str | None = None,
     onnx: bool = False,
     json: JsonOption = False,
 ) -> None:
@@ -46,7 +45,6 @@ def fit(
         targets (COLUMN,...): Where a trial ended; by default, those of the task.
         parameters (KEY,...): What aiming chooses; by default, all of task.
         given (KEY,...): What is given with a target; by default, those of the task.
-        where (CONDITION): Learn only from throws that fulfil it.
         onnx: Write model.onnx, too: target to parameters, for a robot's controller.
     """
     from throwcollect.learning.fitting import fit
@@ -54,8 +52,7 @@ def fit(
 
     if onnx:
         require("onnx")
-    columns = {"targets": _split(targets), "parameters": _split(parameters), "given": _split(given)}
-    model = fit(dataset, **columns, where=where)
+    model = fit(dataset, targets=_split(targets), parameters=_split(parameters), given=_split(given))
     if onnx:
         model = model.distil()
     model.save(output)

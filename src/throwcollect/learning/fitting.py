@@ -15,8 +15,7 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.carried_robot import config_text
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.selection import find_rows
-from throwcollect.errors import ConfigError, DatasetError, refuse_argument
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath
 from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, count_needed_throws, fit_throws
 from throwcollect.learning.model import MODEL, Model, load_model
@@ -32,7 +31,6 @@ def fit(
     targets: Sequence[str] = (),
     parameters: Sequence[str] = (),
     given: Sequence[str] = (),
-    where: str | None = None,
 ) -> Model:
     """Learn a model from the throws of a dataset that succeeded.
 
@@ -41,24 +39,25 @@ def fit(
         targets: Columns that say where a trial ended; those of the task by default.
         parameters: Swept keys that aiming chooses; all of the task by default. The others belong to the world.
         given: Swept keys whose values are given with a target; those that the task names by default.
-        where: A condition on throws, as `Dataset.select` takes it.
 
     Raises:
-        ConfigError: If there is nothing to aim at, a key was not swept, no throw fulfils the condition,
-            or too few throws succeeded.
+        ConfigError: If there is nothing to aim at, a key was not swept, or too few throws succeeded.
         DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
-    config, selected = dataset.config, _select(dataset, where)
+    config = dataset.config
+    if isinstance(config.task.trajectory, MotionFile):
+        hint = "sweep parameters of a motion; throwcollect fit-dmp finds those of a motion of a file"
+        raise ConfigError(f"{dataset.directory} has motions of a file, and there is nothing between them", hint=hint)
     columns = tuple(targets) or config.task.targets
     if not columns:
         raise ConfigError(
             f"the task {config.task.name} names no targets", expected="columns of the table of throws as targets"
         )
-    throws = keep_informative(config.task, selected.throws, columns)
-    axes = _find_axes(selected, throws, parameters, given)
-    _check_amount(selected, throws, axes)
+    throws = keep_informative(config.task, dataset.throws, columns)
+    axes = _find_axes(dataset, throws, parameters, given)
+    _check_amount(dataset, throws, axes)
     outputs = np.column_stack([_read_numbers(throws, column, dataset) for column in columns])
     values = np.column_stack([_read_numbers(throws, column_of(axis.key), dataset) for axis in axes])
     return Model(
@@ -71,8 +70,7 @@ def fit(
             engine=config.sim.engine,
             digest=dataset.digest,
             throws=len(throws),
-            ignored=len(selected) - len(throws),
-            selection=where,
+            ignored=len(dataset) - len(throws),
         ),
         config=config_text(config),
         source=dataset.directory,
@@ -88,18 +86,6 @@ def keep_informative(task: TaskConfig, throws: pa.Table, targets: Sequence[str])
         if name in throws.column_names:
             throws = throws.filter(pc.is_valid(throws[name]))
     return throws
-
-
-def _select(dataset: Dataset, where: str | None) -> Dataset:
-    if isinstance(dataset.config.task.trajectory, MotionFile):
-        hint = "sweep parameters of a motion; throwcollect fit-dmp finds those of a motion of a file"
-        raise ConfigError(f"{dataset.directory} has motions of a file, and there is nothing between them", hint=hint)
-    if where is None:
-        return dataset
-    selected = dataset.select(find_rows(where, dataset.throws, "where"))
-    if not len(selected):
-        raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
-    return selected
 
 
 def _find_axes(

@@ -59,7 +59,6 @@ class TrainedOn(ModelEntry):
         digest: Digest of the dataset.
         throws: Number of throws that it was learned from.
         ignored: Number of throws that did not succeed.
-        selection: The condition on throws; None for all.
     """
 
     name: str
@@ -69,7 +68,6 @@ class TrainedOn(ModelEntry):
     digest: str
     throws: int
     ignored: int
-    selection: str | None
 
 
 class ModelCard(LearnedMap):
@@ -91,7 +89,6 @@ class ModelCard(LearnedMap):
     def describe(self, score: Score | None) -> str:
         """README.md of the model; its score is None if it has none."""
         trained, targets = self.trained_on, self.targets
-        selected = f" (those with `{trained.selection}`)" if trained.selection else ""
         folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in self.errors.items())
         if self.blind_error is not None:
             folds += f"; without latents: {format_length(self.blind_error, targets)}"
@@ -106,7 +103,7 @@ class ModelCard(LearnedMap):
             "",
             f"It maps the parameters of a trial to where it ends ({', '.join(targets)}), and back: from a target to "
             f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
-            f"`{trained.digest}`{selected}; {trained.ignored} that did not succeed were left out. Robot: "
+            f"`{trained.digest}`; {trained.ignored} that did not succeed were left out. Robot: "
             f"{trained.robot}; task: {trained.task}; physics engine: {trained.engine}. Made with "
             f"throwcollect {self.version}.",
             "",

@@ -33,7 +33,7 @@ def make_model(directory: Path, throws: int = 400) -> None:
         correction=none,
         errors={1: 0.002},
         blind_error=None,
-        trained_on=TrainedOn(**trained, throws=throws, ignored=0, selection=None),
+        trained_on=TrainedOn(**trained, throws=throws, ignored=0),
         values=values,
         outputs=values,
         efforts=np.full(throws, 0.5),

@@ -82,13 +82,7 @@ def _show_miss_map(
         )
         line = {"color": LIMIT_LINE["color"], "width": 1.5}
         figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {times}" if times > 1 else "misses")
-    # The title of an axis is the word that the task has for a column, or its own name, and the unit.
-    words, units = {each.of: each.word for each in task.target_columns}, [unit_of_name(each) for each in columns]
-    titles = [
-        f"{words.get(column, column.removesuffix(f'_{unit}'))} [{unit}]" if unit else column
-        for column, unit in zip(columns, units, strict=True)
-    ]
-    first, second = [*titles, ""][:2]
+    first, second = [*columns, ""][:2]
     figure.update_xaxes(title=first).update_yaxes(title=second, scaleanchor="x")
     title = f"{shown}, and misses drawn {times:,} times as long" if times > 1 else f"{shown} and misses"
     return Panel(key, title, figure.update_layout(height=420, legend=LEGEND_ABOVE))
@@ -106,13 +100,7 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
         return ()
     misses = summarise_misses(dataset.config, dataset.throws)
     targeted = int((~np.isnan(list(targets.values()))).any(axis=0).sum())
-    medians = [
-        "{}: median {}, 9 of 10 below {}".format(name, *each.format_misses(unit_of_name(name))[:2])
-        for name, each in misses.items()
-        if each.measured
-    ]
-    text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
-    text += f"{'; '.join(medians)}, in simulation." if medians else "None of them ended anywhere."
+    text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target."
     rows = (
         (name, f"{each.targets:,}", f"{each.measured:,}", *each.format_misses(unit_of_name(name)))
         for name, each in misses.items()
