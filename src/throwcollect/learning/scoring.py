@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -36,23 +36,17 @@ _APART = 1000
 
 
 class Simulates(Protocol):
-    """The part of `Simulator` that scoring needs."""
+    """The part of `Simulator` that scoring needs; that room is above this one."""
 
     config: Config
 
-    def find_refusal(self, values: Mapping[str, float]) -> str | None:
-        """Return why a throw would be refused; None if it would not."""
-        ...
+    @property
+    def find_refusal(self) -> Callable[[Mapping[str, float]], str | None]:
+        """Returns why a throw would be refused; None if it would not."""
 
-    def throw_many(
-        self,
-        points: Iterable[Mapping[str, float]],
-        *,
-        targets: Iterable[Mapping[str, float]] = (),
-        processes: int = 1,
-    ) -> Iterator[Throw]:
-        """Simulate throws, in order."""
-        ...
+    @property
+    def throw_many(self) -> Callable[..., Iterator[Throw]]:
+        """Simulates throws, in order."""
 
 
 def score_model(

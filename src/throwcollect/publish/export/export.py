@@ -66,7 +66,7 @@ def export(
         raise refuse_argument("images", f"{to} has no {way!r}", expected=" or ".join(chosen.images))
     dataset = Dataset.open(directory)
     streams = choose_streams(dataset.config, chosen.images[way])
-    source = ExportSource.of(dataset, streams, rate_hz=rate_hz, images=way)
+    source = ExportSource(dataset, streams, rate_hz=rate_hz, images=way)
     if images not in (None, NO_IMAGES) and not source.streams:
         raise refuse_argument("images", f"{directory} has no sensors that {to} has images of", expected=NO_IMAGES)
     with new_directory(output) as scratch:

@@ -145,9 +145,10 @@ class ThrowSeries:
         return sample_positions(self.trajectory, np.append(time_s[1:], time_s[-1] + 1 / rate_hz))
 
 
-@dataclass(frozen=True)
 class ExportSource:
-    """A dataset to export.
+    """A dataset to export, with some streams of its sensors, at a number of samples per second.
+
+    Without a number it is the recorded one, or the largest at which each sample has a frame of each sensor.
 
     Attributes:
         dataset: The dataset.
@@ -162,31 +163,16 @@ class ExportSource:
         progress: Logs how many of its trials have been exported.
     """
 
-    dataset: Dataset
-    rate_hz: int
-    targets: tuple[TargetColumn, ...]
-    signals: tuple[Signal, ...]
-    throws: Dataset
-    table: pa.Table
-    images: str
-    streams: Mapping[str, tuple[str, ...]]
-    progress: ProgressLog
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         dataset: Dataset,
         streams: Mapping[str, tuple[str, ...]],
         *,
         rate_hz: int | None = None,
         images: str = NO_IMAGES,
-    ) -> ExportSource:
-        """Take a dataset to export it, with some streams of its sensors, at a number of samples per second.
-
-        Without a number it is the recorded one, or the largest at which each sample has a frame of each sensor.
-        """
-        throws = dataset.recorded
-        if not len(throws):
+    ) -> None:
+        self.dataset, self.streams, self.images, self.throws = dataset, streams, images, dataset.recorded
+        if not len(self.throws):
             problem = f"none of its {len(dataset.throws)} trials has an episode to export"
             raise DatasetError(f"{dataset.directory}: {problem}")
         rates = {"joints": dataset.config.record.rate_hz}
@@ -196,18 +182,11 @@ class ExportSource:
             recorded = ", ".join(f"{name} at {rate} Hz" for name, rate in rates.items())
             expected = f"a divisor of {highest_hz}" + f", or --images {NO_IMAGES}" * (images != NO_IMAGES)
             raise refuse_argument("rate_hz", f"{rate_hz} samples per second of {recorded}", expected=expected)
-        targets = _list_targets(throws)
-        return cls(
-            dataset,
-            rate_hz or highest_hz,
-            targets,
-            tuple(list_signals(dataset.config, targets)),
-            throws,
-            dataset.throws.drop_columns(list(_PLACES)),
-            images,
-            streams,
-            ProgressLog(len(dataset.throws), "trial", "exported"),
-        )
+        self.rate_hz = rate_hz or highest_hz
+        self.targets = _list_targets(self.throws)
+        self.signals = tuple(list_signals(dataset.config, self.targets))
+        self.table = dataset.throws.drop_columns(list(_PLACES))
+        self.progress = ProgressLog(len(dataset.throws), "trial", "exported")
 
     @property
     def _step(self) -> int:

@@ -84,23 +84,18 @@ def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:
     """Draw the share of each outcome in each bin of a parameter."""
     totals = parameter.counts.sum(axis=1)
     shares = parameter.counts / np.maximum(totals, 1)[:, np.newaxis]
-    bars = place_bars(parameter.edges)
-    axis: dict[str, Any] = {}
-    if parameter.steps is not None:
-        bars, axis = {"x": [f"{value:g}" for value in parameter.steps], "width": 0.7}, {"type": "category"}
-    elif parameter.logarithmic:
-        axis = {"type": "log", **parameter.ticks}
     figure = go.Figure()
     for code, name in enumerate(outcomes.names):
         figure.add_bar(
-            **bars,
+            **place_bars(parameter.edges),
             y=shares[:, code],
             customdata=np.stack([parameter.counts[:, code], totals], axis=1),
             name=describe(name),
             marker_color=outcomes.style_of(name).colour,
             hovertemplate=f"%{{customdata[0]}} of %{{customdata[1]}} (%{{y:.1%}})<extra>{describe(name)}</extra>",
         )
-    figure.update_xaxes(**axis, title=f"value [{parameter.unit or '-'}]", showgrid=False)
+    kind = "log" if parameter.logarithmic else "linear"
+    figure.update_xaxes(type=kind, title=f"value [{parameter.unit or '-'}]", showgrid=False)
     figure.update_yaxes(title="share of trials", tickformat=".0%", range=[0, 1])
     return figure.update_layout(barmode="stack", bargap=0, showlegend=False, height=230)
 

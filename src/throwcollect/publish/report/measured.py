@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -106,7 +105,6 @@ class SweptKey:
         values: Value of each trial, shape ``(n_trials,)``.
         edges: Edges of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
         counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
-        steps: The distinct values, one a bin, if there are only a few; else None.
     """
 
     key: str
@@ -115,13 +113,6 @@ class SweptKey:
     values: NDArray[np.float64]
     edges: NDArray[np.float64]
     counts: NDArray[np.intp]
-    steps: NDArray[np.float64] | None
-
-    @property
-    def ticks(self) -> dict[str, list[Any]]:
-        """Ticks of a logarithmic axis for plotly: its own are powers of ten, and most ranges contain none."""
-        values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
-        return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
 
 
 def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[SweptKey, ...]:
@@ -134,10 +125,9 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
     swept = config.sweep.parameters.get(key)
     logarithmic = isinstance(swept, Range) and swept.scale == "log"
     distinct = np.unique(values)
-    steps = distinct if len(distinct) <= _BINS else None
-    if steps is not None:
-        edges = np.exp(_surround(np.log(steps))) if logarithmic and len(steps) > 1 else _surround(steps)
-        bins = np.searchsorted(steps, values)
+    if len(distinct) <= _BINS:
+        edges = np.exp(_surround(np.log(distinct))) if logarithmic and len(distinct) > 1 else _surround(distinct)
+        bins = np.searchsorted(distinct, values)
     else:
         low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
         # Bins have to cover all values, also those outside of the range of the sweep.
@@ -147,7 +137,7 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
         bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
     counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
     np.add.at(counts, (bins, outcomes.codes), 1)
-    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, counts, steps)
+    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, counts)
 
 
 def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:
