@@ -276,9 +276,6 @@ def score_policy(
         found.append(
             PolicyScore(
                 world=name,
-                targets=count,
-                seed=seeds[0],
-                seeds=len(seeds),
                 hit=hit,
                 hits=float((np.linalg.norm(away, axis=1) <= hit).mean()),
                 clipped=float(np.mean([throw.row["clipped_share"] for throw in simulated])),

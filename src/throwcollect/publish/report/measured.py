@@ -103,7 +103,7 @@ class SweptKey:
         unit: Unit of its values; empty if they have none.
         logarithmic: True if its logarithm, and not its value, was drawn evenly.
         values: Value of each trial, shape ``(n_trials,)``.
-        edges: Edges of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
+        edges: Edges of the bins, shape ``(n_bins + 1,)``.
         counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
     """
 
@@ -124,29 +124,12 @@ def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tup
 def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> SweptKey:
     swept = config.sweep.parameters.get(key)
     logarithmic = isinstance(swept, Range) and swept.scale == "log"
-    distinct = np.unique(values)
-    if len(distinct) <= _BINS:
-        edges = np.exp(_surround(np.log(distinct))) if logarithmic and len(distinct) > 1 else _surround(distinct)
-        bins = np.searchsorted(distinct, values)
-    else:
-        low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
-        # Bins have to cover all values, also those outside of the range of the sweep.
-        low, high = min(low, float(distinct[0])), max(high, float(distinct[-1]))
-        edges = np.geomspace(low, high, _BINS + 1) if logarithmic else np.linspace(low, high, _BINS + 1)
-        # The largest value lies on the last edge, and belongs to the last bin.
-        bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
-    counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
-    np.add.at(counts, (bins, outcomes.codes), 1)
-    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, counts)
-
-
-def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Place edges half-way between values, and as far beyond the first and the last."""
-    if len(steps) == 1:
-        half = abs(steps[0]) / 2 or 0.5
-        return np.array([steps[0] - half, steps[0] + half])
-    middles = (steps[:-1] + steps[1:]) / 2
-    return np.concatenate([[2 * steps[0] - middles[0]], middles, [2 * steps[-1] - middles[-1]]])
+    edges = np.histogram_bin_edges(np.log(values) if logarithmic else values, _BINS)
+    edges = np.exp(edges) if logarithmic else edges
+    # Rounding must not leave out the smallest and the largest value.
+    edges[[0, -1]] = min(edges[0], values.min()), max(edges[-1], values.max())
+    counts = [np.histogram(values[outcomes.are(name)], edges)[0] for name in outcomes.names]
+    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, np.stack(counts, axis=1))
 
 
 KINDS = ("position", "velocity", "effort")

@@ -157,7 +157,7 @@ def count_throws(
     angle = np.degrees(read_numbers(throws, "hit_angle_rad"))[landings.row]
     values = {"distance_m": landings.distance_m, "hit_angle_rad": angle}
     if target is None:
-        edges = {name: _choose_edges(column) for name, column in values.items()}
+        edges = {name: np.histogram_bin_edges(column, _BINS) for name, column in values.items()}
     else:
         if target.height_m is not None:
             # The column has the heights of all trials, but only trials with landings matter here.
@@ -171,25 +171,6 @@ def count_throws(
             edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack([values[name] for name in edges]), list(edges.values()))
     return edges, counts.astype(np.intp)
-
-
-def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose edges of cells whose width is a round number, which people can quote."""
-    low, high = float(values.min()), float(values.max())
-    width = _round_up((high - low) / _BINS) or 0.1
-    # There is one edge more, so that the largest value lies inside the last cell.
-    first, last = np.floor(low / width), np.floor(high / width) + 1
-    edges: NDArray[np.float64] = np.arange(first, last + 1) * width
-    return edges
-
-
-def _round_up(width: float) -> float:
-    """Round up to 1, 2 or 5 times a power of ten; to 0 if the width is too small to tell values apart."""
-    if width < 1e-9:
-        return 0.0
-    power = 10.0 ** np.floor(np.log10(width))
-    # The factor accepts a width that is a round number except for a rounding error.
-    return float(next(step * power for step in (1, 2, 5, 10) if step * power >= width * (1 - 1e-9)))
 
 
 def draw_coverage_map(edges: Mapping[str, NDArray[np.float64]], counts: NDArray[np.intp]) -> go.Figure:
