@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.progress_log import log_progress
-from throwcollect.publish.view.throw_pictures import FINE, HELD, SIZE, DrawnThrow, Rgb, camera_for
+from throwcollect.publish.view.throw_pictures import FINE, SIZE, DrawnThrow, camera_for
 from throwcollect.publish.view.viewer_directory import choose_throws
 from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.scene import Scene
@@ -38,7 +37,6 @@ _LAST_FRAME_MS = 1200
 _MOST_THROWS = 64
 _GAP = 2
 _INK, _PAPER = (60, 66, 74), (255, 255, 255)
-_GROUND = (214, 217, 222)
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ def render(
         _arrange([draw(each, seen_by, time_s) for each, seen_by in zip(throws, cameras, strict=True)])
         for time_s in log_progress(times, len(times), "picture", "drawn")
     ]
-    data = _encode(kind, pictures, {HELD, *(each.color for each in throws)})
+    data = _encode(kind, pictures)
     write_file(output, data)
     moves_s = (len(pictures) - 1) * _FRAME_MS / 1000
     return Rendering(output, tuple(each.throw.trial for each in throws), len(times), moves_s, len(data))
@@ -157,36 +155,16 @@ def _arrange(pictures: Sequence[Picture]) -> Picture:
     return sheet
 
 
-def _encode(kind: str, pictures: Sequence[Picture], lines: Collection[Rgb]) -> bytes:
-    """Encode pictures as a file of a kind, such as ``.gif``, in which lines have some colors."""
+def _encode(kind: str, pictures: Sequence[Picture]) -> bytes:
+    """Encode pictures as a file of a kind, such as ``.gif``."""
     if kind == ".mp4":
         return _encode_video(pictures)
     shown = [images.fromarray(picture) for picture in pictures]
-    if kind == ".gif":
-        shown = _reduce_colors(shown, lines)
     times = [_FRAME_MS] * (len(shown) - 1) + [_LAST_FRAME_MS]
     moving = {"save_all": True, "append_images": shown[1:], "duration": times, "loop": 0, "quality": 80, "method": 4}
     buffer = io.BytesIO()
     shown[0].save(buffer, kind[1:].upper(), **({"optimize": True} if kind == ".png" else moving))
     return buffer.getvalue()
-
-
-def _reduce_colors(pictures: Sequence[Any], lines: Collection[Rgb]) -> list[Any]:
-    """Give pictures the 256 colors that a GIF can have.
-
-    Thin lines have so few pixels that their colors would not be chosen. So the colors of lines, and of their smooth
-    edges on the ground, are set here.
-    """
-    ground = np.array(_GROUND)
-    fixed = [
-        tuple(np.round(ground + share * (np.array(color) - ground)).astype(int).tolist())
-        for color in sorted(lines)
-        for share in (0.25, 0.5, 0.75, 1.0)
-    ]
-    others = pictures[-1].quantize(256 - len(fixed)).getpalette()
-    palette = images.new("P", (1, 1))
-    palette.putpalette([value for color in fixed for value in color] + others)
-    return [picture.quantize(palette=palette, dither=images.Dither.NONE) for picture in pictures]
 
 
 def _encode_video(pictures: Sequence[Picture]) -> bytes:
