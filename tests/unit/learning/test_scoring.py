@@ -12,8 +12,7 @@ import pytest
 from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.misses import find_median, find_share90
-from throwcollect.learning.adapting import Adaptation, Method
+from throwcollect.learning.adapting import Method
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.score import Errors, Score
 from throwcollect.learning.scoring import draw_targets, score_model, spread_first
@@ -102,11 +101,6 @@ def test_scoring_in_the_world_of_the_dataset_ignores_an_earlier_adaptation() -> 
     assert found.adapted[0].errors.median < 0.01
 
 
-def test_scatter_increases_misses_after_adapting() -> None:
-    exact, scattered = (score(World(), World(SHIFT), scatter=scatter).adapted[1] for scatter in (0.0, 0.03))
-    assert exact.errors.median < scattered.errors.median
-
-
 def test_a_world_in_which_no_target_can_be_reached_has_no_adapted_scores() -> None:
     assert score(World(), World((5.0, 0.0))).adapted == []
 
@@ -132,14 +126,6 @@ def test_error_statistics_that_depend_on_a_throw_that_did_not_succeed_are_empty(
     assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.25, None, None)
     half = Errors.of([np.array([[0.3], [-0.1], [np.nan], [np.nan]])], ["landing_x_m"])
     assert (half.missed, half.median, half.largest) == (2, None, None)
-
-
-def test_errors_of_a_model_are_summed_up_as_misses_of_a_dataset_are() -> None:
-    misses = [0.1, 0.01, 0.03, 0.02]
-    found = Errors.of([np.array(misses)[:, np.newaxis]], ["landing_x_m"])
-    assert (found.median, found.share90) == (find_median(misses), find_share90(misses))
-    entry = Adaptation(method="none", throws=4, scatter=0.0, before=misses, after=[], found=[])
-    assert entry.medians == (found.median, None)
 
 
 def test_errors_in_metres_and_radians_are_summarised_separately() -> None:

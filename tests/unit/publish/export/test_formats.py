@@ -94,12 +94,6 @@ def test_an_export_of_a_damaged_dataset_leaves_no_files(to: str, source: Path, t
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_an_empty_output_directory_is_accepted(source: Path, tmp_path: Path) -> None:
-    (tmp_path / "empty").mkdir()
-    export(source, tmp_path / "empty", to="npz")
-    assert (tmp_path / "empty" / "throws.npz").exists()
-
-
 @pytest.mark.parametrize("rate_hz", [0, -5, 60, 500])
 def test_a_rate_that_does_not_divide_the_recorded_one_is_refused(rate_hz: int, source: Path, tmp_path: Path) -> None:
     with pytest.raises(

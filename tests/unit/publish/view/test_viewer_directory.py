@@ -19,7 +19,7 @@ from tests.unit.dataset.mcap_doctor import Examination
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.publish.view.viewer_directory import View, view
 from throwcollect.robots.talos import TALOS
 from throwcollect.sensing.drawn_robot import draw_robot_of
@@ -222,11 +222,3 @@ def test_only_trials_with_an_episode_can_be_chosen(
     with pytest.raises(DatasetError, match=message):
         view(dataset, tmp_path / "view", trials)
     assert not (tmp_path / "view").exists()
-
-
-def test_an_existing_directory_is_refused_and_left_alone(collected: Path, tmp_path: Path) -> None:
-    (tmp_path / "view").mkdir()
-    (tmp_path / "view" / "mine").write_text("mine")
-    with pytest.raises(ConfigError, match="view: "):
-        view(collected, tmp_path / "view", [0])
-    assert [path.name for path in tmp_path.rglob("*")] == ["view", "mine"]

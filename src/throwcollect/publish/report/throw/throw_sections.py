@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from typing import cast
 
 import numpy as np
 import plotly.graph_objects as go
@@ -19,12 +18,8 @@ from throwcollect.publish.report.figures import BLUE, SCALE, Points, colour_bar,
 from throwcollect.publish.report.measured import MOST_POINTS, Outcomes, read_numbers
 from throwcollect.publish.report.throw.flights import measure_residuals, show_physics
 from throwcollect.robots.surroundings import BodyLook, looks_of
-from throwcollect.tasks.task import task_of
-from throwcollect.tasks.throw.throw_task import ThrowTask
 from throwcollect.wording import format_count
 
-_HEIGHTS = frozenset((LANDING_HEIGHT, "task.bin.height_m", "task.bin.depth_m"))
-"""Keys that the height of landings follows from."""
 _FEW = 8
 """Up to this many throws in a cell, the scale has a mark for each number of throws; plotly would also mark halves."""
 _BINS = 14
@@ -40,8 +35,7 @@ _TITLES = {
 
 def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     """Make the part of a report that only datasets of throws have."""
-    throws, varies = dataset.throws, not _HEIGHTS.isdisjoint(dataset.plan.keys)
-    height_m = None if varies else cast("ThrowTask", task_of(dataset.config)).landing_height_m
+    throws = dataset.throws
     landings = Points.read(throws, outcomes, "landing", None, "release_speed_mps")
     planned = landings[outcomes.are(outcomes.success)[landings.row]]
     few = dataset[:: -(-len(dataset) // _EXAMPLES)]
@@ -51,7 +45,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     return TaskReport(
         tiles=planned.show_ranges("landing distance", "release speed"),
         sections=(
-            _show_landings(landings, planned, outcomes, cells, height_m=height_m, bodies=bodies),
+            _show_landings(landings, planned, outcomes, cells, bodies),
             _show_releases(landings, np.degrees(read_numbers(throws, "release_elevation_rad")[landings.row]), outcomes),
             show_physics(measure_residuals(dataset), len(dataset.recorded)),
         ),
@@ -63,8 +57,6 @@ def _show_landings(
     planned: Points,
     outcomes: Outcomes,
     cells: tuple[Panel, ...],
-    *,
-    height_m: float | None,
     bodies: Sequence[BodyLook],
 ) -> ReportSection:
     """Show where balls crossed the landing plane; `planned` are those that were thrown as planned, also by `cells`."""
@@ -76,10 +68,8 @@ def _show_landings(
         if outcomes.success != "landed":
             text += f"; the balls crossed the {_name_plane(outcomes)}"
         x, y, distance = planned.x_m, planned.y_m, planned.distance_m
-        text += (
-            f"{'' if height_m is None else f' at z = {height_m:g} m'}, {distance.min():.2f} to {distance.max():.2f} m "
-            f"from the robot: x {x.min():.2f} to {x.max():.2f} m, y {y.min():.2f} to {y.max():.2f} m"
-        )
+        text += f", {distance.min():.2f} to {distance.max():.2f} m from the robot: "
+        text += f"x {x.min():.2f} to {x.max():.2f} m, y {y.min():.2f} to {y.max():.2f} m"
     others = len(landings) - len(planned)
     text += f". {format_count(others, 'further ball')} crossed the {_name_plane(outcomes)}, too." if others else "."
     # A landing is all that a throw is about, but only a part of what other tasks are about.
