@@ -51,7 +51,7 @@ def score(world: World, other: World | None = None, *, seeds: range = range(1), 
 def test_a_model_of_more_throws_hits_better() -> None:
     world = World()
     found = score(world)
-    assert [each.trained_on for each in found.trained] == [30, 100, 300, 800]
+    assert [each.trained_on for each in found.trained] == [30, 100, 300, 400]
     medians = [each.errors.median for each in found.trained]
     assert medians[0] > medians[1] > medians[-1]
     assert medians[-1] < 0.001
@@ -106,7 +106,7 @@ def test_a_world_in_which_no_target_can_be_reached_has_no_adapted_scores() -> No
 
 
 def test_drawn_targets_lie_near_landings_but_spread_more_evenly() -> None:
-    landings = learn().outputs
+    landings = learn(800).outputs
     targets = draw_targets(landings, 200, 3)
     away = np.array([np.linalg.norm(landings - target, axis=1).min() for target in targets])
     assert away.max() < 0.05

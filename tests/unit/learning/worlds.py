@@ -49,14 +49,14 @@ def effort(values: Array) -> Array:
 
 
 @cache
-def learn(count: int = 800) -> LearnedMap:
+def learn(count: int = 400) -> LearnedMap:
     """A map of a world that is the same in all throws."""
     values = draw(count)
     return fit_throws(parameter_axes(), TARGETS, values, land(values), effort(values))
 
 
 @cache
-def learn_with_drag(count: int = 600, role: KeyRole = KeyRole.LATENT) -> LearnedMap:
+def learn_with_drag(count: int = 400, role: KeyRole = KeyRole.LATENT) -> LearnedMap:
     """A map of worlds that differ in the ball's drag, which has this role."""
     values = draw(count)
     drag = np.random.default_rng(9).random(count)
