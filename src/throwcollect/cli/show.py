@@ -48,10 +48,10 @@ def init(*, robot: str = "talos", flange: FlangeOption = None, task: str = "thro
 
 def _search_beginning(robot: str, section: RobotConfig, task: str) -> Beginning:
     from throwcollect.extras import is_installed
-    from throwcollect.learning.first_throw import find_first_throw
+    from throwcollect.learning.first_throw import FirstThrowSearch
 
     engine = "bullet" if is_installed("pybullet") else "mujoco"
-    return find_first_throw(section, write_robot(robot, section), task, engine, say=tell)
+    return FirstThrowSearch(section, write_robot(robot, section), task, engine, tell).run()
 
 
 def config(
