@@ -140,7 +140,7 @@ def test_damaged_frames_are_refused_with_their_place(
     path = directory / "seen_00000.mcap"
     whole = chunk.record() + join(*chunk.indexes.values())
     path.write_bytes(path.read_bytes().replace(whole, forge(chunk), 1))
-    done = call_here("dataset", "images", directory, "-o", tmp_path / "new", "--sensor", "eye", "--trials", "0")
+    done = call_here("dataset", "export", directory, tmp_path / "new", "--to", "npz", "--images", "arrays")
     assert done.returncode == 4
     assert done.stderr.startswith(f"throwcollect: {directory}") or "trial 0, eye: chunk" in done.stderr
     assert problem in done.stderr

@@ -72,7 +72,7 @@ def test_trajectories_have_columns_for_bodies(dataset: Path) -> None:
     assert {"can_angular_velocity", "brick_orientation_xyzw"} <= loaded.trajectories().columns.keys()
 
 
-@pytest.mark.parametrize("rate_hz", [250, 60])
+@pytest.mark.parametrize("rate_hz", [250, 50])
 def test_exports_have_columns_for_bodies(dataset: Path, pushed: int, rate_hz: int, tmp_path: Path) -> None:
     export(dataset, tmp_path / "out", to="parquet", rate_hz=rate_hz)
     table = pq.read_table(tmp_path / "out" / "trajectories", filters=[("trial", "==", pushed)])

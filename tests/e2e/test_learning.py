@@ -131,7 +131,7 @@ def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> N
     ("arguments", "message"),
     [
         (["aim", "model"], "no target"),
-        (["fit", "data", "-o", "new", "--where", "trial < 0"], "fulfils 'trial < 0'"),
+        (["fit", "data", "-o", "new", "--targets", "landing_x"], "no column of numbers 'landing_x'"),
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),
     ],
 )

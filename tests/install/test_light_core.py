@@ -215,7 +215,7 @@ except throwcollect.MissingExtraError as error:
         ("collect", ("plan", QUICKSTART)),
         ("collect", ("ros", "topic", "list")),
         ("report", ("dataset", "report", "DATASET")),
-        ("export", ("dataset", "export", "DATASET", "out", "--to", "npz", "--rate", "77")),
+        ("export", ("dataset", "export", "DATASET", "out", "--to", "mat")),
     ],
 )
 def test_a_command_without_its_extra_names_that_extra(

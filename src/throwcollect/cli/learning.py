@@ -15,7 +15,7 @@ from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError, PlanError
 from throwcollect.extras import require
 from throwcollect.side_by_side import count_cores
-from throwcollect.wording import command, format_count, join_names
+from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
     from throwcollect.learning.model import Model
@@ -25,8 +25,7 @@ ModelOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="MODEL", help="Directory to write; must be new or empty.")
 ]
 ScatterOption = Annotated[
-    float,
-    typer.Option("--scatter", help="Standard deviation of where throws with the same parameters end, in their unit."),
+    float, typer.Option("--scatter", min=0, help="Standard deviation of where equal throws end, in its unit.")
 ]
 
 
@@ -37,8 +36,6 @@ def fit(
     targets: str | None = None,
     parameters: str | None = None,
     given: str | None = None,
-    kind: str = "local",
-    where: str | None = None,
     onnx: bool = False,
     json: JsonOption = False,
 ) -> None:
@@ -48,8 +45,6 @@ def fit(
         targets (COLUMN,...): Where a trial ended; by default, those of the task.
         parameters (KEY,...): What aiming chooses; by default, all of task.
         given (KEY,...): What is given with a target; by default, those of the task.
-        kind: local, by the nearest throws, too; or polynomial.
-        where (CONDITION): Learn only from throws that fulfil it.
         onnx: Write model.onnx, too: target to parameters, for a robot's controller.
     """
     from throwcollect.learning.fitting import fit
@@ -57,14 +52,7 @@ def fit(
 
     if onnx:
         require("onnx")
-    model = fit(
-        dataset,
-        kind=kind,
-        targets=_split(targets),
-        parameters=_split(parameters),
-        given=_split(given),
-        where=where,
-    )
+    model = fit(dataset, targets=_split(targets), parameters=_split(parameters), given=_split(given))
     if onnx:
         model = model.distil()
     model.save(output)
@@ -76,11 +64,10 @@ def fit(
     for names, what in ((model.given, "given with a target"), (model.latents, "of the world")):
         if names:
             lines.append(f"{what}: {', '.join(names)}")
-    folds = trained.folds_error.items()
-    errors = ", ".join(f"degree {degree}: {format_length(error, model.targets)}" for degree, error in folds)
-    lines.append(f"error for throws that it was not fitted to, in simulation, median: {errors}")
+    each = (f"degree {degree}: {format_length(error, model.targets)}" for degree, error in model.errors.items())
+    lines.append(f"error for throws that it was not fitted to, in simulation, median: {', '.join(each)}")
     lines.append(f"model: {output}\naim with it: {command('aim', output, '--at', _write_example(model))}")
-    show(model.model_dump(mode="json", include={"kind", "targets", "axes", "trained_on"}), *lines, json=json)
+    show(model.model_dump(mode="json", include={"targets", "axes", "errors", "trained_on"}), *lines, json=json)
 
 
 def aim(
@@ -98,7 +85,7 @@ def aim(
         at (X,Y): A target, and what is given with it; may be repeated.
         targets (FILE): CSV file of targets, with a header line.
         output (--output -o FILE): CSV file to write, for the sampler `list`.
-        choose: Which of several throws: nearest, least-effort or least-sensitive.
+        choose: Which of several throws: nearest or least-effort.
     """
     from throwcollect.config.loader import load as load_config
     from throwcollect.learning.aiming import explain_reach
@@ -125,7 +112,7 @@ def aim(
     show([aim.as_dict() for aim in aims], *lines, json=json)
     for number, aim in enumerate(aims, start=1):
         if not aim.reachable:
-            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
+            tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model, aim)}")
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
 
@@ -185,9 +172,9 @@ def score(
     """Throw at targets in simulation, and note in the model how well it hits.
 
     Options:
-        targets (N): Number of targets for each seed.
-        seed: First seed; targets are chosen by it.
-        seeds (N): Number of seeds; their medians count.
+        targets (N 1..): Number of targets for each seed.
+        seed (N 0..): First seed; targets are chosen by it.
+        seeds (N 1..): Number of seeds; their medians count.
         world (--config CONFIG): Another world, in which the model is adapted by a few throws.
         policy (MODULE:FUNCTION): Score this policy instead; MODEL may be a dataset.
         hit: With --policy: largest miss of a hit, in its unit.
@@ -228,14 +215,13 @@ def adapt(
         throws (THROWS): CSV file with what was thrown and where it ended, or a dataset.
         method: What the world may differ by: auto, offset, bias, latent or none.
     """
-    from throwcollect.learning.lists import read_rows
+    from throwcollect.learning.lists import read_throws
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import format_length
 
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
-    names = (*keys, *model.targets)
-    rows = _read_dataset(throws, names, model) if throws.is_dir() else read_rows(throws, names, "THROWS")
+    rows = read_throws(throws, model)
     adapted = model.adapt(
         [dict(zip(keys, row[: len(keys)], strict=True)) for row in rows],
         [row[len(keys) :] for row in rows],
@@ -261,8 +247,8 @@ def _split(names: str | None) -> tuple[str, ...]:
 
 
 def _write_example(model: Model) -> str:
-    middle = model.learned.outputs[len(model.learned.outputs) // 2]
-    given = [axis.nominal for axis in model.learned.axes if axis.key in model.given]
+    middle = model.outputs[len(model.outputs) // 2]
+    given = [axis.nominal for axis in model.axes if axis.key in model.given]
     return ",".join(f"{value:.2f}" for value in (*middle.tolist(), *given))
 
 
@@ -275,27 +261,6 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
     if len(values) != len(names):
         raise ConfigError(f"--at {text}", expected=f"{format_count(len(names), 'number')}: {','.join(names)}")
     return values
-
-
-def _read_dataset(directory: Path, names: Sequence[str], model: Model) -> list[list[float]]:
-    """Read the throws of a dataset that a model can learn from: keys and columns of each."""
-    from throwcollect.config.values import column_of
-    from throwcollect.dataset.reader import Dataset
-    from throwcollect.learning.fitting import keep_informative
-
-    dataset = Dataset.open(directory)
-    trained, config = model.trained_on, dataset.config
-    if (config.robot.name, config.task.name) != (trained.robot, trained.task):
-        raise ConfigError(
-            f"{directory}: the task {config.task.name} of the robot {config.robot.name}",
-            expected=f"{trained.task} of {trained.robot}, as the model has it",
-        )
-    throws = keep_informative(config.task, dataset.throws, model.targets)
-    if missing := [name for name in names if column_of(name) not in throws.column_names]:
-        raise ConfigError(
-            f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
-        )
-    return [list(row) for row in zip(*(throws[column_of(name)].to_pylist() for name in names), strict=True)]
 
 
 def _score_policy(

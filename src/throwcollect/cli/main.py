@@ -41,8 +41,7 @@ _GROUPS = {
         "Look into datasets, and make others from them.",
         "dataset.info:info dataset.info:verify dataset.writing:export dataset.derive:merge "
         "dataset.derive:filter_ dataset.derive:sample dataset.derive:split dataset.derive:render_sensors "
-        "dataset.derive:stats dataset.writing:report dataset.writing:view dataset.writing:render "
-        "dataset.writing:images dataset.info:replay",
+        "dataset.derive:stats dataset.writing:report dataset.writing:view dataset.writing:render dataset.info:replay",
     ),
     "robot": (
         "Import, check and list robots.",

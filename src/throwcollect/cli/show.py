@@ -46,10 +46,10 @@ def init(*, robot: str = "talos", flange: FlangeOption = None, task: str = "thro
 
 def _search_beginning(robot: str, section: RobotConfig, task: str) -> Beginning:
     from throwcollect.extras import is_installed
-    from throwcollect.learning.first_throw import find_first_throw
+    from throwcollect.learning.first_throw import FirstThrowSearch
 
     engine = "bullet" if is_installed("pybullet") else "mujoco"
-    return find_first_throw(section, write_robot(robot, section), task, engine, say=tell)
+    return FirstThrowSearch(section, write_robot(robot, section), task, engine, tell).run()
 
 
 def config(
@@ -166,9 +166,9 @@ def _load_world(plan: Plan, pictures: Path | None, *, quiet: bool) -> None:
     if not quiet:
         tell(cost.words)
     if pictures is not None:
-        from throwcollect.publish.view.sensor_pictures import write_frames
+        from throwcollect.publish.view.sensor_pictures import write_first_frames
 
-        write_frames([(name, frames, 0) for name, frames in cost.first.items()], pictures)
+        write_first_frames(cost.first, pictures)
 
 
 def doctor(*, json: JsonOption = False) -> None:

@@ -104,7 +104,6 @@ def adapt(
     *,
     method: Method | None = None,
     scatter: float,
-    latents_count: bool,
 ) -> tuple[Correction, Adaptation]:
     """Find out how a world differs from the world of a map.
 
@@ -115,34 +114,37 @@ def adapt(
         learned: The map, corrected or not; the search begins with its latents.
         parameters: Scaled parameters of the throws, shape ``(n_throws, n_parameters)``.
         context: Scaled context of the throws, shape ``(n_throws, n_context)``.
-        places: Where they ended, shape ``(n_throws, n_targets)``.
+        places: Where they ended, shape ``(n_throws, n_targets)``; without throws, no difference is found.
         method: How the world may differ; None to choose by the number of throws, and by whether the method helps.
-        scatter: Standard deviation of each measured coordinate from its prediction [m or rad]: of repeated throws, and
-            of the map.
-        latents_count: Whether latents have an effect that is worth knowing.
+        scatter: Standard deviation of each measured coordinate of repeated throws [m or rad].
     """
     throws = (parameters, context, places)
+    # A measured place differs from its prediction by the scatter of the throw, and by the error of the map.
+    scatter = float(np.hypot(scatter, learned.error))
     before = _measure_distances(learned, *throws)
+    after = before if len(places) > 1 else np.empty(0)
+    correction, numbers = learned.correction, list[AdaptedNumber]()
     chosen = method or (Method.BIAS if len(places) >= _THROWS_FOR_BIAS else Method.OFFSET)
-    if method is None and latents_count:
+    if method is None and learned.latents_count:
         chosen = Method.LATENT
-    if chosen is Method.NONE:
-        return leave_as_it_is(learned, before, scatter)
-    found, deviations = _find(learned, chosen, throws, scatter)
-    after = np.empty(0)
-    if len(places) > 1:
-        after = _predict_by_others(learned, chosen, throws, scatter, found)
-    helps = float((before**2).sum() - (after**2).sum()) > (_CLEARLY * scatter) ** 2
-    if method is None and not helps:
-        return leave_as_it_is(learned, before, scatter)
-    correction = _shift(learned.correction, chosen, found)
+    if not len(places):
+        chosen = Method.NONE
+    if chosen is not Method.NONE:
+        found, deviations = _find(learned, chosen, throws, scatter)
+        others = _predict_by_others(learned, chosen, throws, scatter, found) if len(places) > 1 else np.empty(0)
+        helps = float((before**2).sum() - (others**2).sum()) > (_CLEARLY * scatter) ** 2
+        if method is None and not helps:
+            chosen = Method.NONE
+        else:
+            correction, after = _shift(learned.correction, chosen, found), others
+            numbers = _list_found(learned, correction, chosen, deviations)
     return correction, Adaptation(
         method=chosen,
         throws=len(places),
         scatter=scatter,
         before=before.tolist(),
         after=after.tolist(),
-        found=_list_found(learned, correction, chosen, deviations),
+        found=numbers,
     )
 
 
@@ -188,15 +190,6 @@ def refuse_far_throws(learned: LearnedMap, parameters: Array, context: Array, pl
             expected=f"about {ranges}, where the throws ended that the model was learned from",
             hint="check units, which the names end with, and the order of the numbers",
         )
-
-
-def leave_as_it_is(learned: LearnedMap, distances: Array, scatter: float) -> tuple[Correction, Adaptation]:
-    """Find no difference; distances of throws from predictions have shape ``(n_throws,)``."""
-    before = distances.tolist()
-    after = before if len(before) > 1 else []
-    return learned.correction, Adaptation(
-        method=Method.NONE, throws=len(before), scatter=scatter, before=before, after=after, found=[]
-    )
 
 
 def _predict_by_others(
@@ -291,5 +284,5 @@ def _shift(begun: Correction, method: Method, found: Array) -> Correction:
 
 
 def _measure_distances(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> Array:
-    distances: Array = np.linalg.norm(learned.predict(parameters, context) - places, axis=1)
+    distances: Array = np.linalg.norm(learned.predict_ends(parameters, context) - places, axis=1)
     return distances

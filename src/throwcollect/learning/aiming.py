@@ -23,7 +23,7 @@ TOLERANCE = 0.01
 _STARTS = 8
 """Number of throws, those that ended nearest to a target, from whose parameters the search begins."""
 _MANY_STARTS = 48
-"""The same number for choices other than the nearest: these need more candidates to choose from."""
+"""The same number for the least effort, which needs more candidates to choose from."""
 _TOGETHER = 32
 """Number of targets to aim at together: NumPy needs nearly the same time for short arrays, so one by one is slower."""
 _CONTEXTS = 8
@@ -44,8 +44,6 @@ class Choice(str, Enum):
     """Those nearest to a throw of the dataset, where the prediction is best."""
     LEAST_EFFORT = "least-effort"
     """Those with the smallest predicted torque, as a share of its limit."""
-    LEAST_SENSITIVE = "least-sensitive"
-    """Those at which errors of the parameters move the end of the trial least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,9 +190,6 @@ def _weigh(learned: LearnedMap, choice: Choice, inputs: Array, steps: Array) -> 
     """Find the cost of each candidate by a choice, shape ``(n,)``."""
     if choice is Choice.LEAST_EFFORT:
         return learned.effort.predict(inputs)[:, 0]
-    if choice is Choice.LEAST_SENSITIVE:
-        slopes = learned.forward.slopes(inputs, learned.columns_of(KeyRole.PARAMETER))
-        steps = slopes.reshape(len(slopes), -1)
     squares: Array = (steps**2).sum(axis=1)
     return squares
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter, Range
@@ -19,7 +19,6 @@ from throwcollect.learning.learned_map import (
     EFFORT,
     Axis,
     KeyRole,
-    Kind,
     LearnedMap,
     count_needed_throws,
     find_nearest,
@@ -122,29 +121,26 @@ def choose_throws(config: Config, datasets: Sequence[Dataset], *, count: int, nu
         raise ConfigError("sweep.target is missing", expected="the cells that throws should land in")
     parameters, grid = config.sweep.parameters, Grid(config.sweep.target)
     axes = _list_axes(config)
-    values = np.concatenate([np.column_stack([each.throws[column_of(axis.key)] for axis in axes]) for each in datasets])
-    outcomes = np.concatenate([each.throws["outcome"].to_numpy() for each in datasets])
-    ends = np.concatenate([each.throws["landing_x_m"].to_numpy() for each in datasets])
+    keys = [column_of(axis.key) for axis in axes]
+    measures = {"landing_x_m", "landing_y_m", "hit_angle_rad", column_of(LANDING_HEIGHT), EFFORT}
+    names = {"outcome", *measures.intersection(datasets[0].throws.column_names), *keys}
+    throws = pa.concat_tables([each.throws.select(sorted(names)) for each in datasets])
+    values = np.column_stack([throws[key] for key in keys])
+    outcomes, ends = throws["outcome"].to_numpy(), throws["landing_x_m"].to_numpy()
     landed = np.isin(outcomes.astype(str), [config.task.success, *config.task.informative]) & np.isfinite(ends)
     if not any(axis.role is KeyRole.PARAMETER for axis in axes) or landed.sum() < count_needed_throws(len(axes)):
         raise ConfigError(
             f"{landed.sum()} throws have landed",
             expected=f"at least {count_needed_throws(len(axes))}, and a key of the task that is swept",
         )
-    names = ("landing_x_m", "landing_y_m", "hit_angle_rad", column_of(LANDING_HEIGHT), EFFORT)
-    columns = {
-        name: np.concatenate([each.throws[name].to_numpy() for each in datasets])[landed]
-        for name in names
-        if name in datasets[0].throws.column_names
-    }
+    columns = {name: throws[name].to_numpy()[landed] for name in measures.intersection(names)}
     places = grid.measure(columns)
-    learned, _, _ = fit_throws(Kind.LOCAL, axes, grid.names, values[landed], places, columns[EFFORT])
+    learned = fit_throws(axes, grid.names, values[landed], places, columns[EFFORT])
     randomness = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(number, 0)))
     found = _aim(learned, (values, ~landed), parameters, grid, count, randomness)
     if not len(found):
         raise ConfigError("sweep.target: none of its cells is in reach", hint="look at the report of the first round")
-    keys = [axis.key for axis in axes]
-    return Points(tuple(parameters), found[:, [keys.index(key) for key in parameters]])
+    return Points(tuple(parameters), found[:, [keys.index(column_of(key)) for key in parameters]])
 
 
 def _list_axes(config: Config) -> tuple[Axis, ...]:
@@ -253,5 +249,5 @@ def _start_from(learned: LearnedMap, throws: NDArray[np.intp], noise: Array) -> 
     values = learned.values[throws].copy()
     values[:, columns] = learned.unscale(KeyRole.PARAMETER, parameters)
     # Where nothing has moved, the map predicts nothing better than what was measured.
-    outputs = learned.predict(parameters, context) if noise.any() else learned.outputs[throws]
-    return replace(learned, values=values, outputs=outputs, efforts=learned.efforts[throws])
+    outputs = learned.predict_ends(parameters, context) if noise.any() else learned.outputs[throws]
+    return learned.begin_from(values, outputs, learned.efforts[throws])

@@ -77,7 +77,7 @@ def distil(learned: LearnedMap) -> DistilledMap:
     parameters, context = (
         learned.inputs[:_MOST_THROWS, learned.columns_of(role)] for role in (KeyRole.PARAMETER, KeyRole.CONTEXT)
     )
-    targets = learned.predict(parameters, context)
+    targets = learned.predict_ends(parameters, context)
     low, high = targets.min(axis=0), targets.max(axis=0)
     inputs = _scale_inputs(targets, context, low, high)
     exponents = list_exponents(inputs.shape[1], 1)
@@ -93,7 +93,7 @@ def distil(learned: LearnedMap) -> DistilledMap:
     best, least = coefficients, np.inf
     for _ in range(_STEPS):
         raw = matmul(terms, coefficients)
-        missing = targets - learned.predict(np.clip(raw, -1.0, 1.0), context)
+        missing = targets - learned.predict_ends(np.clip(raw, -1.0, 1.0), context)
         cost = float((missing**2).sum() + _TO_THE_MIDDLE**2 * (raw**2).sum())
         if cost < least:
             best, least = coefficients, cost

@@ -60,10 +60,8 @@ class _Candidate:
     duration_s: float
 
 
-def find_first_throw(
-    robot: RobotConfig, lines: Sequence[str], task: str, engine: str, *, say: Callable[[str], None]
-) -> Beginning:
-    """Search a throw of a robot that lands, and ranges in which nearly all throws land.
+class FirstThrowSearch:
+    """Searches a throw of a robot that lands, and ranges in which nearly all throws land.
 
     Args:
         robot: The complete section of the robot.
@@ -72,10 +70,7 @@ def find_first_throw(
         engine: Name of the physics engine.
         say: A callback that gets progress, a line at a time.
     """
-    return _Search(robot, lines, task, engine, say).run()
 
-
-class _Search:
     def __init__(
         self, robot: RobotConfig, lines: Sequence[str], task: str, engine: str, say: Callable[[str], None]
     ) -> None:
@@ -98,6 +93,7 @@ class _Search:
         self._base_m = robot.base_height_m
 
     def run(self) -> Beginning:
+        """Search; the result is what a configuration begins with."""
         begin = time.monotonic()
         starts, angle = self._postures.find_upright(_STARTS)
         if not starts:

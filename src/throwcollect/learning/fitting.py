@@ -15,70 +15,54 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.values import column_of, leaves
 from throwcollect.dataset.carried_robot import config_text
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.selection import find_rows
-from throwcollect.errors import ConfigError, DatasetError, read_word, refuse_argument
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import StrPath
-from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, Kind, LearnedMap, count_needed_throws, fit_throws
+from throwcollect.learning.learned_map import EFFORT, Axis, KeyRole, count_needed_throws, fit_throws
 from throwcollect.learning.model import MODEL, Model, load_model
 from throwcollect.learning.model_card import TrainedOn
 from throwcollect.learning.polynomial import Array
 from throwcollect.version import __version__
 from throwcollect.wording import format_count, suggest
 
-_WORTH_KNOWING = 2.0
-"""Latents are worth knowing if predictions without them are at least this many times worse."""
-
 
 def fit(
     dataset: Dataset | StrPath,
     *,
-    kind: str = Kind.LOCAL.value,
     targets: Sequence[str] = (),
     parameters: Sequence[str] = (),
     given: Sequence[str] = (),
-    where: str | None = None,
 ) -> Model:
     """Learn a model from the throws of a dataset that succeeded.
 
     Args:
         dataset: The dataset, or its directory.
-        kind: ``local``: predict by a polynomial, corrected by the nearest throws; or ``polynomial``: by the polynomial
-            alone.
         targets: Columns that say where a trial ended; those of the task by default.
         parameters: Swept keys that aiming chooses; all of the task by default. The others belong to the world.
         given: Swept keys whose values are given with a target; those that the task names by default.
-        where: A condition on throws, as `Dataset.select` takes it.
 
     Raises:
-        ConfigError: If there is no such kind, nothing to aim at, a key was not swept, no throw fulfils the condition,
-            or too few throws succeeded.
+        ConfigError: If there is nothing to aim at, a key was not swept, or too few throws succeeded.
         DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
-    _check_names(targets, parameters, given)
-    chosen = read_word("kind", kind, Kind)
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
-    config, selected = dataset.config, _select(dataset, where)
+    config = dataset.config
+    if isinstance(config.task.trajectory, MotionFile):
+        hint = "sweep parameters of a motion; throwcollect fit-dmp finds those of a motion of a file"
+        raise ConfigError(f"{dataset.directory} has motions of a file, and there is nothing between them", hint=hint)
     columns = tuple(targets) or config.task.targets
     if not columns:
         raise ConfigError(
             f"the task {config.task.name} names no targets", expected="columns of the table of throws as targets"
         )
-    throws = keep_informative(config.task, selected.throws, columns)
-    axes = _find_axes(selected, throws, parameters, given)
-    _check_amount(selected, throws, axes)
+    throws = keep_informative(config.task, dataset.throws, columns)
+    axes = _find_axes(dataset, throws, parameters, given)
+    _check_amount(dataset, throws, axes)
     outputs = np.column_stack([_read_numbers(throws, column, dataset) for column in columns])
     values = np.column_stack([_read_numbers(throws, column_of(axis.key), dataset) for axis in axes])
-    efforts = _read_numbers(throws, EFFORT, dataset)
-    learned, errors, blind = fit_throws(chosen, axes, columns, values, outputs, efforts)
     return Model(
+        **dict(fit_throws(axes, columns, values, outputs, _read_numbers(throws, EFFORT, dataset))),
         version=__version__,
-        kind=chosen,
-        axes=axes,
-        targets=columns,
-        forward=learned.forward,
-        effort=learned.effort,
-        correction=learned.correction,
         trained_on=TrainedOn(
             name=config.name,
             robot=config.robot.name,
@@ -86,14 +70,8 @@ def fit(
             engine=config.sim.engine,
             digest=dataset.digest,
             throws=len(throws),
-            ignored=len(selected) - len(throws),
-            selection=where,
-            folds_error=errors,
-            without_latents=blind,
-            latents_count=blind is not None and blind >= _WORTH_KNOWING * min(errors.values()),
+            ignored=len(dataset) - len(throws),
         ),
-        adaptation=None,
-        points=_tabulate(throws, learned),
         config=config_text(config),
         source=dataset.directory,
     )
@@ -108,26 +86,6 @@ def keep_informative(task: TaskConfig, throws: pa.Table, targets: Sequence[str])
         if name in throws.column_names:
             throws = throws.filter(pc.is_valid(throws[name]))
     return throws
-
-
-def _check_names(targets: Sequence[str], parameters: Sequence[str], given: Sequence[str]) -> None:
-    for argument, names in (("targets", targets), ("parameters", parameters), ("given", given)):
-        if twice := [name for name in names if names.count(name) > 1]:
-            raise ConfigError(f"{argument}: {twice[0]} is named twice", expected="each name once")
-    if both := [key for key in parameters if key in given]:
-        raise ConfigError(f"parameters and given: {both[0]} is in both", expected="each key in one of them")
-
-
-def _select(dataset: Dataset, where: str | None) -> Dataset:
-    if isinstance(dataset.config.task.trajectory, MotionFile):
-        hint = "sweep parameters of a motion; throwcollect fit-dmp finds those of a motion of a file"
-        raise ConfigError(f"{dataset.directory} has motions of a file, and there is nothing between them", hint=hint)
-    if where is None:
-        return dataset
-    selected = dataset.select(find_rows(where, dataset.throws, "where"))
-    if not len(selected):
-        raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
-    return selected
 
 
 def _find_axes(
@@ -160,14 +118,6 @@ def _choose_role(config: Config, key: str, parameters: Sequence[str], context: S
         return KeyRole.CONTEXT
     chosen = key in parameters if parameters else key.startswith("task.")
     return KeyRole.PARAMETER if chosen else KeyRole.LATENT
-
-
-def _tabulate(throws: pa.Table, learned: LearnedMap) -> pa.Table:
-    """Make a table of the throws that a map was learned from."""
-    columns = {"trial": throws["trial"].to_numpy()}
-    columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
-    columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
-    return pa.table({**columns, EFFORT: learned.efforts})
 
 
 def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
@@ -207,7 +157,7 @@ def read_ends(directory: Path) -> Array:
         DatasetError: If there is neither, or it is damaged.
     """
     if (directory / MODEL).exists():
-        return load_model(directory).learned.outputs
+        return load_model(directory).outputs
     dataset = Dataset.open(directory)
     task = dataset.config.task
     throws = keep_informative(task, dataset.throws, task.targets)

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import FiniteFloat
+from pydantic import Field, FiniteFloat
 
-from throwcollect.learning.polynomial import Array, Polynomial, Vector, cross_validate, fit_polynomial
+from throwcollect.learning.polynomial import (
+    Array,
+    Matrix,
+    ModelEntry,
+    Polynomial,
+    Vector,
+    cross_validate,
+    fit_polynomial,
+)
 from throwcollect.units import unit_of_name
 
 EFFORT = "effort_peak_share"
@@ -23,15 +32,10 @@ _EFFORT_DEGREE = 2
 _FOLDS = 5
 _CELL = 0.05
 """Width of the cells of targets [m or rad]."""
+_WORTH_KNOWING = 2.0
+"""Latents are worth knowing if predictions without them are at least this many times worse."""
 
-
-class Kind(str, Enum):
-    """How a prediction is made."""
-
-    LOCAL = "local"
-    """By the polynomial, corrected by the residuals of the nearest throws."""
-    POLYNOMIAL = "polynomial"
-    """By the polynomial alone, which is a formula."""
+_Map = TypeVar("_Map", bound="LearnedMap")
 
 
 class KeyRole(str, Enum):
@@ -84,33 +88,44 @@ class Correction:
     offset: Vector
 
 
-@dataclass(frozen=True, eq=False)
-class LearnedMap:
-    """Maps parameters to where a trial ends.
+class LearnedMap(ModelEntry):
+    """Maps parameters to where a trial ends: by a polynomial, corrected by the residuals of the nearest throws.
 
-    Inputs are scaled: -1 is the minimum of an axis, 1 its maximum.
+    Inputs are scaled: -1 is the minimum of an axis, 1 its maximum. A file of JSON has no throws.
 
     Attributes:
-        kind: How predictions are made.
         axes: The inputs: parameters, then context, then latents.
         targets: Columns of the table of throws that say where a trial ended.
         forward: The polynomial: all inputs to targets.
         effort: The polynomial of the largest share of a joint's torque limit.
+        errors: By degree: median distance of throws from their prediction by polynomials fitted to others.
+        blind_error: The smallest such distance when latents are no inputs; None if there are no latents.
+        correction: How the world differs from the dataset's.
         values: Inputs of the throws that it was learned from, in the units of their keys, shape ``(n, n_axes)``.
         outputs: Places where those throws ended, shape ``(n, n_targets)``.
         efforts: Their largest shares of a joint's torque limit, shape ``(n,)``.
-        correction: How the world differs from the dataset's.
     """
 
-    kind: Kind
-    axes: tuple[Axis, ...]
-    targets: tuple[str, ...]
-    forward: Polynomial = field(repr=False)
-    effort: Polynomial = field(repr=False)
-    values: Array = field(repr=False)
-    outputs: Array = field(repr=False)
-    efforts: Array = field(repr=False)
+    axes: tuple[Axis, ...] = Field(min_length=1)
+    targets: tuple[str, ...] = Field(min_length=1)
+    forward: Polynomial
+    effort: Polynomial
+    errors: dict[int, FiniteFloat] = Field(min_length=1)
+    blind_error: FiniteFloat | None
     correction: Correction
+    values: Matrix = Field(default=np.empty((0, 0)), exclude=True)
+    outputs: Matrix = Field(default=np.empty((0, 0)), exclude=True)
+    efforts: Vector = Field(default=np.empty(0), exclude=True)
+
+    @property
+    def error(self) -> float:
+        """The smallest of the errors, which belongs to the chosen degree."""
+        return min(self.errors.values())
+
+    @property
+    def latents_count(self) -> bool:
+        """Whether latents have an effect that is worth knowing."""
+        return self.blind_error is not None and self.blind_error >= _WORTH_KNOWING * self.error
 
     @cached_property
     def inputs(self) -> Array:
@@ -119,9 +134,7 @@ class LearnedMap:
 
     @cached_property
     def residuals(self) -> Array:
-        """Outputs minus the polynomial's predictions, ``(n, n_targets)``; 0 if predictions are the polynomial alone."""
-        if self.kind is Kind.POLYNOMIAL:
-            return np.zeros_like(self.outputs)
+        """Outputs minus the polynomial's predictions, ``(n, n_targets)``."""
         return self.outputs - self.forward.predict(self.inputs)
 
     def axes_of(self, role: KeyRole) -> tuple[Axis, ...]:
@@ -155,7 +168,7 @@ class LearnedMap:
         latents = np.tile(self.correction.latents, (len(parameters), 1))
         return np.hstack([parameters + self.correction.bias, context, latents])
 
-    def predict(self, parameters: Array, context: Array) -> Array:
+    def predict_ends(self, parameters: Array, context: Array) -> Array:
         """Where trials end in the corrected world, in the units of the targets, shape ``(n, n_targets)``.
 
         Parameters and context are those of `in_world`.
@@ -173,11 +186,16 @@ class LearnedMap:
         # Each throw keeps its own residual, as only the world around it changes.
         return self.residuals + self.forward.predict(moved) + self.correction.offset
 
-    def correct(self, correction: Correction | None) -> LearnedMap:
+    def correct(self: _Map, correction: Correction | None) -> _Map:
         """The map of another world, or with None of the dataset's own world, learned from the same throws."""
-        other = replace(self, correction=correction or _no_correction(self.axes, self.targets))
-        # The throws are the same, so cached values that were computed from them are reused.
-        vars(other).update(inputs=self.inputs, residuals=self.residuals)
+        # A copy has the cached values, too, which follow from the throws alone.
+        return self.model_copy(update={"correction": correction or _no_correction(self.axes, self.targets)})
+
+    def begin_from(self: _Map, values: Array, outputs: Array, efforts: Array) -> _Map:
+        """The same map with other throws, from which aiming begins; the arguments are its attributes."""
+        other = self.model_copy(update={"values": values, "outputs": outputs, "efforts": efforts})
+        for cached in ("inputs", "residuals"):
+            vars(other).pop(cached, None)
         return other
 
     def predict_residuals(self, inputs: Array) -> Array:
@@ -185,8 +203,6 @@ class LearnedMap:
 
         The inputs have the shape ``(n, n_axes)``, the means ``(n, n_targets)``.
         """
-        if self.kind is Kind.POLYNOMIAL:
-            return np.zeros((len(inputs), len(self.targets)))
         predicted = np.empty((len(inputs), len(self.targets)))
         for row, place in enumerate(inputs):
             squares = ((self.inputs - place) ** 2).sum(axis=1)
@@ -227,21 +243,12 @@ def _list_bounds(axes: tuple[Axis, ...]) -> tuple[Array, Array]:
 
 
 def fit_throws(
-    kind: Kind, axes: tuple[Axis, ...], targets: tuple[str, ...], values: Array, outputs: Array, efforts: Array
-) -> tuple[LearnedMap, dict[int, float], float | None]:
-    """Learn from throws that succeeded.
+    axes: tuple[Axis, ...], targets: tuple[str, ...], values: Array, outputs: Array, efforts: Array
+) -> LearnedMap:
+    """Learn from throws that succeeded; the arguments are attributes of the map.
 
-    Args:
-        kind: How predictions are made.
-        axes: The inputs.
-        targets: Columns that say where a trial ended.
-        values: Inputs in the units of their keys, shape ``(n, n_axes)``.
-        outputs: Where the trials ended, shape ``(n, n_targets)``.
-        efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
-
-    Returns:
-        The map; by degree, the median distance of throws from their prediction by polynomials that were fitted to
-        others; the smallest such distance when latents are no inputs, None if there are no latents.
+    The degree of the polynomial is the one that predicts best: throws of one cell stay together, and each fifth of the
+    cells is predicted from the others.
     """
     inputs, folds = scale_values(axes, values), _assign_folds(outputs)
     # Latents come last. Products of two latents have little effect, so such terms are left out.
@@ -251,10 +258,18 @@ def fit_throws(
     # The error of predictions without latents shows whether latents are worth knowing.
     blind = None if all(known) else min(_find_medians(cross_validate(inputs[:, known], outputs, folds)).values())
     degree = min(errors, key=errors.__getitem__)
-    forward = fit_polynomial(inputs, outputs, degree, minor=minor)
-    effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, degree))
-    correction = _no_correction(axes, targets)
-    return LearnedMap(kind, axes, targets, forward, effort, values, outputs, efforts, correction), errors, blind
+    return LearnedMap(
+        axes=axes,
+        targets=targets,
+        forward=fit_polynomial(inputs, outputs, degree, minor=minor),
+        effort=fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, degree)),
+        errors=errors,
+        blind_error=blind,
+        correction=_no_correction(axes, targets),
+        values=values,
+        outputs=outputs,
+        efforts=efforts,
+    )
 
 
 def _find_medians(errors: dict[int, Array]) -> dict[int, float]:

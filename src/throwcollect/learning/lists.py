@@ -9,9 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from throwcollect.config.task_config import TaskConfig
+from throwcollect.config.values import column_of
+from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.learning.aiming import Aim
+from throwcollect.learning.fitting import keep_informative
+from throwcollect.learning.model import Model
 from throwcollect.plan.point_file import problem_of_row, read_numbers, read_table
 from throwcollect.wording import join_names
 
@@ -50,6 +54,22 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
     declares the names that columns of targets have in such lists.
     """
     return read_rows(path, names, "--targets", aliases={each.of: each.name for each in task.target_columns})
+
+
+def read_throws(path: Path, model: Model) -> list[list[float]]:
+    """Read throws of another world, of a list or a dataset: all keys that a model takes, and where each throw ended."""
+    names = (*model.parameters, *model.given, *model.targets)
+    if not path.is_dir():
+        return read_rows(path, names, "THROWS")
+    dataset, trained = Dataset.open(path), model.trained_on
+    robot, task = dataset.config.robot.name, dataset.config.task
+    if (robot, task.name) != (trained.robot, trained.task):
+        expected = f"{trained.task} of {trained.robot}, as the model has it"
+        raise ConfigError(f"{path}: the task {task.name} of the robot {robot}", expected=expected)
+    throws = keep_informative(task, dataset.throws, model.targets)
+    if missing := [name for name in names if column_of(name) not in throws.column_names]:
+        raise ConfigError(f"{path}: has no {join_names(missing)}", expected="throws with all parameters of the model")
+    return [list(row) for row in zip(*(throws[column_of(name)].to_pylist() for name in names), strict=True)]
 
 
 def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
+import pyarrow as pa
 from pydantic import Field, ValidationError
 
 from throwcollect.config.task_config import LARGEST_TARGET
 from throwcollect.dataset.carried_robot import copy_carried
 from throwcollect.dataset.directory import is_begun
-from throwcollect.errors import ConfigError, DatasetError, check_bounds, read_word, refuse_argument
+from throwcollect.errors import ConfigError, DatasetError, read_word, refuse_argument
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory, read_text, suggest_path, write_file
-from throwcollect.learning.adapting import Adaptation, Method, adapt, refuse_far_throws
+from throwcollect.learning.adapting import Method, adapt, refuse_far_throws
 from throwcollect.learning.aiming import Aim, Choice, aim
 from throwcollect.learning.distilling import ONNX, distil, encode_onnx
-from throwcollect.learning.learned_map import EFFORT, Correction, KeyRole, LearnedMap
+from throwcollect.learning.learned_map import EFFORT, KeyRole
 from throwcollect.learning.model_card import ModelCard
 from throwcollect.learning.polynomial import Array, ModelEntry
 from throwcollect.learning.score import Score
@@ -43,53 +43,35 @@ class Model(ModelCard):
 
     A model is a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`, byte for byte.
 
-    Its other attributes are those of `ModelCard`.
+    Its other attributes are those of `ModelCard` and `LearnedMap`.
 
     Attributes:
-        points: Arrow table of the throws that it was learned from: ``trial``, inputs, ends, effort; a file of its own.
         config: YAML of the dataset's configuration; a file of its own.
         source: Directory with the files that the configuration names, of the dataset or of a model; they are copied.
     """
 
-    points: Any = Field(default=None, exclude=True)
     config: str = Field(default="", exclude=True)
     source: Path | None = Field(default=None, exclude=True)
 
     def __repr__(self) -> str:
         trained = self.trained_on
-        learned = f"{trained.name!r}, {self.kind.value}, {format_count(trained.throws, 'throw')}"
+        learned = f"{trained.name!r}, {format_count(trained.throws, 'throw')}"
         return f"Model({learned}: {', '.join((*self.targets, *self.given))} -> {', '.join(self.parameters)})"
-
-    @cached_property
-    def learned(self) -> LearnedMap:
-        """The map, with the throws that it was learned from."""
-        columns = {name: self.points[name].to_numpy() for name in self.points.column_names}
-        return LearnedMap(
-            self.kind,
-            self.axes,
-            self.targets,
-            self.forward,
-            self.effort,
-            np.column_stack([columns[axis.key] for axis in self.axes]),
-            np.column_stack([columns[target] for target in self.targets]),
-            columns[EFFORT],
-            self.correction,
-        )
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Keys that aiming chooses."""
-        return tuple(axis.key for axis in self.learned.axes_of(KeyRole.PARAMETER))
+        return tuple(axis.key for axis in self.axes_of(KeyRole.PARAMETER))
 
     @property
     def given(self) -> tuple[str, ...]:
         """Keys whose values are given after a target's."""
-        return tuple(axis.key for axis in self.learned.axes_of(KeyRole.CONTEXT))
+        return tuple(axis.key for axis in self.axes_of(KeyRole.CONTEXT))
 
     @property
     def latents(self) -> tuple[str, ...]:
         """Keys of the world, whose values are only known from throws."""
-        return tuple(axis.key for axis in self.learned.axes_of(KeyRole.LATENT))
+        return tuple(axis.key for axis in self.axes_of(KeyRole.LATENT))
 
     def predict(self, points: Sequence[Mapping[str, float]]) -> Array:
         """Where throws should end, in the units of the targets, shape ``(n_points, n_targets)``.
@@ -98,10 +80,10 @@ class Model(ModelCard):
             points: For each throw, values by key of all `parameters` and all `given`.
 
         Raises:
-            ConfigError: If a key is missing or unknown, or a value is not finite.
+            ConfigError: If a key is missing or unknown.
         """
         parameters, context = self._read_inputs(points)
-        return self.learned.predict(parameters, context)
+        return self.predict_ends(parameters, context)
 
     def aim(self, targets: Iterable[Sequence[float]], *, choose: str = Choice.NEAREST.value) -> list[Aim]:
         """Find parameters for targets, inside of the ranges of the dataset.
@@ -116,9 +98,9 @@ class Model(ModelCard):
         names = (*self.targets, *self.given)
         rows = _read_places("targets", targets, names)
         ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
-        context = self.learned.scale(KeyRole.CONTEXT, values)
-        found = aim(self.learned, ends, context, read_word("choose", choose, Choice))
-        chosen = self.learned.unscale(KeyRole.PARAMETER, found.parameters)
+        context = self.scale(KeyRole.CONTEXT, values)
+        found = aim(self, ends, context, read_word("choose", choose, Choice))
+        chosen = self.unscale(KeyRole.PARAMETER, found.parameters)
         inside = np.all(np.abs(context) <= 1.0, axis=1).tolist()
         return [
             Aim(
@@ -156,22 +138,16 @@ class Model(ModelCard):
             processes: How many processes simulate.
 
         Raises:
-            ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
-        for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
-            check_bounds(name, number, least=1)
-        check_bounds("seed", seed, least=0)
-        _check_scatter(scatter)
-        distilled = None if self.distilled is None else distil(self.learned.correct(None))
+        distilled = None if self.distilled is None else distil(self.correct(None))
         return score_model(
-            self.learned,
+            self,
             simulator,
             count=targets,
             seeds=range(seed, seed + seeds),
             world=world,
             scatter=scatter,
-            adapt_map=self._bind_adapt(scatter),
             distilled=distilled,
             processes=processes,
         )
@@ -193,8 +169,8 @@ class Model(ModelCard):
             scatter: Standard deviation of the measured ends, in the unit of the targets.
 
         Raises:
-            ConfigError: If there are no throws, or not one place for each; a key is missing or unknown, a value is not
-                finite, there is no such method, or a parameter, context or place is far outside the dataset.
+            ConfigError: If there are no throws, or not one place for each; a key is missing or unknown, there is no
+                such method, or a parameter, context or place is far outside the dataset.
         """
         parameters, context = self._read_inputs(points)
         measured = _read_places("places", places, self.targets)
@@ -202,7 +178,6 @@ class Model(ModelCard):
             raise ConfigError(
                 f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
             )
-        _check_scatter(scatter)
         chosen = None if method is None else read_word("method", method, Method)
         if chosen is Method.LATENT and not self.latents:
             raise refuse_argument(
@@ -211,17 +186,11 @@ class Model(ModelCard):
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
-        refuse_far_throws(self.learned, parameters, context, measured)
-        correction, adaptation = self._bind_adapt(scatter)(self.learned, parameters, context, measured, method=chosen)
-        # The map of the other world shares what was computed from the throws.
-        changed = {"correction": correction, "learned": self.learned.correct(correction)}
-        world = self.model_copy(update={**changed, "adaptation": adaptation, "version": __version__, "distilled": None})
+        refuse_far_throws(self, parameters, context, measured)
+        correction, adaptation = adapt(self, parameters, context, measured, method=chosen, scatter=scatter)
+        changed = {"adaptation": adaptation, "version": __version__, "distilled": None}
+        world = self.correct(correction).model_copy(update=changed)
         return world if self.distilled is None else world.distil()
-
-    def _bind_adapt(self, scatter: float) -> partial[tuple[Correction, Adaptation]]:
-        # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
-        deviation = float(np.hypot(scatter, self.trained_on.error))
-        return partial(adapt, scatter=deviation, latents_count=self.trained_on.latents_count)
 
     def distil(self) -> Model:
         """Add one polynomial from targets to parameters, which `save` writes into ``model.onnx``, too.
@@ -230,7 +199,7 @@ class Model(ModelCard):
             MissingExtraError: If the package ``onnx`` is not installed.
         """
         require("onnx")
-        return self.model_copy(update={"distilled": distil(self.learned)})
+        return self.model_copy(update={"distilled": distil(self)})
 
     def save(self, directory: StrPath) -> None:
         """Write the model into a directory that is new or empty.
@@ -240,10 +209,10 @@ class Model(ModelCard):
             DatasetError: If it cannot be written.
             MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
-        onnx = None if self.distilled is None else encode_onnx(self.learned, self.distilled)
+        onnx = None if self.distilled is None else encode_onnx(self, self.distilled)
         with new_directory(Path(directory)) as scratch:
             write_file(scratch / MODEL, (self.model_dump_json(indent=1) + "\n").encode())
-            write_file(scratch / POINTS, encode_table(self.points))
+            write_file(scratch / POINTS, encode_table(pa.table(dict(self._columns()))))
             write_file(scratch / CONFIG, self.config.encode())
             write_file(scratch / CARD, self.describe(None).encode())
             if self.source is not None:
@@ -256,23 +225,21 @@ class Model(ModelCard):
         write_file(directory / SCORE, (score.model_dump_json(indent=1) + "\n").encode())
         write_file(directory / CARD, self.describe(score).encode())
 
+    def _columns(self) -> Iterator[tuple[str, Array]]:
+        """The throws that it was learned from, as columns of their file."""
+        yield from zip((axis.key for axis in self.axes), self.values.T, strict=True)
+        yield from zip(self.targets, self.outputs.T, strict=True)
+        yield EFFORT, self.efforts
+
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points."""
         names = (*self.parameters, *self.given)
-        rows = []
         for number, point in enumerate(points):
             if wrong := sorted(set(point) ^ set(names), key=str):
-                state = "is missing" if wrong[0] in names else "is no key that this model takes"
-                raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
-            rows.append([point[name] for name in names])
-        values = np.array(rows, np.float64).reshape(-1, len(names))
-        if not np.isfinite(values).all():
-            number, column = np.argwhere(~np.isfinite(values))[0].tolist()
-            value = values[number, column]
-            raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
-        split = len(self.parameters)
-        parameters = self.learned.scale(KeyRole.PARAMETER, values[:, :split])
-        return parameters, self.learned.scale(KeyRole.CONTEXT, values[:, split:])
+                raise ConfigError(f"throw {number}: {', '.join(wrong)}", expected=f"values of {', '.join(names)}")
+        values = np.array([[point[name] for name in names] for point in points], np.float64).reshape(-1, len(names))
+        parameters, context = np.split(values, [len(self.parameters)], axis=1)
+        return self.scale(KeyRole.PARAMETER, parameters), self.scale(KeyRole.CONTEXT, context)
 
 
 def load_model(directory: StrPath) -> Model:
@@ -295,12 +262,13 @@ def load_model(directory: StrPath) -> Model:
         raise DatasetError(problem, path=directory, hint=hint) from error
     model = _read_json(Model, text, path)
     points = read_parquet(directory / POINTS)
-    names = {"trial", *(axis.key for axis in model.axes), *model.targets, EFFORT}
-    if set(points.column_names) != names:
-        expected = ", ".join(sorted(names))
-        raise DatasetError("does not have the columns of this model", path=directory / POINTS, expected=expected)
+    keys = [axis.key for axis in model.axes]
+    if missing := {*keys, *model.targets, EFFORT}.difference(points.column_names):
+        raise DatasetError("does not have the columns of this model", path=directory / POINTS, expected=min(missing))
+    values, outputs = (np.column_stack([points[name].to_numpy() for name in names]) for names in (keys, model.targets))
     config = read_text(directory / CONFIG, most_bytes=_MOST_BYTES)
-    return model.model_copy(update={"points": points, "config": config, "source": directory})
+    model = model.begin_from(values, outputs, points[EFFORT].to_numpy())
+    return model.model_copy(update={"config": config, "source": directory})
 
 
 def read_score(directory: Path) -> Score | None:
@@ -328,10 +296,3 @@ def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequenc
             wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
             raise refuse_argument(argument, f"got {row}", expected=wanted)
     return np.array(rows, np.float64).reshape(-1, len(names))
-
-
-def _check_scatter(scatter: float) -> None:
-    """Refuse a number that is no standard deviation."""
-    if not 0.0 <= scatter <= LARGEST_TARGET:
-        expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"
-        raise refuse_argument("scatter", f"got {scatter}", expected=expected)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
-from pydantic import Field, FiniteFloat
-
-from throwcollect.learning.adapting import Adaptation, Method
+from throwcollect.learning.adapting import Adaptation
 from throwcollect.learning.distilling import DistilledMap
-from throwcollect.learning.learned_map import Axis, Correction, Kind
-from throwcollect.learning.polynomial import ModelEntry, Polynomial
+from throwcollect.learning.learned_map import LearnedMap
+from throwcollect.learning.polynomial import ModelEntry
 from throwcollect.learning.score import SCORE_HEAD, Score, format_length, list_units
 from throwcollect.units import format_distance
 from throwcollect.wording import format_count
@@ -61,10 +59,6 @@ class TrainedOn(ModelEntry):
         digest: Digest of the dataset.
         throws: Number of throws that it was learned from.
         ignored: Number of throws that did not succeed.
-        selection: The condition on throws; None for all.
-        folds_error: By degree: median distance of throws from their prediction by polynomials fitted to others.
-        without_latents: The same distance when latents are no inputs; None if there are no latents.
-        latents_count: Whether latents have an effect that is worth knowing.
     """
 
     name: str
@@ -74,28 +68,13 @@ class TrainedOn(ModelEntry):
     digest: str
     throws: int
     ignored: int
-    selection: str | None
-    folds_error: dict[int, FiniteFloat] = Field(min_length=1)
-    without_latents: FiniteFloat | None
-    latents_count: bool
-
-    @property
-    def error(self) -> float:
-        """The smallest of the errors, which belongs to the chosen degree."""
-        return min(self.folds_error.values())
 
 
-class ModelCard(ModelEntry):
-    """``model.json``: a learned map without the throws that it was learned from; `describe` makes its card.
+class ModelCard(LearnedMap):
+    """A learned map, and where it comes from: ``model.json``; `describe` makes its card.
 
     Attributes:
         version: Version of throwcollect that made it.
-        kind: How predictions are made.
-        axes: The inputs: parameters, then context, then latents.
-        targets: Columns of the table of throws that say where a trial ended.
-        forward: The polynomial: all inputs to targets.
-        effort: The polynomial of the largest share of a joint's torque limit.
-        correction: How the world differs from the dataset's.
         trained_on: The throws that it was learned from.
         adaptation: How it was adapted; None if it was not.
         distilled: A polynomial from targets to parameters; None if it was not distilled.
@@ -103,113 +82,81 @@ class ModelCard(ModelEntry):
 
     format: Literal["1"] = "1"
     version: str
-    kind: Kind
-    axes: tuple[Axis, ...] = Field(min_length=1)
-    targets: tuple[str, ...] = Field(min_length=1)
-    forward: Polynomial
-    effort: Polynomial
-    correction: Correction
     trained_on: TrainedOn
-    adaptation: Adaptation | None
+    adaptation: Adaptation | None = None
     distilled: DistilledMap | None = None
 
     def describe(self, score: Score | None) -> str:
         """README.md of the model; its score is None if it has none."""
         trained, targets = self.trained_on, self.targets
-        selected = f" (those with `{trained.selection}`)" if trained.selection else ""
-        folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in trained.folds_error.items())
-        if trained.without_latents is not None:
-            folds += f"; without latents: {format_length(trained.without_latents, targets)}"
-        axes = (
-            [f"`{axis.key}`", axis.role.value]
-            + [f"{number:.6g}" for number in (axis.minimum, axis.maximum, axis.nominal)]
-            + [axis.unit or "-"]
-            for axis in self.axes
-        )
-        lines = [
+        folds = ", ".join(f"{degree}: {format_length(error, targets)}" for degree, error in self.errors.items())
+        if self.blind_error is not None:
+            folds += f"; without latents: {format_length(self.blind_error, targets)}"
+        axes = []
+        for axis in self.axes:
+            numbers = (f"{number:.6g}" for number in (axis.minimum, axis.maximum, axis.nominal))
+            axes.append((f"`{axis.key}`", axis.role.value, *numbers, axis.unit or "-"))
+        blocks = [
             f"# A model of {trained.name}",
-            "",
             f"It maps the parameters of a trial to where it ends ({', '.join(targets)}), and back: from a target to "
             f"parameters. Learned from {format_count(trained.throws, 'throw')} of the dataset with the digest "
-            f"`{trained.digest}`{selected}; {trained.ignored} that did not succeed were left out. Robot: "
+            f"`{trained.digest}`; {trained.ignored} that did not succeed were left out. Robot: "
             f"{trained.robot}; task: {trained.task}; physics engine: {trained.engine}. Made with "
             f"throwcollect {self.version}.",
-            "",
-            *_tabulate(("key", "it is", "from", "to", "configured", "unit"), axes),
+            _tabulate(("key", "it is", "from", "to", "configured", "unit"), axes),
             "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing "
             "is extrapolated beyond the ranges.",
-            "",
             "Predictions for throws that polynomials were not fitted to are off by "
-            f"{format_length(trained.error, targets)} (median, in simulation); by degree: {folds}.",
-            "",
+            f"{format_length(self.error, targets)} (median, in simulation); by degree: {folds}.",
         ]
         if self.adaptation is not None:
-            lines += _describe_adaptation(self.adaptation, targets)
+            blocks += _describe_adaptation(self.adaptation, targets)
         if score is not None:
-            lines += _describe_score(score, targets)
-        lines += [
+            blocks += _describe_score(score, targets)
+        blocks += [
             "## What it was not tested on",
-            "",
             "A real robot; balls, tools, surfaces and postures other than the dataset's; throws that scatter. Every "
             "number on this page is one in simulation.",
-            "",
             "## In a program of a robot",
-            "",
             "`model.json` alone is enough. For a `target`, in the order and the units above:",
-            "",
             f"```python\n{PROGRAM}```",
-            "",
         ]
         if self.distilled is not None:
-            lines += [
+            blocks += [
                 "`model.onnx` needs no NumPy in a controller: one polynomial, distilled from this model. Its "
                 "parameters stay inside of their ranges for any target, in reach or not. In Python:",
-                "",
                 f"```python\n{ONNX_PROGRAM}```",
-                "",
             ]
-        return "\n".join(lines)
+        return "\n\n".join(blocks) + "\n"
 
 
 def _describe_adaptation(adaptation: Adaptation, targets: Sequence[str]) -> Iterator[str]:
     throws = format_count(adaptation.throws, "throw")
-    yield "## Adapted to another world\n"
-    if adaptation.method is Method.NONE:
-        yield f"{throws} there did not speak for any difference.\n"
-        return
-    yield f"By {throws} there; what differs was taken to be: {adaptation.method.value}.\n"
-    found = ((f"`{each.name}`", f"{each.value:.4g}", f"{each.deviation:.2g}") for each in adaptation.found)
-    yield from _tabulate(("", "found", "standard deviation"), found)
+    yield "## Adapted to another world"
+    yield f"By {throws} there; what differs was taken to be: {adaptation.method.value}."
+    found = [(f"`{each.name}`", f"{each.value:.4g}", f"{each.deviation:.2g}") for each in adaptation.found]
+    yield _tabulate(("", "found", "standard deviation"), found)
     before, after = adaptation.medians
     if after is not None:
         yield (
             f"The throws were off by {format_length(before, targets)} before (median), and by "
-            f"{format_length(after, targets)} after, each predicted by a model that was adapted to the others.\n"
+            f"{format_length(after, targets)} after, each predicted by a model that was adapted to the others."
         )
 
 
 def _describe_score(score: Score, targets: Sequence[str]) -> Iterator[str]:
-    rows = score.list_rows()
-    here = len(rows) - len(score.adapted)
-    yield "## How it hits\n"
-    yield (
+    yield "## How it hits"
+    text = (
         f"Misses of {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')} (from "
-        f"{score.seed} on), medians of the seeds; each draws targets, the throws that were learned from, and those in "
-        "another world; in simulation:\n"
+        f"{score.seed} on), medians of the seeds, in simulation; in another world of those that can be reached there"
     )
-    yield from _tabulate(("", *SCORE_HEAD), rows[:here])
-    if score.adapted:
+    if score.scatter:
         scatter = " and ".join(format_distance(score.scatter, unit) for unit in list_units(targets))
-        measured = f", with a scatter of {scatter} of what is measured"
-        yield (
-            f"In another world{measured if score.scatter else ''}, at those of these targets that can be reached "
-            "there, in simulation:\n"
-        )
-        yield from _tabulate(("", *SCORE_HEAD), rows[here:])
+        text += f", with a scatter of {scatter} of what is measured"
+    yield f"{text}."
+    yield _tabulate(("", *SCORE_HEAD), score.list_rows())
 
 
-def _tabulate(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Make the lines of a table in Markdown, and an empty one after it."""
-    for cells in (head, ["---"] * len(head), *rows):
-        yield f"| {' | '.join(cells)} |"
-    yield ""
+def _tabulate(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Make a table in Markdown."""
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows))

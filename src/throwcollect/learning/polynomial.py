@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import reduce
 from itertools import combinations_with_replacement
-from operator import add
 from typing import Annotated, Any
 
 import numpy as np
@@ -99,7 +97,7 @@ def fit_polynomial(inputs: Array, outputs: Array, degree: int, *, minor: int = 0
         minor: Number of minor inputs, as `list_exponents` takes it.
     """
     exponents = list_exponents(inputs.shape[1], degree, minor=minor)
-    return _solve(exponents, _Sums.of(inputs, outputs, exponents))
+    return _solve(exponents, len(inputs), *_sum_up(list_terms(inputs, exponents), outputs))
 
 
 def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, minor: int = 0) -> dict[int, Array]:
@@ -122,16 +120,18 @@ def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, m
         exponents = list_exponents(inputs.shape[1], degree, minor=minor)
         if degree > 1 and len(exponents) * SAMPLES_PER_TERM > len(inputs):
             break
-        parts: list[_Sums] = []
+        sums = []
         for fold in numbers:
-            parts.append(_Sums.of(inputs[folds == fold], outputs[folds == fold], exponents))
-            log.note(len(errors) * len(numbers) + len(parts))
-        distances = np.empty(len(inputs))
-        for fold, left_out in zip(numbers, parts, strict=True):
-            others = reduce(add, [part for part in parts if part is not left_out])
             held = folds == fold
-            missed = _solve(exponents, others).predict(inputs[held]) - outputs[held]
-            distances[held] = np.linalg.norm(missed, axis=1)
+            sums.append(_sum_up(list_terms(inputs[held], exponents), outputs[held]))
+            log.note(len(errors) * len(numbers) + len(sums))
+        squares, products = map(np.stack, zip(*sums, strict=True))
+        distances = np.empty(len(inputs))
+        for fold in numbers:
+            held, others = folds == fold, numbers != fold
+            # The sums over all others are those over their folds, added up.
+            found = _solve(exponents, int((~held).sum()), squares[others].sum(axis=0), products[others].sum(axis=0))
+            distances[held] = np.linalg.norm(found.predict(inputs[held]) - outputs[held], axis=1)
         errors[degree] = distances
     return errors
 
@@ -155,27 +155,14 @@ def list_exponents(inputs: int, degree: int, *, minor: int = 0) -> NDArray[np.in
     return np.array(rows, np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class _Sums:
-    """The sums over samples that least squares needs; the sums of several groups of samples can be added."""
-
-    samples: int
-    squares: Array
-    products: Array
-
-    @classmethod
-    def of(cls, inputs: Array, outputs: Array, exponents: NDArray[np.int64]) -> _Sums:
-        terms = list_terms(inputs, exponents)
-        transposed = np.ascontiguousarray(terms.T)
-        return cls(len(inputs), matmul(transposed, terms), matmul(transposed, outputs))
-
-    def __add__(self, more: _Sums) -> _Sums:
-        return _Sums(self.samples + more.samples, self.squares + more.squares, self.products + more.products)
+def _sum_up(terms: Array, outputs: Array) -> tuple[Array, Array]:
+    """The sums over samples that least squares needs: products of terms, and of terms with outputs."""
+    transposed = np.ascontiguousarray(terms.T)
+    return matmul(transposed, terms), matmul(transposed, outputs)
 
 
-def _solve(exponents: NDArray[np.int64], sums: _Sums) -> Polynomial:
-    ridge = _RIDGE * sums.samples * np.eye(len(exponents))
-    return Polynomial(exponents, solve(sums.squares + ridge, sums.products))
+def _solve(exponents: NDArray[np.int64], samples: int, squares: Array, products: Array) -> Polynomial:
+    return Polynomial(exponents, solve(squares + _RIDGE * samples * np.eye(len(exponents)), products))
 
 
 def list_terms(inputs: Array, exponents: NDArray[np.int64]) -> Array:

@@ -185,18 +185,12 @@ class PolicyScore(ModelEntry):
 
     Attributes:
         world: The world.
-        targets: Number of targets of each seed.
-        seed: The first seed of their choice.
-        seeds: Number of seeds.
         hits: Share of throws that succeeded and ended at most `hit` from their target, in its unit.
         clipped: Share of their samples in which a command was beyond a limit.
         errors: By how much the targets are missed; medians over seeds.
     """
 
     world: str
-    targets: int
-    seed: int
-    seeds: int
     hit: FiniteFloat
     hits: FiniteFloat
     clipped: FiniteFloat

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.throw import Throw
-from throwcollect.learning.adapting import Adaptation, Method, leave_as_it_is
+from throwcollect.learning.adapting import Adaptation, Method, adapt
 from throwcollect.learning.aiming import aim
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.learned_map import (
@@ -34,28 +34,19 @@ REAL_THROWS = (0, 1, 3, 5, 10)
 _APART = 1000
 """Added to the seed of targets, this gives the seed of throws to adapt by, so that these are no seed's targets."""
 
-Adapts = Callable[[LearnedMap, Array, Array, Array], tuple[Correction, Adaptation]]
-"""`adapt`, with all that is the same for all throws."""
-
 
 class Simulates(Protocol):
-    """The part of `Simulator` that scoring needs."""
+    """The part of `Simulator` that scoring needs; that room is above this one."""
 
     config: Config
 
-    def find_refusal(self, values: Mapping[str, float]) -> str | None:
-        """Return why a throw would be refused; None if it would not."""
-        ...
+    @property
+    def find_refusal(self) -> Callable[[Mapping[str, float]], str | None]:
+        """Returns why a throw would be refused; None if it would not."""
 
-    def throw_many(
-        self,
-        points: Iterable[Mapping[str, float]],
-        *,
-        targets: Iterable[Mapping[str, float]] = (),
-        processes: int = 1,
-    ) -> Iterator[Throw]:
-        """Simulate throws, in order."""
-        ...
+    @property
+    def throw_many(self) -> Callable[..., Iterator[Throw]]:
+        """Simulates throws, in order."""
 
 
 def score_model(
@@ -66,23 +57,13 @@ def score_model(
     seeds: range,
     world: Simulates | None,
     scatter: float,
-    adapt_map: Adapts,
     distilled: DistilledMap | None,
     processes: int,
 ) -> Score:
-    """Throw at targets, in the world of the dataset and in another one.
+    """Throw at `count` targets of each seed, in the world of the dataset and in another one; see `Model.score`.
 
-    Args:
-        learned: The map. If it was adapted already, adapting to the other world begins with its correction, and the
-            throws in the world of the dataset leave the correction out.
-        simulator: Simulates the world of the dataset.
-        count: Number of targets of each seed.
-        seeds: Seeds of their choice, of the throws that smaller models are learned from, and of the noise.
-        world: Simulates the other world; None for none.
-        scatter: Standard deviation of noise on the measured ends of throws in the other world.
-        adapt_map: Adapts a map to throws in the other world.
-        distilled: The map that is distilled for the world of the dataset; None for none.
-        processes: How many processes simulate.
+    If the map was adapted already, adapting to the other world begins with its correction, and the throws in the world
+    of the dataset leave the correction out.
     """
     context = _find_nominal_context(learned)
     plain = learned.correct(None)
@@ -105,7 +86,7 @@ def score_model(
         throws += _list_throws(targets, places[len(sizes)])
         if world is None:
             continue
-        adaptations = _adapt_step_by_step(learned, world, seed, scatter, adapt_map, processes)
+        adaptations = _adapt_step_by_step(learned, world, seed, scatter, processes)
         targets, found = _throw_there(learned, adaptations, targets, world, processes)
         adapted_throws += _list_throws(targets, found[-1]) if found else []
         for (number, (_, each)), ends in zip(adaptations.items(), found, strict=False):
@@ -133,7 +114,7 @@ def score_model(
 
 
 def _adapt_step_by_step(
-    learned: LearnedMap, world: Simulates, seed: int, scatter: float, adapt_map: Adapts, processes: int
+    learned: LearnedMap, world: Simulates, seed: int, scatter: float, processes: int
 ) -> dict[int, tuple[Correction, Adaptation]]:
     """Throw in another world, and adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
     context = _find_nominal_context(learned)
@@ -145,10 +126,11 @@ def _adapt_step_by_step(
     # The second number of the seed makes this sequence independent of the sequence for targets.
     noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
     parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
-    found = {0: leave_as_it_is(learned, np.empty(0), scatter)}
-    for number in sorted({min(number, len(measured)) for number in REAL_THROWS} - {0}):
-        found[number] = adapt_map(learned, parameters[:number], given[:number], measured[:number])
-    return found
+    numbers = sorted({min(number, len(measured)) for number in REAL_THROWS})
+    return {
+        number: adapt(learned, parameters[:number], given[:number], measured[:number], scatter=scatter)
+        for number in numbers
+    }
 
 
 def _throw_there(
@@ -225,15 +207,8 @@ def _find_nominal_context(learned: LearnedMap) -> Array:
 def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap:
     """Learn a map from some throws of the dataset, drawn at random."""
     drawn = np.sort(np.random.default_rng((seed, 2)).permutation(len(learned.inputs))[:size])
-    fit, _, _ = fit_throws(
-        learned.kind,
-        learned.axes,
-        learned.targets,
-        learned.values[drawn],
-        learned.outputs[drawn],
-        learned.efforts[drawn],
-    )
-    return fit
+    throws = (learned.values[drawn], learned.outputs[drawn], learned.efforts[drawn])
+    return fit_throws(learned.axes, learned.targets, *throws)
 
 
 def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Simulates, processes: int) -> list[Array]:
@@ -301,9 +276,6 @@ def score_policy(
         found.append(
             PolicyScore(
                 world=name,
-                targets=count,
-                seed=seeds[0],
-                seeds=len(seeds),
                 hit=hit,
                 hits=float((np.linalg.norm(away, axis=1) <= hit).mean()),
                 clipped=float(np.mean([throw.row["clipped_share"] for throw in simulated])),

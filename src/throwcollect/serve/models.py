@@ -73,12 +73,12 @@ def make_model_routes(directory: Path) -> APIRouter:
     def view(model: str) -> ModelView:
         """The throws that a model was learned from, its misses, and the effect of adapting it."""
         found = _find(directory, model)
-        trained, ends = found.trained_on, found.learned.outputs
+        trained, ends = found.trained_on, found.outputs
         return ModelView(
             name=model,
             learned_from=trained.name,
             throws=trained.throws,
-            error=trained.error,
+            error=found.error,
             parameters=list(found.parameters),
             targets=list(found.targets),
             given=list(found.given),

@@ -201,9 +201,9 @@ def test_merged_throws_keep_their_targets(targeted: Path, tmp_path: Path) -> Non
     assert [throw.target for throw in merged] == [{}] * 7 + before
     assert [throw.miss_m for throw in merged][7:] == [throw.miss_m for throw in Dataset.open(targeted)]
     assert merged.throws["target_x_m"].null_count == 8
-    assert ExportSource.of(Dataset.open(tmp_path / "both"), {}).targets == ()
+    assert ExportSource(Dataset.open(tmp_path / "both"), {}).targets == ()
     filter_trials(tmp_path / "both", tmp_path / "some", where="miss_m >= 0")
-    some = ExportSource.of(Dataset.open(tmp_path / "some"), {})
+    some = ExportSource(Dataset.open(tmp_path / "some"), {})
     assert [each.name for each in some.targets] == ["target_x_m", "target_y_m"]
     assert verify(tmp_path / "some") == []
     filter_trials(tmp_path / "both", tmp_path / "none", where="trial < 7")

@@ -5,7 +5,7 @@ import pytest
 from tests.unit.learning.worlds import HIGH, KEYS, LOW, draw, effort, land, learn, learn_with_drag
 
 from throwcollect.learning.aiming import Choice, aim
-from throwcollect.learning.learned_map import Correction, KeyRole, Kind, LearnedMap, find_nearest
+from throwcollect.learning.learned_map import Correction, KeyRole, LearnedMap, find_nearest
 
 
 def throw(learned: LearnedMap, targets: np.ndarray, choice: Choice = Choice.NEAREST):
@@ -20,13 +20,12 @@ def targets() -> np.ndarray:
     return land(draw(40, seed=5, inside=0.6))
 
 
-@pytest.mark.parametrize(("kind", "off_m"), [(Kind.LOCAL, 0.002), (Kind.POLYNOMIAL, 0.005)])
-def test_aimed_throws_end_at_their_targets(kind: Kind, off_m: float, targets: np.ndarray) -> None:
-    found, _, off = throw(learn(kind=kind), targets)
+def test_aimed_throws_end_at_their_targets(targets: np.ndarray) -> None:
+    found, _, off = throw(learn(), targets)
     assert found.reachable.all()
     assert np.linalg.norm(found.predicted - targets, axis=1).max() < 1e-3
-    assert np.median(off) < off_m / 4
-    assert off.max() < off_m
+    assert np.median(off) < 0.0005
+    assert off.max() < 0.002
 
 
 @pytest.mark.parametrize("choice", Choice)
@@ -91,17 +90,12 @@ def test_a_target_that_no_throw_came_near_is_out_of_reach() -> None:
     assert np.linalg.norm(nearest - [9.0, 0.0]) == np.linalg.norm(learned.outputs - [9.0, 0.0], axis=1).min()
 
 
-def test_aiming_takes_the_way_of_least_effort_or_sensitivity_if_chosen(targets: np.ndarray) -> None:
+def test_aiming_takes_the_way_of_least_effort_if_chosen(targets: np.ndarray) -> None:
     learned = learn()
     by = {choice: throw(learned, targets, choice) for choice in Choice}
     assert all(off.max() < 0.01 for _, _, off in by.values())
     efforts = {choice: effort(values).mean() for choice, (_, values, _) in by.items()}
     assert efforts[Choice.LEAST_EFFORT] == min(efforts.values()) < efforts[Choice.NEAREST] - 0.005
-    sensitivities = {
-        choice: (learned.forward.slopes(found.parameters, slice(None)) ** 2).sum()
-        for choice, (found, _, _) in by.items()
-    }
-    assert sensitivities[Choice.LEAST_SENSITIVE] < 0.98 * sensitivities[Choice.NEAREST]
 
 
 def test_aiming_compensates_for_a_known_bias_and_offset(targets: np.ndarray) -> None:

@@ -59,9 +59,9 @@ def test_the_onnx_file_is_reproducible_and_agrees_with_the_distilled_map(tmp_pat
         assert {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} == files
     model = load_model(tmp_path / "one")
     assert model.distilled is not None
-    context = model.learned.scale(KeyRole.CONTEXT, np.array([[0.1]]))
+    context = model.scale(KeyRole.CONTEXT, np.array([[0.1]]))
     scaled = model.distilled.aim(np.array([[1.2, -0.2]]), context)
-    wanted = model.learned.unscale(KeyRole.PARAMETER, scaled)[0]
+    wanted = model.unscale(KeyRole.PARAMETER, scaled)[0]
     assert ONNX_PROGRAM.rstrip() in (tmp_path / "one" / "README.md").read_text()
     script = f"target = [1.2, -0.2, 0.1]\n{ONNX_PROGRAM}\nprint(json.dumps(parameters))"
     said = subprocess.run(

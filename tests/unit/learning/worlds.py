@@ -13,7 +13,7 @@ from tests.unit.dataset.conftest import Collection
 
 from throwcollect.config.values import column_of
 from throwcollect.dataset.reader import Dataset
-from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap, fit_throws
+from throwcollect.learning.learned_map import Axis, KeyRole, LearnedMap, fit_throws
 
 Array = NDArray[np.float64]
 
@@ -49,20 +49,20 @@ def effort(values: Array) -> Array:
 
 
 @cache
-def learn(count: int = 800, kind: Kind = Kind.LOCAL) -> LearnedMap:
+def learn(count: int = 400) -> LearnedMap:
     """A map of a world that is the same in all throws."""
     values = draw(count)
-    return fit_throws(kind, parameter_axes(), TARGETS, values, land(values), effort(values))[0]
+    return fit_throws(parameter_axes(), TARGETS, values, land(values), effort(values))
 
 
 @cache
-def learn_with_drag(count: int = 600, role: KeyRole = KeyRole.LATENT) -> LearnedMap:
+def learn_with_drag(count: int = 400, role: KeyRole = KeyRole.LATENT) -> LearnedMap:
     """A map of worlds that differ in the ball's drag, which has this role."""
     values = draw(count)
     drag = np.random.default_rng(9).random(count)
     inputs = np.column_stack([values, drag])
     axes = (*parameter_axes(), replace(DRAG, role=role))
-    return fit_throws(Kind.LOCAL, axes, TARGETS, inputs, land(values, drag), effort(values))[0]
+    return fit_throws(axes, TARGETS, inputs, land(values, drag), effort(values))
 
 
 def make_dataset(directory: Path, count: int) -> Dataset:

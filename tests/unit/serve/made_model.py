@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
-from throwcollect.learning.learned_map import EFFORT, Axis, Correction, KeyRole, Kind
+from throwcollect.learning.learned_map import Axis, Correction, KeyRole
 from throwcollect.learning.model import Model
 from throwcollect.learning.model_card import TrainedOn
 from throwcollect.learning.polynomial import Polynomial
@@ -24,28 +23,20 @@ def make_model(directory: Path, throws: int = 400) -> None:
     straight = Polynomial(np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     flat = Polynomial(np.array([[0, 0]]), np.array([[0.5]]))
     none = Correction(np.zeros(2), np.zeros(0), np.zeros(2))
-    columns = {"trial": np.arange(throws), EFFORT: np.full(throws, 0.5)}
-    columns |= {name: values[:, number] for names in (KEYS, TARGETS) for number, name in enumerate(names)}
     trained: dict[str, Any] = {"name": "quick", "robot": "talos", "task": "throw", "engine": "bullet", "digest": "0"}
     model = Model(
         version="0",
-        kind=Kind.LOCAL,
         axes=axes,
         targets=TARGETS,
         forward=straight,
         effort=flat,
         correction=none,
-        trained_on=TrainedOn(
-            **trained,
-            throws=throws,
-            ignored=0,
-            selection=None,
-            folds_error={1: 0.002},
-            without_latents=None,
-            latents_count=False,
-        ),
-        adaptation=None,
-        points=pa.table(columns),
+        errors={1: 0.002},
+        blind_error=None,
+        trained_on=TrainedOn(**trained, throws=throws, ignored=0),
+        values=values,
+        outputs=values,
+        efforts=np.full(throws, 0.5),
         config="name: quick\n",
     )
     directory.parent.mkdir(exist_ok=True)

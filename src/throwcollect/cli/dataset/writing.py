@@ -1,4 +1,4 @@
-"""`throwcollect dataset export`, `report`, `view`, `render` and `images`: files for other programs and people."""
+"""`throwcollect dataset export`, `report`, `view` and `render`: files for other programs and people."""
 
 from __future__ import annotations
 
@@ -98,7 +98,6 @@ def render(
     camera: str | None = None,
     size: str | None = None,
     slow: float = 1.0,
-    strip: int = 1,
     json: JsonOption = False,
 ) -> None:
     """Draw throws as an animated picture, a video or a picture, from what was recorded.
@@ -109,7 +108,6 @@ def render(
         camera (NAME): Camera of the configuration that sees them; a place to their right if not given.
         size (WIDTHxHEIGHT): Size of the picture of a throw in pixels.
         slow (FACTOR 0.5..20): How many times slower than it was.
-        strip (COUNT 1..50): Pictures of a throw in a .png, from its start to its end.
     """
     from throwcollect.publish.view.animation import render as render_throws
 
@@ -120,25 +118,9 @@ def render(
         if min(pixels) < 8:
             raise ConfigError(f"--size: got {size!r}", expected="pixels such as 640x400, each from 8 to 9999")
     chosen = None if trials is None else read_trials(trials)
-    written = render_throws(directory, output, trials=chosen, camera=camera, size=pixels, slow=slow, strip=strip)
+    written = render_throws(directory, output, trials=chosen, camera=camera, size=pixels, slow=slow)
     text = (
         f"{written.file}: {format_count(len(written.trials), 'throw')}, {format_count(written.pictures, 'picture')}, "
         f"{written.duration_s:.1f} s, {written.size_bytes / 1e6:.2f} MB"
     )
     show(written, text, json=json)
-
-
-def images(
-    directory: DatasetArgument, *, output: Path, sensor: str, trials: str | None = None, json: JsonOption = False
-) -> None:
-    """Write the frames of a sensor as PNG files.
-
-    Options:
-        output (-o --output DIR): Directory to write; must be new or empty.
-        sensor (NAME): Name of the sensor.
-        trials (3,5,7-9): Trials to write; all if not given.
-    """
-    from throwcollect.publish.view.sensor_pictures import write_images
-
-    count = write_images(directory, output, sensor=sensor, trials=None if trials is None else read_trials(trials))
-    show({"directory": output, "pictures": count}, f"{output}: {format_count(count, 'picture')}", json=json)

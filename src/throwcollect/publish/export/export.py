@@ -49,8 +49,8 @@ def export(
     ``hdf5``). Each sample then has a frame of each sensor, so that the rate is that of the sensors.
 
     Raises:
-        ConfigError: If there is no such format, it has no such images, the rate is above the recorded one or not one
-            at which all sensors have frames, or `output` exists.
+        ConfigError: If there is no such format, it has no such images, the rate does not divide the recorded one and
+            those of all sensors, or `output` exists.
         MissingExtraError: If a library that the format needs is not installed.
         DatasetError: If the dataset is unfinished, damaged or without episodes, or `output` cannot be written.
         MemberError: If the format is of another package and fails.
@@ -66,7 +66,7 @@ def export(
         raise refuse_argument("images", f"{to} has no {way!r}", expected=" or ".join(chosen.images))
     dataset = Dataset.open(directory)
     streams = choose_streams(dataset.config, chosen.images[way])
-    source = ExportSource.of(dataset, streams, rate_hz=rate_hz, images=way)
+    source = ExportSource(dataset, streams, rate_hz=rate_hz, images=way)
     if images not in (None, NO_IMAGES) and not source.streams:
         raise refuse_argument("images", f"{directory} has no sensors that {to} has images of", expected=NO_IMAGES)
     with new_directory(output) as scratch:

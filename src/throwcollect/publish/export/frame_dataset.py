@@ -54,7 +54,7 @@ class FrameDataset:
         seen = {f"{name}_{_ENDINGS[each]}": (name, FRAMES[each]) for name, some in streams.items() for each in some}
         self._seen = {name: found for name, found in seen.items() if name in (observation or seen)}
         chosen = {name: streams[name] for name, _ in self._seen.values()}
-        self._source, self._horizon = ExportSource.of(dataset, chosen, rate_hz=rate_hz), horizon
+        self._source, self._horizon = ExportSource(dataset, chosen, rate_hz=rate_hz), horizon
         known = [*(signal.name for signal in self._source.signals), *seen]
         for name in set(observation).difference(known):
             raise refuse_argument("observation", f"there is no {name!r}{suggest(name, known)}")

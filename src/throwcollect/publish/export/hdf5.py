@@ -51,14 +51,9 @@ file = h5py.File("throws.hdf5")
         frames="`obs/<sensor>_image` [0 to 255] and `obs/<sensor>_depth` [m], each with the next ones in `next_obs/`",
         notes=(
             f"The layout is that of robomimic. Each group of a {noun} has `obs/` with what is measured, `next_obs/`, "
-            "the same one sample later (in the last sample, that of the sample itself), `actions`, the commanded "
-            "positions of the moving joints one sample later, `rewards`, 1 in the last sample of a "
-            f"{noun} that succeeded, and `dones`, 1 in the last sample; `time_s` and what is commanded "
-            "in the samples themselves are there, too. Every dataset has the attributes `unit` and `description`, and "
-            "`components` where it has several columns.",
-            "Actions are in radians, and robomimic's policies put out numbers between -1 and 1, so set "
-            '`train.action_config.actions.normalization` to "min_max" there (version 0.5.0). '
-            "`env_args` names no environment that robomimic could make.",
+            "the same one sample later, `actions`, the commanded positions of the moving joints one sample later, "
+            f"`rewards`, 1 in the last sample of a {noun} that succeeded, and `dones`, 1 in the last sample. Every "
+            "dataset has the attributes `unit` and `description`, and `components` where it has several columns.",
         ),
         over_time=tabulate_signals(source),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from itertools import islice
@@ -16,7 +16,6 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from throwcollect.config.sensors import PictureConfig
-from throwcollect.dataset.derive.statistics import Moments
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
@@ -36,13 +35,12 @@ from throwcollect.robots.surroundings import moving_bodies_of
 
 _VERSION = "v3.0"
 _EPISODES_PER_GROUP = 100
-_BINS = 5000
 _FARTHEST_M = 65.535
 """No depth beyond has a number of millimetres."""
 
 Frames = NDArray[np.float64]
 """Values of one feature, shape ``(n_frames, n_components)``."""
-Statistics = dict[str, list[float] | list[int]]
+Statistics = dict[str, list[Any]]
 """``min``, ``max``, ``mean``, ``std`` and quantiles of each component; ``count``, the number of frames."""
 
 
@@ -75,7 +73,7 @@ class Feature:
 def describe(source: ExportSource) -> Layout:
     """Describe how `write` lays a source out."""
     config = source.dataset.config
-    success, noun, body = config.task.success, config.task.noun, config.acted_on
+    success, noun = config.task.success, config.task.noun
     longest = max(map(source.count_samples, source.throws))
     return Layout(
         files={
@@ -90,13 +88,9 @@ dataset = LeRobotDataset("me/throws", root=".")
 {success} = LeRobotDataset("me/throws", root=".", episode_filter=lambda episode: episode["outcome"] == "{success}")""",
         frames="`observation.images.<sensor>`, depths `observation.images.<sensor>_depth` [mm, 0 for none]",
         notes=(
-            f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a {noun}. Frames are float32, "
-            f"as usual there. Joints that do not move, orientation and spin of the {body}, and commanded velocities "
-            "are left out.",
-            f"The longest episode has {longest} frames. A policy of LeRobot commands all of it at once with "
-            f"`--policy.chunk_size={longest} --policy.n_action_steps={longest}` (ACT), and is to be asked at "
-            f"{source.rate_hz} Hz. ACT and Diffusion train without images, because there is "
-            "`observation.environment_state`; they normalise it only if `normalization_mapping` names `ENV`.",
+            f"A LeRobot dataset of version {_VERSION.removeprefix('v')}; each episode is a {noun}. Frames are float32. "
+            f"The longest episode has {longest} frames: a policy commands all of it at once with "
+            f"`--policy.chunk_size={longest} --policy.n_action_steps={longest}` (ACT), asked at {source.rate_hz} Hz.",
         ),
         over_time=[
             "| feature | unit | |",
@@ -112,13 +106,6 @@ dataset = LeRobotDataset("me/throws", root=".")
             "",
             list_joints(source),
         ],
-        hub={
-            "tags": ["LeRobot"],
-            "configs": [
-                {"config_name": "default", "data_files": "data/*/*.parquet", "default": True},
-                {"config_name": "throws", "data_files": THROWS},
-            ],
-        },
     )
 
 
@@ -128,7 +115,6 @@ def write(source: ExportSource, directory: Path) -> None:
     tasks: dict[str, int] = {}
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
-    moments: dict[str, Moments] = {}
     images = {
         (name, stream): ImageSeries(name, stream, camera, source.images, directory, source.rate_hz)
         for name, camera in source.dataset.config.sensors.items()
@@ -165,17 +151,12 @@ def write(source: ExportSource, directory: Path) -> None:
                     if series.in_table:
                         table_of_frames = table_of_frames.append_column(series.key, encode_pictures(pictures))
                 data.append(table_of_frames)
-                for name, feature in features.items():
-                    more = Moments.of(feature.values)
-                    moments[name] = moments[name].with_more(more) if name in moments else more
                 first += len(throw)
             _append_episodes(meta, rows, episodes.slice(start, len(rows)))
     entries = {name: feature.as_dict() for name, feature in features.items()}
     entries |= {series.key: series.as_feature() for series in images.values()}
     _write_json(directory / "meta" / "info.json", _describe_dataset(source, entries, frames=first, tasks=len(tasks)))
-    statistics: dict[str, Mapping[str, Any]] = {
-        name: summarise_all(moments[name], _read_feature(data.paths, name)) for name in features
-    }
+    statistics: dict[str, Mapping[str, Any]] = {name: _summarise_all(data.paths, name) for name in features}
     statistics |= {series.key: series.summarise() for series in images.values()}
     _write_json(directory / "meta" / "stats.json", statistics)
     pq.write_table(_tabulate_tasks(tasks), directory / "meta" / "tasks.parquet")
@@ -243,9 +224,7 @@ def _describe_episode(
         "dataset_to_index": first + length,
     }
     for name, feature in features.items():
-        exact = np.quantile(feature.values, list(QUANTILES.values()), axis=0)
-        statistics = _list_statistics(Moments.of(feature.values), exact)
-        row |= {f"stats/{name}/{key}": values for key, values in statistics.items()}
+        row |= {f"stats/{name}/{key}": values for key, values in _summarise(feature.values).items()}
     return row
 
 
@@ -256,16 +235,6 @@ def _append_episodes(meta: ParquetSeries, rows: list[dict[str, Any]], throws: pa
     for field in throws.drop_columns(["episode_index"]).schema:
         table = table.append_column(field, throws[field.name])
     meta.append(table)
-
-
-def _read_feature(paths: Sequence[Path], name: str) -> Iterator[Frames]:
-    for path in paths:
-        with pq.ParquetFile(path) as file:
-            for batch in file.iter_batches(columns=[name]):
-                column = batch.column(0)
-                if pa.types.is_fixed_size_list(column.type):
-                    column = column.flatten()
-                yield column.cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(batch), -1)
 
 
 def _describe_dataset(
@@ -315,42 +284,26 @@ def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
     )
 
 
-def summarise_all(moments: Moments, portions: Iterable[Frames]) -> Statistics:
-    """Compute the statistics of all frames from their moments and the frames themselves, in any portions.
-
-    Quantiles come from histograms of 5000 bins over the range of each component, so they are right to 1/5000 of it.
-    """
-    low, span = moments.minimum, moments.maximum - moments.minimum
-    histogram = np.zeros((len(span), _BINS), np.int64)
-    # All values of a constant component are in the first bin.
-    scale = np.divide(_BINS, span, out=np.zeros_like(span), where=span > 0)
-    # Each component has numbers of bins of its own, so that one count serves all of them.
-    rows = np.arange(len(span)) * _BINS
-    for frames in portions:
-        bins = np.minimum(((frames - low) * scale).astype(np.int64), _BINS - 1)
-        histogram += np.bincount((bins + rows).ravel(), minlength=histogram.size).reshape(histogram.shape)
-    below = np.cumsum(histogram, axis=1)
-    quantiles = []
-    for share in QUANTILES.values():
-        target = share * moments.count
-        # Within the bin that a quantile is in, values count as evenly spread.
-        index = (below < target).sum(axis=1)[:, np.newaxis]
-        inside = np.take_along_axis(histogram, index, axis=1)[:, 0]
-        before = np.take_along_axis(below, index, axis=1)[:, 0] - inside
-        quantiles.append(low + span * (index[:, 0] + (target - before) / inside) / _BINS)
-    return _list_statistics(moments, np.array(quantiles))
-
-
-def _list_statistics(moments: Moments, quantiles: Frames) -> Statistics:
-    """List moments, and quantiles of shape ``(n_quantiles, n_components)``, by the names that LeRobot gives them."""
+def _summarise(frames: Frames) -> Statistics:
+    """Compute the statistics of frames, by the names that LeRobot gives them."""
+    quantiles = np.quantile(frames, list(QUANTILES.values()), axis=0)
     return {
-        "min": moments.minimum.tolist(),
-        "max": moments.maximum.tolist(),
-        "mean": moments.mean.tolist(),
-        "std": moments.std.tolist(),
-        "count": [moments.count],
+        "min": frames.min(axis=0).tolist(),
+        "max": frames.max(axis=0).tolist(),
+        "mean": frames.mean(axis=0).tolist(),
+        "std": frames.std(axis=0).tolist(),
+        "count": [len(frames)],
         **dict(zip(QUANTILES, quantiles.tolist(), strict=True)),
     }
+
+
+def _summarise_all(paths: Sequence[Path], name: str) -> Statistics:
+    """Compute the statistics of a feature of all frames, component by component, as they may be many."""
+    column = pq.read_table([*paths], columns=[name])[name].combine_chunks()
+    values = (column.flatten() if pa.types.is_fixed_size_list(column.type) else column).to_numpy(zero_copy_only=False)
+    components = values.reshape(len(column), -1).T
+    each = [_summarise(np.array(component, np.float64)[:, np.newaxis]) for component in components]
+    return {key: [number for part in each for number in part[key]] for key in each[0]} | {"count": [len(column)]}
 
 
 def _write_json(path: Path, value: object) -> None:

@@ -31,8 +31,6 @@ BASIS_FUNCTIONS = 25
 """Number of basis functions of each joint in a fitted DMP."""
 _LONGEST_NAME = 63
 """Most characters of the name of a field in MATLAB."""
-_LARGEST = 2**31 - 1
-"""Size that a variable may have in a file of version 5 [bytes]."""
 
 
 def describe(source: ExportSource) -> Layout:
@@ -106,23 +104,11 @@ def write(source: ExportSource, directory: Path) -> None:
 
 
 def _save(path: Path, variables: Mapping[str, Any]) -> None:
-    for name, value in variables.items():
-        if (size := _count_bytes(value)) > _LARGEST:
-            raise DatasetError(
-                f"{path.name}: {name} would have {size / 2**30:.1f} GiB",
-                expected="less than 2 GiB, which is what MATLAB files of version 5 can hold",
-                hint="export at a lower rate, or another format",
-            )
-    scipy_io.savemat(path, variables, do_compression=True, long_field_names=True)
-
-
-def _count_bytes(value: Any) -> int:
-    """Count the bytes of all numbers in nested structures."""
-    if isinstance(value, dict):
-        return sum(map(_count_bytes, value.values()))
-    if isinstance(value, np.ndarray):
-        return sum(map(_count_bytes, value.flat)) if value.dtype == object else value.nbytes
-    return 0
+    try:
+        scipy_io.savemat(path, variables, do_compression=True, long_field_names=True)
+    except scipy_io.matlab.MatWriteError as error:
+        hint = "export at a lower rate, or another format"
+        raise DatasetError(f"{path.name}: {error}", expected="less than 4 GiB a variable", hint=hint) from error
 
 
 def _make_cell(values: Sequence[Any]) -> NDArray[np.object_]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
-import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, Any
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -20,8 +18,6 @@ from throwcollect.errors import refuse_argument
 from throwcollect.publish.export.exporter import Exporter, Layout, tabulate_signals
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)
-"""A fixed date for the members of archives, so that the same data give the same bytes."""
 _LARGEST = 2 * 2**30
 """Size that an array of what a sensor saw may have, as NumPy reads a whole array into memory [bytes]."""
 
@@ -52,13 +48,15 @@ time_s, {position} = archive["time_s"][rows], archive["{position}"][rows]""",
 
 def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as NumPy archives; see `Exporter.write`."""
-    columns = {field.name: to_array(source.table[field.name]) for field in source.table.schema}
-    with zipfile.ZipFile(directory / "throws.npz", "w") as archive:
-        for name, values in {**columns, "digest_of_dataset": np.array(source.dataset.digest)}.items():
-            _add(archive, name, values)
+    columns = {name: to_array(source.table[name]) for name in source.table.column_names}
+    # Objects would be pickled, and every reader would have to allow that.
+    plain: dict[str, Any] = {
+        name: values.astype(np.str_) if values.dtype == object else values for name, values in columns.items()
+    }
+    np.savez_compressed(directory / "throws.npz", **plain, digest_of_dataset=np.array(source.dataset.digest))
     (directory / "trajectories").mkdir()
-    for shard, entries in source.shards.items():
-        _write_shard(source, entries, directory / "trajectories" / f"{shard}.npz")
+    for shard, throws in source.shards.items():
+        _write_shard(source, throws, directory / "trajectories" / f"{shard}.npz")
 
 
 def to_array(column: pa.ChunkedArray) -> NDArray[Any]:
@@ -71,35 +69,27 @@ def to_array(column: pa.ChunkedArray) -> NDArray[Any]:
 
 
 def _write_shard(source: ExportSource, throws: Dataset, path: Path) -> None:
-    offsets = np.concatenate([[0], np.cumsum([source.count_samples(throw) for throw in throws])])
-    names: Mapping[str, NDArray[Any]] = {
-        "trial": throws["trial"],
-        "offsets": offsets,
-        "joints": np.array(source.dataset.joints),
-        "moving_joints": np.array(source.dataset.moving_joints),
-        "digest_of_dataset": np.array(source.dataset.digest),
-    }
-    # A member of an archive has to be written in one go, so each array is first written to a file of its own.
-    unpacked: dict[str, Path] = {}
-    with ExitStack() as stack:
-        files: dict[str, IO[bytes]] = {}
+    ends = np.cumsum([source.count_samples(throw) for throw in throws])
+    count, kinds = int(ends[-1]), dict[str, tuple[Any, ...]]()
+    with TemporaryDirectory(dir=path.parent) as unpacked:
+        # The samples of all throws may be larger than the memory, so they are gathered in files.
         for throw in source.read(throws):
-            for name, values in (*throw.signals.items(), *_look(source, throw.throw, int(offsets[-1]))):
-                if name not in files:
-                    unpacked[name] = path.with_name(f"{path.stem}.{name}.npy")
-                    files[name] = stack.enter_context(unpacked[name].open("wb"))
-                    kind, shape = np.lib.format.dtype_to_descr(values.dtype), (int(offsets[-1]), *values.shape[1:])
-                    header = {"descr": kind, "fortran_order": False, "shape": shape}
-                    np.lib.format.write_array_header_1_0(files[name], header)
-                files[name].write(values.tobytes())
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, values in names.items():
-            _add(archive, name, values)
-        for name, file_of_signal in unpacked.items():
-            # `zipfile` does not know the size beforehand, and fails at 2 GiB unless `force_zip64` is set.
-            with file_of_signal.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
-                shutil.copyfileobj(array, packed)
-            file_of_signal.unlink()
+            for name, values in (*throw.signals.items(), *_look(source, throw.throw, count)):
+                kinds[name] = values.dtype, (count, *values.shape[1:])
+                with Path(unpacked, name).open("ab") as file:
+                    file.write(values.tobytes())
+        arrays: dict[str, Any] = {
+            name: np.memmap(Path(unpacked, name), kind, "r", shape=shape) for name, (kind, shape) in kinds.items()
+        }
+        np.savez_compressed(
+            path,
+            trial=throws["trial"],
+            offsets=np.concatenate([[0], ends]),
+            joints=np.array(source.dataset.joints),
+            moving_joints=np.array(source.dataset.moving_joints),
+            digest_of_dataset=np.array(source.dataset.digest),
+            **arrays,
+        )
 
 
 def _look(source: ExportSource, throw: Throw, samples: int) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -111,19 +101,6 @@ def _look(source: ExportSource, throw: Throw, samples: int) -> Iterator[tuple[st
                 expected = f"at most {_LARGEST // 2**30} GiB, a lower rate, or --images {NO_IMAGES}"
                 raise refuse_argument("images", problem, expected=expected)
             yield f"{sensor}_{kind}", frames
-
-
-def _add(archive: zipfile.ZipFile, name: str, values: NDArray[Any]) -> None:
-    # Objects would be pickled, and every reader would have to allow that.
-    stored = values.astype(np.str_) if values.dtype == object else values
-    with archive.open(_make_member(name), "w") as file:
-        np.lib.format.write_array(file, stored, allow_pickle=False)
-
-
-def _make_member(name: str) -> zipfile.ZipInfo:
-    member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
-    member.compress_type = zipfile.ZIP_DEFLATED
-    return member
 
 
 NPZ = Exporter(describe, write, images={NO_IMAGES: (), "arrays": tuple(FRAMES)})

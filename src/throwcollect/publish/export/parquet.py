@@ -85,18 +85,7 @@ import pandas as pd
 
 throws = pd.read_parquet("{THROWS}")
 samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.throws[0].trial})])""",
-        notes=(
-            f"Without `filters` these are the samples of all {noun}s. Units and descriptions are also in the metadata "
-            "of the fields.",
-        ),
         over_time=tabulate_signals(source, columns=True),
-        hub={
-            "tags": [],
-            "configs": [
-                {"config_name": "throws", "data_files": THROWS, "default": True},
-                {"config_name": _TRAJECTORIES, "data_files": f"{_TRAJECTORIES}/*.parquet"},
-            ],
-        },
     )
 
 

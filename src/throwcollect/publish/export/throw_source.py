@@ -1,11 +1,10 @@
-"""A dataset as exporters read it: its table, and its throws one by one with their signals, also at another rate."""
+"""A dataset as exporters read it: its table, and its throws one by one with their signals, also at a lower rate."""
 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import gcd
-from operator import index
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +19,14 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.sensors import FRAMES
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.trajectories import BODY_COMPONENTS
-from throwcollect.episode.record import Samples
 from throwcollect.episode.sensor_topics import sensor_topics
 from throwcollect.errors import DatasetError, refuse_argument
-from throwcollect.extras import lazily
 from throwcollect.progress_log import ProgressLog
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.robots.trajectory import JointTrajectory, sample_positions, sample_quintic
 from throwcollect.tasks.task import commanded_trajectory
-from throwcollect.units import NS_PER_S, ascii_unit, name_sliding, unit_of_name
-
-interpolate = lazily("scipy.interpolate")
-
+from throwcollect.units import ascii_unit, name_sliding, unit_of_name
 
 NO_IMAGES = "none"
 """The way of leaving out what sensors saw."""
@@ -151,9 +145,10 @@ class ThrowSeries:
         return sample_positions(self.trajectory, np.append(time_s[1:], time_s[-1] + 1 / rate_hz))
 
 
-@dataclass(frozen=True)
 class ExportSource:
-    """A dataset to export.
+    """A dataset to export, with some streams of its sensors, at a number of samples per second.
+
+    Without a number it is the recorded one, or the largest at which each sample has a frame of each sensor.
 
     Attributes:
         dataset: The dataset.
@@ -168,54 +163,35 @@ class ExportSource:
         progress: Logs how many of its trials have been exported.
     """
 
-    dataset: Dataset
-    rate_hz: int
-    targets: tuple[TargetColumn, ...]
-    signals: tuple[Signal, ...]
-    throws: Dataset
-    table: pa.Table
-    images: str
-    streams: Mapping[str, tuple[str, ...]]
-    progress: ProgressLog
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         dataset: Dataset,
         streams: Mapping[str, tuple[str, ...]],
         *,
         rate_hz: int | None = None,
         images: str = NO_IMAGES,
-    ) -> ExportSource:
-        """Take a dataset to export it, with some streams of its sensors, at a number of samples per second.
+    ) -> None:
+        self.dataset, self.streams, self.images, self.throws = dataset, streams, images, dataset.recorded
+        if not len(self.throws):
+            problem = f"none of its {len(dataset.throws)} trials has an episode to export"
+            raise DatasetError(f"{dataset.directory}: {problem}")
+        rates = {"joints": dataset.config.record.rate_hz}
+        rates |= {name: dataset.config.sensors[name].rate_hz for name in streams}
+        highest_hz = gcd(*rates.values())
+        if rate_hz is not None and (rate_hz < 1 or highest_hz % rate_hz):
+            recorded = ", ".join(f"{name} at {rate} Hz" for name, rate in rates.items())
+            expected = f"a divisor of {highest_hz}" + f", or --images {NO_IMAGES}" * (images != NO_IMAGES)
+            raise refuse_argument("rate_hz", f"{rate_hz} samples per second of {recorded}", expected=expected)
+        self.rate_hz = rate_hz or highest_hz
+        self.targets = _list_targets(self.throws)
+        self.signals = tuple(list_signals(dataset.config, self.targets))
+        self.table = dataset.throws.drop_columns(list(_PLACES))
+        self.progress = ProgressLog(len(dataset.throws), "trial", "exported")
 
-        Without a number it is the recorded one, or the largest at which each sample has a frame of each sensor.
-        """
-        directory, recorded_hz = dataset.directory, dataset.config.record.rate_hz
-        if rate_hz is not None and not 1 <= index(rate_hz) <= recorded_hz:
-            expected = f"1 to {recorded_hz}, at which {directory} was recorded"
-            raise refuse_argument("rate_hz", f"{rate_hz} samples per second", expected=expected)
-        throws = dataset.recorded
-        if not len(throws):
-            raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
-        rates = {name: dataset.config.sensors[name].rate_hz for name in streams}
-        if rate_hz is not None and any(rate % rate_hz for rate in rates.values()):
-            seen = ", ".join(f"{name} at {rate} Hz" for name, rate in rates.items())
-            expected = f"a divisor of {gcd(*rates.values())}" + f", or --images {NO_IMAGES}" * (images != NO_IMAGES)
-            raise refuse_argument("rate_hz", f"{rate_hz} samples per second, and images of {seen}", expected=expected)
-        rate_hz = rate_hz or gcd(*rates.values()) or recorded_hz
-        targets = _list_targets(throws)
-        return cls(
-            dataset,
-            rate_hz,
-            targets,
-            tuple(list_signals(dataset.config, targets)),
-            throws,
-            dataset.throws.drop_columns(list(_PLACES)),
-            images,
-            streams,
-            ProgressLog(len(dataset.throws), "trial", "exported"),
-        )
+    @property
+    def _step(self) -> int:
+        # Every n-th recorded sample is exported, unchanged.
+        return self.dataset.config.record.rate_hz // self.rate_hz
 
     @property
     def shards(self) -> dict[str, Dataset]:
@@ -225,7 +201,7 @@ class ExportSource:
 
     def count_samples(self, throw: Throw) -> int:
         """Count the samples that a throw has in the export."""
-        return count_resampled(throw["samples"], recorded_hz=self.dataset.config.record.rate_hz, rate_hz=self.rate_hz)
+        return len(range(throw["samples"])[:: self._step])
 
     def look(self, throw: Throw, name: str) -> dict[str, NDArray[Any]]:
         """Read what a sensor saw in a throw, one frame a sample, as its attributes in `throw.sensors` have it."""
@@ -245,7 +221,7 @@ class ExportSource:
     def read_throw(self, throw: Throw) -> ThrowSeries:
         """Read the time series of a throw."""
         config, (header, recorded) = self.dataset.config, throw.read_samples()
-        samples = resample(recorded, recorded_hz=config.record.rate_hz, rate_hz=self.rate_hz)
+        samples = recorded[:: self._step]
         trajectory = commanded_trajectory(throw.config, recorded)
         time_s = samples.seconds_since(header.start_ns)
         joints = (samples.position, samples.velocity, samples.effort, *sample_quintic(trajectory, time_s))
@@ -273,68 +249,3 @@ def _list_targets(throws: Dataset) -> tuple[TargetColumn, ...]:
 def read_metadata(field: pa.Field) -> dict[str, str]:
     """Read the metadata of a column of the table, such as its ``unit`` and ``description``."""
     return {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-
-
-def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
-    """Count the samples that `resample` makes of a number of recorded ones."""
-    return (samples - 1) * rate_hz // recorded_hz + 1
-
-
-def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
-    """Compute samples at a lower rate, or the same, from the first recorded one to the last instant within the record.
-
-    If the rate divides the recorded one, these are every n-th recorded sample. Otherwise positions of joints and bodies
-    lie on the cubic through positions and velocities of both neighbours; all else is linear between them, and the
-    orientations are normalised. Nothing is filtered.
-    """
-    if recorded_hz % rate_hz == 0:
-        return samples[:: recorded_hz // rate_hz]
-    count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
-    # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
-    places = np.arange(count) * recorded_hz / rate_hz
-    bodies = range(samples.bodies.shape[1] + 1)
-    recorded = np.stack([np.hstack(samples.parts_of(number)) for number in bodies], axis=1)
-    recorded[..., 3:7] = _remove_flips(recorded[..., 3:7])
-    between = _interpolate_linearly(recorded, places)
-    between[..., :3] = _interpolate_cubically(recorded[..., :3], recorded[..., 7:10] / recorded_hz, places)
-    between[..., 3:7] /= np.linalg.norm(between[..., 3:7], axis=-1, keepdims=True)
-    position, turn, linear, angular = np.split(between[:, 0], (3, 7, 10), axis=1)
-    elapsed_ns = np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64)
-    return Samples(
-        stamps_ns=samples.stamps_ns[0] + elapsed_ns,
-        position=_interpolate_cubically(samples.position, samples.velocity / recorded_hz, places),
-        velocity=_interpolate_linearly(samples.velocity, places),
-        effort=_interpolate_linearly(samples.effort, places),
-        object_position=position,
-        object_orientation_xyzw=turn,
-        object_linear_velocity=linear,
-        object_angular_velocity=angular,
-        bodies=between[:, 1:],
-        # A command holds until the next one.
-        command=samples.command[places.astype(np.intp)],
-    )
-
-
-def _interpolate_linearly(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    before = np.minimum(places.astype(np.intp), len(values) - 1)
-    after = np.minimum(before + 1, len(values) - 1)
-    share = (places - before).reshape(-1, *[1] * (values.ndim - 1))
-    between: NDArray[np.float64] = (1 - share) * values[before] + share * values[after]
-    return between
-
-
-def _interpolate_cubically(
-    values: NDArray[np.float64], slopes: NDArray[np.float64], places: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    if len(values) < 2:
-        return values[: len(places)]
-    curve: NDArray[np.float64] = interpolate.CubicHermiteSpline(np.arange(len(values)), values, slopes)(places)
-    return curve
-
-
-def _remove_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose, of the two quaternions of each orientation, the one that is near the quaternion before."""
-    # Each flip turns the sign of all quaternions that follow, so that two flips cancel out.
-    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0
-    signs = np.where(np.cumsum(turns, axis=0) % 2, -1.0, 1.0)
-    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., np.newaxis]])

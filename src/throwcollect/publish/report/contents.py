@@ -75,12 +75,8 @@ class ReportSection:
     blocks: tuple[Row | Table | Listing | str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Tile:
-    """A key number of the dataset, with its unit, and the label below it."""
-
-    value: str
-    label: str
+Tile = tuple[str, str]
+"""A key number of the dataset, with its unit, and the label below it."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +85,11 @@ class TaskReport:
 
     Attributes:
         tiles: Key numbers, which follow how many trials there are and succeeded.
-        results: Sections on the results of the trials, which open the page.
-        episodes: Sections on single episodes, which follow those on parameters, outcomes and limits.
+        sections: Sections on the results of the trials, which open the page.
     """
 
     tiles: tuple[Tile, ...] = ()
-    results: tuple[ReportSection, ...] = ()
-    episodes: tuple[ReportSection, ...] = ()
+    sections: tuple[ReportSection, ...] = ()
 
 
 def format_share(count: int, total: int) -> str:

@@ -15,7 +15,6 @@ import numpy as np
 import plotly.graph_objects as go
 import pyarrow as pa
 from numpy.typing import NDArray
-from plotly.subplots import make_subplots
 
 from throwcollect.publish.report.contents import Tile
 from throwcollect.publish.report.measured import (
@@ -27,6 +26,7 @@ from throwcollect.publish.report.measured import (
 )
 from throwcollect.robots.surroundings import BodyLook
 from throwcollect.tasks.outcome_styles import LANDED, style_of
+from throwcollect.wording import format_count
 
 BLUE = style_of(LANDED).colour
 NEUTRAL = "#8a8f98"
@@ -43,7 +43,6 @@ _LEAST_ROOM_M = 0.15
 _INTERVALS = 40
 """Most intervals of time in which trials are counted."""
 _CELL_PX = 128
-_CELL_GAP = 0.012
 
 
 SCALE = "Viridis"
@@ -53,56 +52,27 @@ _MOST_SVG_POINTS = 1500
 
 
 def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) -> go.Figure:
-    """Draw each pair of at most `MOST_KEYS` swept keys below the diagonal, and on it how often each value occurs."""
-    count = len(parameters)
+    """Draw each pair of swept keys, of which there are two to `MOST_KEYS`, below the diagonal."""
     chosen = choose_points(len(outcomes.codes), count_matrix_points(parameters))
-    cells: list[list[dict[str, Any] | None]] = [
-        [{} if column <= row else None for column in range(count)] for row in range(count)
-    ]
-    figure = make_subplots(count, count, specs=cells, horizontal_spacing=_CELL_GAP, vertical_spacing=_CELL_GAP)
-    figure.update_xaxes(showticklabels=False, tickangle=0).update_yaxes(showticklabels=False)
-    for row, parameter in enumerate(parameters):
-        figure.add_bar(
-            **place_bars(parameter.edges),
-            y=parameter.counts.sum(axis=1),
-            row=row + 1,
-            col=row + 1,
-            marker={"color": NEUTRAL, "opacity": 0.55},
-            showlegend=False,
-            hovertemplate="%{y} trials near %{x:.4g}<extra></extra>",
+    figure = go.Figure()
+    for code, name in enumerate(outcomes.names):
+        trials = chosen[outcomes.codes[chosen] == code]
+        style, dimensions = outcomes.style_of(name), []
+        for each in parameters:
+            above, _, last = each.key.rpartition(".")
+            label = f"{last}<br>{above} [{each.unit or '-'}]"
+            axis = {"type": "log" if each.logarithmic else "linear"}
+            dimensions.append({"label": label, "values": single_precision(each.values[trials]), "axis": axis})
+        figure.add_splom(
+            dimensions=dimensions,
+            customdata=trials,
+            diagonal_visible=False,
+            showupperhalf=False,
+            marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
+            name=describe(name),
+            hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{describe(name)}</extra>",
         )
-        figure.update_yaxes(row=row + 1, col=row + 1, showgrid=False, rangemode="tozero")
-        above, _, last = parameter.key.rpartition(".")
-        above = f"{above} [{parameter.unit or '-'}]".strip()
-        ends = parameter.edges[[0, -1]]
-        low, high = (np.log10(ends) if parameter.logarithmic else ends).tolist()
-        room = 0.04 * (high - low)
-        axis: dict[str, Any] = {"range": [low - room, high + room], "nticks": 4, "tickfont": {"size": 9}}
-        axis |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
-        labels = {"title": {"text": f"{last}<br>{above}", "font": {"size": 10}}, "showticklabels": True}
-        figure.update_xaxes(axis, col=row + 1)
-        figure.update_xaxes(labels, row=count, col=row + 1)
-        for column in range(row):
-            figure.update_yaxes({**axis, **(labels if column == 0 else {})}, row=row + 1, col=column + 1)
-            for code, name in enumerate(outcomes.names):
-                trials = chosen[outcomes.codes[chosen] == code]
-                style = outcomes.style_of(name)
-                figure.add_scatter(
-                    x=single_precision(parameters[column].values[trials]),
-                    y=single_precision(parameter.values[trials]),
-                    customdata=trials,
-                    row=row + 1,
-                    col=column + 1,
-                    mode="markers",
-                    marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
-                    name=describe(name),
-                    legendgroup=name,
-                    # An outcome is in every panel of the matrix, but in the legend only once.
-                    showlegend=row == 1,
-                    hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{describe(name)}</extra>",
-                )
-    legend = {"x": 1, "y": 1, "xanchor": "right", "yanchor": "top"}
-    return figure.update_layout(height=90 + _CELL_PX * max(count, 2), bargap=0, legend=legend)
+    return figure.update_layout(height=90 + _CELL_PX * len(parameters), legend=LEGEND_ABOVE)
 
 
 def count_matrix_points(parameters: Sequence[SweptKey]) -> int:
@@ -114,50 +84,37 @@ def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:
     """Draw the share of each outcome in each bin of a parameter."""
     totals = parameter.counts.sum(axis=1)
     shares = parameter.counts / np.maximum(totals, 1)[:, np.newaxis]
-    bars = place_bars(parameter.edges)
-    axis: dict[str, Any] = {}
-    if parameter.steps is not None:
-        bars, axis = {"x": [f"{value:g}" for value in parameter.steps], "width": 0.7}, {"type": "category"}
-    elif parameter.logarithmic:
-        axis = {"type": "log", **parameter.ticks}
     figure = go.Figure()
     for code, name in enumerate(outcomes.names):
         figure.add_bar(
-            **bars,
+            **place_bars(parameter.edges),
             y=shares[:, code],
             customdata=np.stack([parameter.counts[:, code], totals], axis=1),
             name=describe(name),
             marker_color=outcomes.style_of(name).colour,
             hovertemplate=f"%{{customdata[0]}} of %{{customdata[1]}} (%{{y:.1%}})<extra>{describe(name)}</extra>",
         )
-    figure.update_xaxes(**axis, title=f"value [{parameter.unit or '-'}]", showgrid=False)
+    kind = "log" if parameter.logarithmic else "linear"
+    figure.update_xaxes(type=kind, title=f"value [{parameter.unit or '-'}]", showgrid=False)
     figure.update_yaxes(title="share of trials", tickformat=".0%", range=[0, 1])
     return figure.update_layout(barmode="stack", bargap=0, showlegend=False, height=230)
 
 
 def draw_limit_boxes(peaks: Mapping[str, NDArray[np.float64]]) -> go.Figure:
     """Draw the peaks of each joint over their limit, as `summarise_peaks` finds them, the first joint on top."""
-    rows = [*peaks.items()][::-1]
-    low, first, median, third, high = np.transpose(
-        [np.percentile(shares, [0, 25, 50, 75, 100]) for _, shares in rows]
-    ).tolist()
-    figure = go.Figure(
-        go.Box(
-            y=[f"{joint}<br>{len(shares)} trial{'s' if len(shares) > 1 else ''}" for joint, shares in rows],
-            lowerfence=low,
-            q1=first,
-            median=median,
-            q3=third,
-            upperfence=high,
-            orientation="h",
+    figure = go.Figure()
+    for joint, shares in [*peaks.items()][::-1]:
+        figure.add_box(
+            x=single_precision(shares[choose_points(len(shares))]),
+            name=f"{joint}<br>{format_count(len(shares), 'trial')}",
+            boxpoints=False,
             line_color=BLUE,
             showlegend=False,
-            name="",
         )
-    )
     figure.add_vline(x=1, line=LIMIT_LINE)
-    figure.update_xaxes(title="peak over limit [-]", range=[0, max(1.08, 1.05 * max(high))])
-    return figure.update_layout(height=120 + 46 * len(rows))
+    most = max(float(shares.max()) for shares in peaks.values())
+    figure.update_xaxes(title="peak over limit [-]", range=[0, max(1.08, 1.05 * most)])
+    return figure.update_layout(height=120 + 46 * len(peaks))
 
 
 def draw_throughput(times: Mapping[str, list[float]], total_s: float, noun: str) -> go.Figure:
@@ -167,32 +124,17 @@ def draw_throughput(times: Mapping[str, list[float]], total_s: float, noun: str)
     rate_per_s = np.histogram(commits, edges_s)[0] / np.diff(edges_s)
     unit, seconds = ("h", 3600) if total_s > 7200 else ("min", 60) if total_s > 120 else ("s", 1)
     edges = edges_s / seconds
-    figure = go.Figure(
-        go.Scatter(
-            # Each rate is a step from one edge to the next, so each edge appears twice, but the first and last once.
-            x=np.repeat(edges, 2)[1:-1],
-            y=np.repeat(rate_per_s, 2),
-            mode="lines",
-            fill="tozeroy",
-            line={"color": BLUE, "width": 1.5},
-            name=f"{noun}s",
-            hovertemplate=f"%{{y:.1f}} {noun}s/s<extra></extra>",
-        )
-    )
-    for kind, name, symbol, colour in (
-        ("fail", "a simulation did not bring a trial back", "x", "#D55E00"),
-        ("lost", "a trial was lost", "diamond", NEUTRAL),
-    ):
-        if times[kind]:
-            x = np.array(times[kind])[choose_points(len(times[kind]), 500)] / seconds
-            marker = {"symbol": symbol, "color": colour, "size": 9}
-            figure.add_scatter(x=x, y=np.zeros(len(x)), mode="markers", name=name, marker=marker, cliponaxis=False)
+    line = {"color": BLUE, "width": 1.5, "shape": "hv"}
+    hover = f"%{{y:.1f}} {noun}s/s<extra></extra>"
+    # Each rate holds from one edge to the next.
+    figure = go.Figure(go.Scatter(x=edges, y=[*rate_per_s, rate_per_s[-1]], line=line, hovertemplate=hover))
+    figure.update_traces(mode="lines", fill="tozeroy")
     # The first opening began the collection; each later one resumed it.
     for time_s in times["opened"][1:]:
         figure.add_vline(x=time_s / seconds, line=MOMENT_LINE)
     figure.update_xaxes(title=f"time spent collecting [{unit}]", range=[0, edges[-1]])
     figure.update_yaxes(title=f"{noun}s per second [1/s]", rangemode="tozero")
-    return figure.update_layout(height=300, legend=LEGEND_ABOVE, showlegend=len(figure.data) > 1)
+    return figure.update_layout(height=300, showlegend=False)
 
 
 def place_bars(edges: NDArray[np.float64]) -> dict[str, Any]:
@@ -250,8 +192,8 @@ class Points:
         if not len(self):
             return ()
         return (
-            Tile(f"{self.distance_m.min():.2f}–{self.distance_m.max():.2f} m", distance),
-            Tile(f"{self.speed_mps.min():.2f}–{self.speed_mps.max():.2f} m/s", speed),
+            (f"{self.distance_m.min():.2f}–{self.distance_m.max():.2f} m", distance),
+            (f"{self.speed_mps.min():.2f}–{self.speed_mps.max():.2f} m/s", speed),
         )
 
 
@@ -264,7 +206,7 @@ def draw_map(points: Points, outcomes: Outcomes, bodies: Sequence[BodyLook] = ()
         hover="x %{x:.3f} m, y %{y:.3f} m" + (f", {speed} %{{marker.color:.2f}} m/s" if speed is not None else ""),
         scale_title=None if speed is None else f"{speed} [m/s]",
     )
-    draw_bodies(figure, bodies, "above_m")
+    _draw_bodies(figure, bodies)
     places = np.column_stack([points.x_m, points.y_m])
     room = max(0.08 * float(np.ptp(places, axis=0).max()), _LEAST_ROOM_M)
     low, high = places.min(axis=0) - room, places.max(axis=0) + room
@@ -281,11 +223,11 @@ def draw_map(points: Points, outcomes: Outcomes, bodies: Sequence[BodyLook] = ()
     return figure.update_layout(height=460)
 
 
-def draw_bodies(figure: go.Figure, bodies: Sequence[BodyLook], outline: str) -> None:
-    """Draw one of the outlines of bodies behind all that a figure shows; the more of a name, the paler each is."""
+def _draw_bodies(figure: go.Figure, bodies: Sequence[BodyLook]) -> None:
+    """Draw the outlines of bodies behind all that a figure shows; the more of a name, the paler each is."""
     shown, same = len(figure.data), Counter(body.name for body in bodies)
     for body in bodies:
-        first, *others = getattr(body, outline)
+        first, *others = body.above_m
         x, y = zip(first, *others, first, strict=True)
         red, green, blue = bytes.fromhex(body.color[1:])
         fill = f"rgba({red}, {green}, {blue}, {0.2 / same[body.name]:.3f})"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -104,9 +103,8 @@ class SweptKey:
         unit: Unit of its values; empty if they have none.
         logarithmic: True if its logarithm, and not its value, was drawn evenly.
         values: Value of each trial, shape ``(n_trials,)``.
-        edges: Edges of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
+        edges: Edges of the bins, shape ``(n_bins + 1,)``.
         counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
-        steps: The distinct values, one a bin, if there are only a few; else None.
     """
 
     key: str
@@ -115,13 +113,6 @@ class SweptKey:
     values: NDArray[np.float64]
     edges: NDArray[np.float64]
     counts: NDArray[np.intp]
-    steps: NDArray[np.float64] | None
-
-    @property
-    def ticks(self) -> dict[str, list[Any]]:
-        """Ticks of a logarithmic axis for plotly: its own are powers of ten, and most ranges contain none."""
-        values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
-        return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
 
 
 def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[SweptKey, ...]:
@@ -133,30 +124,12 @@ def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tup
 def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> SweptKey:
     swept = config.sweep.parameters.get(key)
     logarithmic = isinstance(swept, Range) and swept.scale == "log"
-    distinct = np.unique(values)
-    steps = distinct if len(distinct) <= _BINS else None
-    if steps is not None:
-        edges = np.exp(_surround(np.log(steps))) if logarithmic and len(steps) > 1 else _surround(steps)
-        bins = np.searchsorted(steps, values)
-    else:
-        low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
-        # Bins have to cover all values, also those outside of the range of the sweep.
-        low, high = min(low, float(distinct[0])), max(high, float(distinct[-1]))
-        edges = np.geomspace(low, high, _BINS + 1) if logarithmic else np.linspace(low, high, _BINS + 1)
-        # The largest value lies on the last edge, and belongs to the last bin.
-        bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
-    counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
-    np.add.at(counts, (bins, outcomes.codes), 1)
-    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, counts, steps)
-
-
-def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Place edges half-way between values, and as far beyond the first and the last."""
-    if len(steps) == 1:
-        half = abs(steps[0]) / 2 or 0.5
-        return np.array([steps[0] - half, steps[0] + half])
-    middles = (steps[:-1] + steps[1:]) / 2
-    return np.concatenate([[2 * steps[0] - middles[0]], middles, [2 * steps[-1] - middles[-1]]])
+    edges = np.histogram_bin_edges(np.log(values) if logarithmic else values, _BINS)
+    edges = np.exp(edges) if logarithmic else edges
+    # Rounding must not leave out the smallest and the largest value.
+    edges[[0, -1]] = min(edges[0], values.min()), max(edges[-1], values.max())
+    counts = [np.histogram(values[outcomes.are(name)], edges)[0] for name in outcomes.names]
+    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, np.stack(counts, axis=1))
 
 
 KINDS = ("position", "velocity", "effort")
@@ -175,12 +148,12 @@ def summarise_peaks(throws: pa.Table, kind: str) -> dict[str, NDArray[np.float64
 
 
 def measure_times(events: Iterable[JournalLine]) -> tuple[dict[str, list[float]], float]:
-    """Find when trials came in (``commit``), failed or were lost, and when the journal was ``opened``, without pauses.
+    """Find when trials came in (``commit``), and when the journal was ``opened``, without pauses.
 
     Returns:
         The times of these entries of a journal, which are in order, since the first one [s]; and that of the last one.
     """
-    times: dict[str, list[float]] = {kind: [] for kind in ("commit", "opened", "fail", "lost")}
+    times: dict[str, list[float]] = {"commit": [], "opened": []}
     elapsed = 0.0
     last: float | None = None
     for event in events:

@@ -117,21 +117,20 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
         name=info.name,
         lead=f"{info.trials:,} simulated {dataset.config.task.subject} by {by}{finished}.",
         tiles=(
-            Tile(f"{len(outcomes.codes):,}", f"{noun}s planned"),
-            Tile(format_share(outcomes.succeeded, len(outcomes.codes)), describe(outcomes.success)),
+            (f"{len(outcomes.codes):,}", f"{noun}s planned"),
+            (format_share(outcomes.succeeded, len(outcomes.codes)), describe(outcomes.success)),
             *task.tiles,
-            Tile(format_duration(info.duration_s), "of simulated time"),
-            Tile(format_size(info.size_bytes), "on disk"),
+            (format_duration(info.duration_s), "of simulated time"),
+            (format_size(info.size_bytes), "on disk"),
         ),
         outcomes=outcomes,
         sections=(
-            *task.results,
+            *task.sections,
             *show_targets(dataset),
             *(() if model is None else (show_model(model, dataset),)),
             _show_parameters(parameters, outcomes),
             _show_outcomes(outcomes, parameters, tabulate_failures(reasons), noun),
             _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
-            *task.episodes,
             *show_cameras(dataset),
             _show_throughput(*measure_times(read_journal(dataset.directory / JOURNAL)), info),
             _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
@@ -171,15 +170,10 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
     notes = []
     if len(shown) < len(parameters):
         notes.append(f"The first {len(shown)} of {len(parameters)} swept keys.")
-    if len(shown) > 1 and trials > (most := figures.count_matrix_points(shown)):
-        notes.append(f"{most:,} of {trials:,} trials, chosen at random; the diagonal counts all.")
-    panel = Panel(
-        key="pairs",
-        title="Values of all trials" if len(shown) == 1 else "Each pair of keys, and on the diagonal each key alone",
-        figure=figures.draw_parameter_matrix(shown, outcomes),
-        text=" ".join(notes),
-        width_px=90 + 105 * len(shown),
-    )
+    if trials > (most := figures.count_matrix_points(shown)):
+        notes.append(f"{most:,} of {trials:,} trials, chosen at random.")
+    matrix, width_px = figures.draw_parameter_matrix(shown, outcomes), 90 + 105 * len(shown)
+    panel = Panel("pairs", "Each pair of keys", matrix, " ".join(notes), width_px)
     table = Table(
         head=("swept key", "lowest", "highest", "unit"),
         rows=tuple(
@@ -189,7 +183,7 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
         number_columns=(1, 2),
     )
     text = f"{len(parameters)} key{'s' if len(parameters) > 1 else ''} varied from trial to trial."
-    return ReportSection("parameters", "Parameters", title, text, ((panel,), table))
+    return ReportSection("parameters", "Parameters", title, text, (*([(panel,)] if len(shown) > 1 else []), table))
 
 
 def _show_outcomes(

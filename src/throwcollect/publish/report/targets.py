@@ -82,13 +82,7 @@ def _show_miss_map(
         )
         line = {"color": LIMIT_LINE["color"], "width": 1.5}
         figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {times}" if times > 1 else "misses")
-    # The title of an axis is the word that the task has for a column, or its own name, and the unit.
-    words, units = {each.of: each.word for each in task.target_columns}, [unit_of_name(each) for each in columns]
-    titles = [
-        f"{words.get(column, column.removesuffix(f'_{unit}'))} [{unit}]" if unit else column
-        for column, unit in zip(columns, units, strict=True)
-    ]
-    first, second = [*titles, ""][:2]
+    first, second = [*columns, ""][:2]
     figure.update_xaxes(title=first).update_yaxes(title=second, scaleanchor="x")
     title = f"{shown}, and misses drawn {times:,} times as long" if times > 1 else f"{shown} and misses"
     return Panel(key, title, figure.update_layout(height=420, legend=LEGEND_ABOVE))
@@ -106,28 +100,16 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
         return ()
     misses = summarise_misses(dataset.config, dataset.throws)
     targeted = int((~np.isnan(list(targets.values()))).any(axis=0).sum())
-    medians = [
-        "{}: median {}, 9 of 10 below {}".format(name, *each.format_misses(unit_of_name(name))[:2])
-        for name, each in misses.items()
-        if each.measured
-    ]
-    text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
-    text += f"{'; '.join(medians)}, in simulation." if medians else "None of them ended anywhere."
-    panels = [
-        _show_map(dataset, targets),
-        *(
-            Panel(name, f"Share of misses below a distance: {name}", _draw_share(dataset, name))
-            for name, each in misses.items()
-            if each.measured
-        ),
-    ]
+    text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target."
     rows = (
         (name, f"{each.targets:,}", f"{each.measured:,}", *each.format_misses(unit_of_name(name)))
         for name, each in misses.items()
     )
     head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
     table = Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
-    return (ReportSection("misses", "Targets", "How targets are missed", text, (tuple(panels), table)),)
+    return (
+        ReportSection("misses", "Targets", "How targets are missed", text, ((_show_map(dataset, targets),), table)),
+    )
 
 
 def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> Panel:
@@ -144,24 +126,6 @@ def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> P
     return _show_miss_map("map", "Targets", places[~aimed], goals[aimed], places[aimed], columns, dataset.config.task)
 
 
-def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
-    scale, unit = choose_shown_unit(unit_of_name(miss))
-    values: NDArray[np.float64] = np.sort(dataset.throws[miss].drop_null().to_numpy()) * scale
-    figure = go.Figure()
-    chosen = choose_points(len(values))
-    figure.add_scatter(
-        x=values[chosen],
-        # The values are sorted, so this share of them is not greater than the value at this index.
-        y=(chosen + 1) / len(values),
-        mode="lines+markers",
-        line={"color": BLUE, "width": 2},
-        marker={"color": BLUE, "size": 4, "symbol": "circle"},
-    )
-    figure.update_xaxes(title=f"distance from the target [{unit}]", rangemode="tozero")
-    figure.update_yaxes(title="share of trials", range=[0, 1.02])
-    return figure.update_layout(height=420, showlegend=False)
-
-
 def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     """Show how a model of a dataset hits targets, from the directory of the model."""
     model, score = load_model(directory), read_score(directory)
@@ -172,7 +136,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
             expected=f"a model of this dataset, digest {dataset.digest[:10]}",
             hint=command("fit", dataset.directory, "-o", "MODEL"),
         )
-    error = format_length(trained.error, model.targets)
+    error = format_length(model.error, model.targets)
     text = (
         f"Learned from {format_count(trained.throws, noun)}: {', '.join(model.parameters)} to "
         f"{', '.join(model.targets)}. "
@@ -216,7 +180,7 @@ def _show_misses(key: str, shown: str, model: Model, throws: Sequence[ThrowAtTar
     shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
     targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
     places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(shape)
-    return _show_miss_map(key, shown, model.learned.outputs, targets, places, model.targets, task)
+    return _show_miss_map(key, shown, model.outputs, targets, places, model.targets, task)
 
 
 def _show_errors(

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +17,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.progress_log import log_progress
-from throwcollect.publish.view.throw_pictures import FINE, HELD, SIZE, DrawnThrow, Rgb, camera_for
+from throwcollect.publish.view.throw_pictures import FINE, SIZE, DrawnThrow, camera_for
 from throwcollect.publish.view.viewer_directory import choose_throws
 from throwcollect.sensing.camera import Camera
 from throwcollect.sensing.scene import Scene
@@ -39,7 +37,6 @@ _LAST_FRAME_MS = 1200
 _MOST_THROWS = 64
 _GAP = 2
 _INK, _PAPER = (60, 66, 74), (255, 255, 255)
-_GROUND = (214, 217, 222)
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class Rendering:
     Attributes:
         file: The file.
         trials: Numbers of the trials in it.
-        pictures: Number of pictures, one after another or in a row.
+        pictures: Number of pictures, one after another.
         duration_s: How long it moves [s], without the time of the last picture.
         size_bytes: Its size.
     """
@@ -69,27 +66,23 @@ def render(
     camera: str | None = None,
     size: tuple[int, int] | None = None,
     slow: float = 1.0,
-    strip: int = 1,
 ) -> Rendering:
     """Draw throws of a dataset.
 
     Args:
         directory: The dataset.
-        output: A ``.webp``, ``.gif``, ``.mp4`` or ``.png`` file, which is replaced if it exists. All but the last show
-            the throws from start to end.
+        output: A ``.webp``, ``.gif``, ``.mp4`` or ``.png`` file, which is replaced if it exists. A PNG shows
+            the end of the throws, all others show them from start to end.
         trials: Numbers of the trials, which begin at the same time, side by side; the first one that has an episode by
             default.
         camera: Name of a camera of the configuration, which draws what it sees; by default a place from which all of
             the throws can be seen, with the path of the object and where it ended.
         size: Width and height of the picture of a throw [pixels].
         slow: How many times slower than real time it is.
-        strip: Number of pictures in a PNG file, from the start to the end of the throws; a single one shows the end.
     """
     kind = output.suffix.lower()
     if kind not in _KINDS:
         raise ConfigError(f"{output}: no picture ends like this", expected=f"a name with {' or '.join(_KINDS)}")
-    if strip > 1 and kind != ".png":
-        raise ConfigError(f"{output}: a strip of {strip} pictures", expected="a name with .png")
     require("PIL", *(("av",) if kind == ".mp4" else ()))
     dataset = Dataset.open(directory)
     chosen = choose_throws(dataset, trials)
@@ -99,27 +92,17 @@ def render(
         raise ConfigError(f"trials: {len(chosen)} throws", expected=f"at most {_MOST_THROWS} in one picture")
     throws, cameras = _prepare(chosen, camera, size)
     last_s = max(float(each.times_s[-1]) for each in throws)
-    still = kind == ".png"
-    times = [*np.arange(0, last_s, _FRAME_MS / 1000 / slow), last_s]
-    if still:
-        times = np.linspace(0, last_s, strip).tolist() if strip > 1 else [last_s]
-    # A strip has a row for each throw; an animated picture has all throws at each time.
-    sheets = [list(product(range(len(throws)), [time_s])) for time_s in times]
-    columns = math.ceil(math.sqrt(len(throws)))
-    if still:
-        sheets, columns = [list(product(range(len(throws)), times))], strip if strip > 1 else columns
+    times = [last_s] if kind == ".png" else [*np.arange(0, last_s, _FRAME_MS / 1000 / slow), last_s]
 
-    def draw(number: int, time_s: float) -> Picture:
-        each = throws[number]
-        lines = [f"{each.throw.trial}: {each.throw.outcome.replace('_', ' ')}"] if len(throws) > 1 else []
-        lines += [f"{time_s:.2f} s"] if still and strip > 1 else []
-        return _label(each.draw(cameras[number], time_s, marks=camera is None), lines)
+    def draw(each: DrawnThrow, seen_by: Camera, time_s: float) -> Picture:
+        words = f"{each.throw.trial}: {each.throw.outcome.replace('_', ' ')}" if len(throws) > 1 else ""
+        return _label(each.draw(seen_by, time_s, marks=camera is None), words)
 
     pictures = [
-        _arrange([draw(number, time_s) for number, time_s in sheet], columns)
-        for sheet in log_progress(sheets, len(sheets), "picture", "drawn")
+        _arrange([draw(each, seen_by, time_s) for each, seen_by in zip(throws, cameras, strict=True)])
+        for time_s in log_progress(times, len(times), "picture", "drawn")
     ]
-    data = _encode(kind, pictures, {HELD, *(each.color for each in throws)})
+    data = _encode(kind, pictures)
     write_file(output, data)
     moves_s = (len(pictures) - 1) * _FRAME_MS / 1000
     return Rendering(output, tuple(each.throw.trial for each in throws), len(times), moves_s, len(data))
@@ -150,21 +133,20 @@ def _prepare(
     return throws, cameras
 
 
-def _label(picture: Picture, lines: Sequence[str]) -> Picture:
-    """Write lines into the upper left corner of a picture."""
-    if not lines:
+def _label(picture: Picture, words: str) -> Picture:
+    """Write words into the upper left corner of a picture."""
+    if not words:
         return picture
     image = images.fromarray(picture)
-    font = fonts.load_default(max(11, image.width // 26))
-    drawing.Draw(image).text((6, 4), "\n".join(lines), _INK, font)
+    drawing.Draw(image).text((6, 4), words, _INK, fonts.load_default(max(11, image.width // 26)))
     return np.asarray(image)
 
 
-def _arrange(pictures: Sequence[Picture], columns: int) -> Picture:
-    """Put pictures of one size side by side, row by row, with lines between them."""
+def _arrange(pictures: Sequence[Picture]) -> Picture:
+    """Put pictures of one size side by side, in about as many rows as columns, with lines between them."""
     if len(pictures) == 1:
         return pictures[0]
-    height, width, _ = pictures[0].shape
+    (height, width, _), columns = pictures[0].shape, math.ceil(math.sqrt(len(pictures)))
     rows = -(-len(pictures) // columns)
     sheet = np.full((rows * (height + _GAP) - _GAP, columns * (width + _GAP) - _GAP, 3), _PAPER, np.uint8)
     for number, picture in enumerate(pictures):
@@ -173,36 +155,16 @@ def _arrange(pictures: Sequence[Picture], columns: int) -> Picture:
     return sheet
 
 
-def _encode(kind: str, pictures: Sequence[Picture], lines: Collection[Rgb]) -> bytes:
-    """Encode pictures as a file of a kind, such as ``.gif``, in which lines have some colors."""
+def _encode(kind: str, pictures: Sequence[Picture]) -> bytes:
+    """Encode pictures as a file of a kind, such as ``.gif``."""
     if kind == ".mp4":
         return _encode_video(pictures)
     shown = [images.fromarray(picture) for picture in pictures]
-    if kind == ".gif":
-        shown = _reduce_colors(shown, lines)
     times = [_FRAME_MS] * (len(shown) - 1) + [_LAST_FRAME_MS]
     moving = {"save_all": True, "append_images": shown[1:], "duration": times, "loop": 0, "quality": 80, "method": 4}
     buffer = io.BytesIO()
     shown[0].save(buffer, kind[1:].upper(), **({"optimize": True} if kind == ".png" else moving))
     return buffer.getvalue()
-
-
-def _reduce_colors(pictures: Sequence[Any], lines: Collection[Rgb]) -> list[Any]:
-    """Give pictures the 256 colors that a GIF can have.
-
-    Thin lines have so few pixels that their colors would not be chosen. So the colors of lines, and of their smooth
-    edges on the ground, are set here.
-    """
-    ground = np.array(_GROUND)
-    fixed = [
-        tuple(np.round(ground + share * (np.array(color) - ground)).astype(int).tolist())
-        for color in sorted(lines)
-        for share in (0.25, 0.5, 0.75, 1.0)
-    ]
-    others = pictures[-1].quantize(256 - len(fixed)).getpalette()
-    palette = images.new("P", (1, 1))
-    palette.putpalette([value for color in fixed for value in color] + others)
-    return [picture.quantize(palette=palette, dither=images.Dither.NONE) for picture in pictures]
 
 
 def _encode_video(pictures: Sequence[Picture]) -> bytes:

@@ -148,14 +148,9 @@ def _make_point(name: str, throw: ShownThrow) -> list[Any]:
         return []
     (x, y, z), speed = state.position, math.hypot(*state.velocity)
     marker = get_message("visualization_msgs/msg/Marker")
-    text = {
-        "apex": f"apex {z:.2f} m",
-        "landing": f"landing x {x:.2f} m, y {y:.2f} m, {speed:.2f} m/s",
-        "rest": f"rest x {x:.2f} m, y {y:.2f} m",
-    }.get(name, f"{name} {state.time_s:.2f} s, {speed:.2f} m/s")
     dot = _make_marker(name, marker.SPHERE, throw.rgba, (_POINT_M,) * 3, stamp_ns)
     label = _make_marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
-    label.text = text
+    label.text = f"{name} x {x:.2f} m, y {y:.2f} m, z {z:.2f} m, {speed:.2f} m/s"
     _place(dot, x, y, z)
     # The label of the release is below its dot, because the apex of what is released on its way down is at the same
     # place.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,40 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.sensors import LayersConfig, LidarConfig, PictureConfig
-from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.sensors import SensorFrames
-from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import new_directory
-from throwcollect.publish.view.viewer_directory import choose_throws
-from throwcollect.wording import suggest
 
 images = lazily("PIL.Image")
 _SIZE = 480
 """Width and height of a picture of points [pixels]."""
 
 
-def write_images(directory: Path, output: Path, *, sensor: str, trials: Iterable[int] | None = None) -> int:
-    """Write the frames of a sensor in some trials, or in all of them; returns the number of files."""
-    dataset = Dataset.open(directory)
-    if sensor not in dataset.config.sensors:
-        raise ConfigError(f"--sensor: there is no sensor {sensor!r}{suggest(sensor, dataset.config.sensors)}")
-    every = ((f"{sensor}_{throw.trial:06}", throw.sensors[sensor]) for throw in choose_throws(dataset, trials))
-    return write_frames(
-        ((f"{name}_{number:04}", frames, number) for name, frames in every for number in range(len(frames))), output
-    )
-
-
-def write_frames(frames: Iterable[tuple[str, SensorFrames, int]], output: Path) -> int:
-    """Write frames, each with the beginning of its file names and its number, into a new directory."""
+def write_first_frames(sensors: Mapping[str, SensorFrames], output: Path) -> None:
+    """Write the first frame of each sensor, a file for each stream, into a new directory."""
     require("PIL")
-    count = 0
     with new_directory(output) as directory:
-        for name, sensor, number in frames:
-            for stream, picture in _draw(sensor, number):
+        for name, sensor in sensors.items():
+            for stream, picture in _draw(sensor, 0):
                 images.fromarray(picture).save(directory / f"{name}_{stream}.png")
-                count += 1
-    return count
 
 
 def _draw(sensor: SensorFrames, number: int) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,18 +13,13 @@ from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.record import Samples
-from throwcollect.episode.topics import odometry
 from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory
 from throwcollect.progress_log import log_progress
 from throwcollect.publish.view.markers import ShownThrow
-from throwcollect.publish.view.viewer_recording import FACTS_HARDWARE, FACTS_NAME, ViewRecording
+from throwcollect.publish.view.viewer_recording import ViewRecording
 from throwcollect.sensing.drawn_robot import draw_robot_of
 
-_SCENE = "3D!throws"
-_OBJECT = "Plot!object"
-_LIMITS = "Plot!limits"
-_FACTS = "DiagnosticStatusPanel!facts"
 _SPEED = 0.2
 """Speed of the playback [-]: at real speed a throw is over within a second or two."""
 
@@ -72,7 +67,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
             summary = recording.finish(RECORDING)
         information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
         (scratch / METADATA).write_text(to_yaml(information), encoding="utf-8")
-        (scratch / LAYOUT).write_bytes(layout(tuple(config.task.end), config.acted_on))
+        (scratch / LAYOUT).write_text(json.dumps(_describe_layout(), indent=2) + "\n", encoding="utf-8")
         robot.copy_package(scratch)
         mesh_bytes = sum(file.stat().st_size for file in robot.meshes.values())
         recording_bytes = path.stat().st_size
@@ -104,34 +99,8 @@ def _schedule(throws: Dataset) -> Iterator[tuple[ShownThrow, Samples]]:
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
 
 
-def layout(joints: Sequence[str], body: str) -> bytes:
-    """JSON text of the layout, as applications import it, with plots of the limits of joints, and of the object."""
-    shares = [_describe_series(f"/view/limits.position[{index}]", joint) for index, joint in enumerate(joints)]
-    height = _describe_series(f"{odometry(body).name}.pose.pose.position.z", "height [m]")
-    panels = {
-        _SCENE: _describe_scene(),
-        _OBJECT: _describe_plot(
-            [height, _describe_series("/view/object_speed.data", "speed [m/s]")], body.capitalize()
-        ),
-        _LIMITS: _describe_plot(
-            [*shares, _describe_series("-1", "lower limit"), _describe_series("1", "upper limit")],
-            "Joint positions within their limits",
-        ),
-        _FACTS: {"topicToRender": "/view/facts", "selectedHardwareId": FACTS_HARDWARE, "selectedName": FACTS_NAME},
-    }
-    document = {
-        "configById": panels,
-        "globalVariables": {},
-        "userNodes": {},
-        "playbackConfig": {"speed": _SPEED},
-        "layout": _describe_split(
-            "row", _SCENE, _describe_split("column", _FACTS, _describe_split("column", _OBJECT, _LIMITS, 50), 34), 64
-        ),
-    }
-    return (json.dumps(document, indent=2) + "\n").encode()
-
-
-def _describe_scene() -> dict[str, Any]:
+def _describe_layout() -> dict[str, Any]:
+    """The layout, as Foxglove imports it: the scene alone."""
     camera = {
         "perspective": True,
         "distance": 4.6,
@@ -144,59 +113,33 @@ def _describe_scene() -> dict[str, Any]:
         "near": 0.05,
         "far": 500,
     }
-    layers = {
-        "ground": {
-            "instanceId": "ground",
-            "layerId": "foxglove.Grid",
-            "label": "Ground",
-            "visible": True,
-            "frameId": WORLD,
-            "size": 10,
-            "divisions": 10,
-            "lineWidth": 1,
-            "color": "#248eff60",
-            "order": 1,
-        },
+    ground = {
+        "instanceId": "ground",
+        "layerId": "foxglove.Grid",
+        "label": "Ground",
+        "visible": True,
+        "frameId": WORLD,
+        "size": 10,
+        "divisions": 10,
+        "lineWidth": 1,
+        "color": "#248eff60",
+        "order": 1,
     }
-    return {
+    shown = {f"/view/{name}": {"visible": True, "showOutlines": False} for name in ("robot", "tool", "throw", "throws")}
+    scene = {
         "followMode": "follow-none",
         "followTf": WORLD,
         "cameraState": camera,
         # The meshes are STL files with z up, as usual in ROS; the default of the application is y.
         "scene": {"meshUpAxis": "z_up", "transforms": {"showLabel": False, "axisScale": 0, "lineWidth": 0}},
-        "topics": {
-            "/view/robot": {"visible": True, "showOutlines": False},
-            "/view/tool": {"visible": True, "showOutlines": False},
-            "/view/throw": {"visible": True, "showOutlines": False},
-            "/view/throws": {"visible": True, "showOutlines": False},
-            "/view/path": {"visible": False},
-            # This is the same robot, but with paths of mesh files, which not every machine has.
-            "/robot_description": {"visible": False},
-        },
-        "layers": layers,
+        # The description is the same robot, but with paths of mesh files, which not every machine has.
+        "topics": {**shown, "/view/path": {"visible": False}, "/robot_description": {"visible": False}},
+        "layers": {"ground": ground},
     }
-
-
-def _describe_plot(paths: Sequence[Mapping[str, Any]], title: str) -> dict[str, Any]:
     return {
-        # Lichtblick, which began as a copy of Foxglove, uses another key for the title.
-        "foxglovePanelTitle": title,
-        "lichtblickPanelTitle": title,
-        "paths": list(paths),
-        "showLegend": True,
-        "legendDisplay": "left",
-        "sidebarDimension": 190,
-        "showPlotValuesInLegend": False,
-        "showXAxisLabels": True,
-        "showYAxisLabels": True,
-        "isSynced": True,
-        "xAxisVal": "timestamp",
+        "configById": {"3D!throws": scene},
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": _SPEED},
+        "layout": "3D!throws",
     }
-
-
-def _describe_series(value: str, label: str) -> dict[str, Any]:
-    return {"value": value, "label": label, "enabled": True, "timestampMethod": "receiveTime"}
-
-
-def _describe_split(direction: str, first: Any, second: Any, percentage: int) -> dict[str, Any]:
-    return {"direction": direction, "first": first, "second": second, "splitPercentage": percentage}

@@ -1,14 +1,12 @@
-"""The MCAP file that viewers open: throws one after another, with robot, markers and facts."""
+"""The MCAP file that viewers open: throws one after another, with robot and markers."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import cache
-from typing import IO, Any
+from typing import IO
 
-import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from rclzenoh.interfaces import Message, get_message, serialize
@@ -18,29 +16,18 @@ from throwcollect.dataset.directory import LIBRARY
 from throwcollect.dataset.mcap_file import PROFILE, declarations
 from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.frames import FrameTree, read_frames
-from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import (
-    Rows,
-    SetPoints,
-    Topic,
     joint_states,
     make_fixed_transforms,
-    make_header,
     odometry,
-    put_stamps,
     transforms,
 )
 from throwcollect.publish.view.markers import ShownThrow, all_markers, path_cloud, shape_markers, throw_markers
 from throwcollect.robots.description import full_description, robot_of
-from throwcollect.robots.robot import Robot, joint_limits
 from throwcollect.robots.surroundings import moving_bodies_of
 from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sensing.drawn_robot import draw_object_of, draw_robot_of
-
-FACTS_NAME = "throw"
-FACTS_HARDWARE = "throwcollect"
-"""Hardware id of the facts of a throw; a layout names them for a panel by this and `FACTS_NAME`."""
 
 _SAMPLED = Qos("volatile", 100)
 _LATCHED = Qos("transient_local", 1)
@@ -53,7 +40,6 @@ _LATCHED_TYPES = {
     "/view/throws": "visualization_msgs/msg/MarkerArray",
     "/view/throw": "visualization_msgs/msg/MarkerArray",
     "/view/path": "sensor_msgs/msg/PointCloud2",
-    "/view/facts": "diagnostic_msgs/msg/DiagnosticArray",
 }
 
 
@@ -71,8 +57,6 @@ class ViewRecording:
             transforms(_read_frames(config).moving, robot.joints, moving_bodies_of(config)),
             joint_states(robot.joints),
             odometry(config.acted_on),
-            _object_speed(),
-            _range_shares(robot, tuple(config.task.end)),
         ]
         declared = [(name, kind, _LATCHED) for name, kind in _LATCHED_TYPES.items()]
         declared += [(topic.name, topic.type_name, _SAMPLED) for topic in self._topics]
@@ -102,7 +86,6 @@ class ViewRecording:
             self._put_looks(throw)
             self._put("/view/throw", throw.start_ns, throw_markers(throw))
             self._put("/view/path", throw.start_ns, path_cloud(throw))
-            self._put("/view/facts", throw.start_ns, _make_facts(throw))
             self._put_samples(samples, throw.start_ns)
 
     def finish(self, name: str) -> FileSummary:
@@ -147,51 +130,5 @@ class ViewRecording:
                 self._put_data(channel, stamp, messages[number].tobytes())
 
 
-@cache
-def _object_speed() -> Topic:
-    """``/view/object_speed``: std_msgs/Float64, speed of the object's centre [m/s]."""
-    kind = "std_msgs/msg/Float64"
-
-    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
-        rows["data"] = np.linalg.norm(samples.object_linear_velocity, axis=1)
-
-    return Topic("/view/object_speed", kind, MessageLayout(get_message(kind)(), ["data"]), fill)
-
-
-def _range_shares(robot: Robot, joints: tuple[str, ...]) -> Topic:
-    """``/view/limits``: sensor_msgs/JointState whose positions are -1 at the lower limit and 1 at the upper one."""
-    kind = "sensor_msgs/msg/JointState"
-    columns = [robot.joints.index(joint) for joint in joints]
-    message = get_message(kind)(name=list(joints), position=np.zeros(len(joints)))
-    layout = MessageLayout(message, ["header.stamp.sec", "header.stamp.nanosec", "position"])
-
-    def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
-        limits = joint_limits(robot)
-        lower, upper = limits.lower[columns], limits.upper[columns]
-        put_stamps(rows, "header.stamp", samples.stamps_ns)
-        rows["position"] = (2 * samples.position[:, columns] - lower - upper) / (upper - lower)
-
-    return Topic("/view/limits", kind, layout, fill)
-
-
 def _read_frames(config: Config) -> FrameTree:
     return read_frames(full_description(config), base_height=config.robot.base_height_m)
-
-
-def _make_facts(throw: ShownThrow) -> Any:
-    """A diagnostic_msgs/DiagnosticArray with the row of a throw, without columns that are null.
-
-    Its only status is OK if the trial succeeded, else a warning.
-    """
-    row = throw.throw.row
-    texts = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in row.items()}
-    status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
-    shown = status(
-        level=status.OK if row["outcome"] == throw.config.task.success else status.WARN,
-        name=FACTS_NAME,
-        hardware_id=FACTS_HARDWARE,
-        message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),
-        values=[pair(key=key, value=text) for key, text in texts.items() if row[key] is not None],
-    )
-    header = make_header("", throw.start_ns)
-    return get_message("diagnostic_msgs/msg/DiagnosticArray")(header=header, status=[shown])

@@ -11,7 +11,6 @@ from tests.unit.publish.export.conftest import (
     WITH_EPISODE,
     Export,
     actions_of,
-    moving_columns,
     throws_of,
 )
 
@@ -46,17 +45,6 @@ def test_throws_are_arranged_as_robomimic_expects_them(
             last = np.arange(count) == count - 1
             assert np.array_equal(group["dones"], last)
             assert np.array_equal(group["rewards"], last * (trial != HELD))
-
-
-def test_a_model_of_hdf5_actions_that_stands_still_has_the_loss_of_the_motion(exported: Export) -> None:
-    with h5py.File(exported("hdf5", 25) / "throws.hdf5") as file:
-        for demo in file["data"].values():
-            position, following = (
-                demo[f"{name}/joint_position_rad"][:, moving_columns()] for name in ("obs", "next_obs")
-            )
-            loss, motion = np.std(demo["actions"] - position), np.std(following - position)
-            assert loss == pytest.approx(motion, rel=0.02)
-            assert motion > 0.01
 
 
 def test_datasets_in_the_hdf5_file_state_their_units_and_components(exported: Export, source: Path) -> None:

@@ -188,7 +188,7 @@ def test_archives_have_all_streams_when_asked(seen: Path, tmp_path: Path, monkey
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
-        ({"to": "lerobot", "rate_hz": 50}, "50 samples per second, and images of head at 10 Hz, side at 25 Hz"),
+        ({"to": "lerobot", "rate_hz": 50}, "50 samples per second of joints at 250 Hz, head at 10 Hz, side at 25 Hz"),
         ({"to": "mat", "images": "arrays"}, "mat has no 'arrays'"),
         ({"to": "hdf5", "images": "png"}, "hdf5 has no 'png'"),
     ],
@@ -252,5 +252,5 @@ def test_frames_for_training_have_what_is_observed_at_the_rate_of_its_cameras(se
         throwcollect.FrameDataset(seen, horizon=-1)
     with pytest.raises(ConfigError, match=r"observation: there is no 'side_imag'; did you mean 'side_image'\?"):
         throwcollect.FrameDataset(seen, observation=["side_imag"])
-    with pytest.raises(ConfigError, match=r"images of side at 25 Hz\n  expected: a divisor of 25$"):
+    with pytest.raises(ConfigError, match=r"side at 25 Hz\n  expected: a divisor of 25$"):
         throwcollect.FrameDataset(seen, observation=["side_image"], rate_hz=10)

@@ -56,7 +56,7 @@ def test_misses_are_drawn_as_arrows_from_their_targets(dataset: Dataset, model: 
     panels = {panel.key: panel.figure for panel in list_panels(show_model(model, dataset))}
     assert list(panels) == ["targets", "training", "adapting", "elsewhere"]
     axes = panels["targets"].layout
-    assert (axes.xaxis.title.text, axes.yaxis.title.text) == ("x [m]", "y [m]")
+    assert (axes.xaxis.title.text, axes.yaxis.title.text) == ("landing_x_m", "landing_y_m")
     traces = {trace.name: trace for trace in panels["targets"].data}
     assert len(traces["throws of the dataset"].x) == 80
     assert list(traces["targets"].x) == [1.0, 1.2]

@@ -23,11 +23,10 @@ from throwcollect.publish.report.sections import Report, render_page, report_dat
 SECTIONS = [
     "landing",
     "release",
+    "physics",
     "parameters",
     "outcomes",
     "limits",
-    "throws",
-    "physics",
     "throughput",
     "provenance",
 ]
@@ -48,7 +47,7 @@ def test_a_page_has_every_section_and_a_drawing_place_for_every_plot(text: str) 
     assert [attributes["href"] for attributes in page.find_elements("a")] == [f"#{name}" for name in SECTIONS]
     places = [attributes["id"] for attributes in page.find_elements("div") if attributes.get("class") == "plot"]
     assert places == list(page.plots)
-    assert {name.partition("-")[0] for name in places} >= {"landing", "parameters", "release", "limits", "throws"}
+    assert {name.partition("-")[0] for name in places} >= {"landing", "release", "limits"}
     for name, plot in page.plots.items():
         assert plot["data"], name
         axes = [axis for key, axis in plot["layout"].items() if re.fullmatch(r"[xy]axis\d*", key)]

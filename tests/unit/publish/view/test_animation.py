@@ -109,15 +109,6 @@ def test_throws_stand_side_by_side_and_begin_together(collected: Path, tmp_path:
         assert count_flight(first[:, half]) < count_flight(last[:, half])
 
 
-def test_a_strip_has_a_row_for_each_throw_and_a_column_for_each_time(collected: Path, tmp_path: Path) -> None:
-    written = render(collected, tmp_path / "throws.png", trials=[0, 4], size=(320, 200), strip=3)
-    pixels = picture(written.file, 0)
-    assert (written.pictures, pixels.shape) == (3, (402, 964, 3))
-    for row in (pixels[:200], pixels[202:]):
-        counts = [count_flight(row[:, begin : begin + 320]) for begin in (0, 322, 644)]
-        assert counts[0] + 20 < counts[2]
-
-
 def test_a_video_has_the_pictures_of_the_throw(collected: Path, tmp_path: Path) -> None:
     written = render(collected, tmp_path / "throw.mp4", trials=[4], size=(161, 101), slow=0.2)
     with av.open(str(written.file)) as container:

@@ -1,4 +1,4 @@
-"""The directory for viewers: each throw as it was recorded, and the scene and facts around it."""
+"""The directory for viewers: each throw as it was recorded, and the scene around it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import base64
 import json
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,14 +19,13 @@ from tests.unit.dataset.mcap_doctor import Examination
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.publish.view.viewer_directory import View, view
-from throwcollect.robots.robot import joint_limits
 from throwcollect.robots.talos import TALOS
 from throwcollect.sensing.drawn_robot import draw_robot_of
 
 CHOSEN = [5, 0]
-SAMPLED = ["/tf", "/joint_states", "/ball/odometry", "/view/object_speed", "/view/limits"]
+SAMPLED = ["/tf", "/joint_states", "/ball/odometry"]
 
 Messages = dict[str, list[tuple[int, Any]]]
 
@@ -74,7 +72,7 @@ def test_the_view_directory_is_a_rosbag(written: View) -> None:
     assert {
         counts[topic] for topic in ("/robot_description", "/view/robot", "/view/tool", "/tf_static", "/view/throws")
     } == {1}
-    assert {counts[topic] for topic in ("/view/throw", "/view/path", "/view/facts")} == {len(CHOSEN)}
+    assert {counts[topic] for topic in ("/view/throw", "/view/path")} == {len(CHOSEN)}
     assert len({counts[topic] for topic in SAMPLED}) == 1
 
 
@@ -94,24 +92,6 @@ def test_throws_follow_one_another_in_the_chosen_order(collected: Path, messages
         states, odometry = states[count:], odometry[count:]
         start = int(stamps[-1]) + 1_000_000_000
     assert not states
-
-
-def test_the_ball_speed_is_that_of_the_samples(collected: Path, messages: Messages) -> None:
-    samples = Dataset.open(collected).episode(CHOSEN[0]).samples()
-    shown = [speed.data for _, speed in messages["/view/object_speed"][: len(samples)]]
-    assert shown == pytest.approx(np.linalg.norm(samples.object_linear_velocity, axis=1))
-
-
-def test_joints_are_shown_within_their_limits(collected: Path, messages: Messages) -> None:
-    samples, limits = Dataset.open(collected).episode(CHOSEN[0]).samples(), joint_limits(TALOS)
-    share = messages["/view/limits"][100][1]
-    assert len(share.name) > 1
-    for index, joint in enumerate(share.name):
-        column = TALOS.joints.index(joint)
-        lower, upper = limits.lower[column], limits.upper[column]
-        assert share.position[index] == pytest.approx(
-            np.interp(samples.position[100, column], [lower, upper], [-1.0, 1.0])
-        )
 
 
 def test_every_shape_moves_with_an_existing_frame(messages: Messages) -> None:
@@ -169,44 +149,10 @@ def test_points_of_a_throw_have_the_places_and_numbers_of_the_table(
         assert f"x {row['landing_x_m']:.2f} m, y {row['landing_y_m']:.2f} m" in label.text
 
 
-def test_the_facts_of_a_throw_are_its_row_of_the_table(messages: Messages, rows: list[dict[str, Any]]) -> None:
-    for (_, array), row in zip(messages["/view/facts"], rows, strict=True):
-        (status,) = array.status
-        facts = {pair.key: pair.value for pair in status.values}
-        assert facts.keys() == {key for key, value in row.items() if value is not None}
-        assert facts["digest"] == row["digest"]
-        assert float(facts["landing_x_m"]) == pytest.approx(row["landing_x_m"], rel=1e-5)
-        assert (status.level, status.message) == (status.OK, f"trial {row['trial']} landed")
-
-
-def leaves(tree: Any) -> Iterator[str]:
-    if isinstance(tree, str):
-        yield tree
-    else:
-        yield from (*leaves(tree["first"]), *leaves(tree["second"]))
-
-
 def test_the_layout_shows_only_topics_of_the_recording(written: View, messages: Messages) -> None:
-    layout = json.loads(written.layout.read_text())
-    panels = layout["configById"]
-    assert sorted(leaves(layout["layout"])) == sorted(panels)
-    scene, facts = panels["3D!throws"], panels["DiagnosticStatusPanel!facts"]
-    assert {*scene["topics"], facts["topicToRender"]} <= set(messages)
-    (status,) = messages[facts["topicToRender"]][0][1].status
-    assert (facts["selectedHardwareId"], facts["selectedName"]) == (status.hardware_id, status.name)
+    scene = json.loads(written.layout.read_text())["configById"]["3D!throws"]
+    assert {*scene["topics"]} <= set(messages)
     assert scene["scene"]["meshUpAxis"] == "z_up"
-    labels = []
-    for name in ("Plot!object", "Plot!limits"):
-        for series in panels[name]["paths"]:
-            if re.fullmatch(r"-?[0-9.]+", series["value"]):
-                continue
-            topic, _, path = series["value"].partition(".")
-            value = messages[topic][0][1]
-            for part in re.findall(r"\w+", path):
-                value = value[int(part)] if part.isdigit() else getattr(value, part)
-            assert isinstance(value, float)
-            labels.append(series["label"])
-    assert labels == ["height [m]", "speed [m/s]", *messages["/view/limits"][0][1].name]
 
 
 def test_the_same_throws_give_the_same_bytes(collected: Path, written: View, tmp_path: Path) -> None:
@@ -257,11 +203,9 @@ def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episode
 def test_a_throw_that_was_not_released_has_no_points(make_collection: Any, tmp_path: Path) -> None:
     dataset = make_collection({"trials": 1}).collect(tmp_path / "dataset", change=hold_ball)
     shown = messages_of(view(dataset, tmp_path / "view").recording)
-    (_, array), (_, facts) = shown["/view/throw"][0], shown["/view/facts"][0]
+    _, array = shown["/view/throw"][0]
     assert [marker.ns for marker in array.markers] == ["", "bodies", "path"]
     assert {round(color.g - color.r, 6) for color in array.markers[2].colors} == {0.0}
-    assert facts.status[0].level == facts.status[0].WARN
-    assert facts.status[0].message.startswith("trial 0 not_released")
 
 
 @pytest.mark.parametrize(
@@ -278,11 +222,3 @@ def test_only_trials_with_an_episode_can_be_chosen(
     with pytest.raises(DatasetError, match=message):
         view(dataset, tmp_path / "view", trials)
     assert not (tmp_path / "view").exists()
-
-
-def test_an_existing_directory_is_refused_and_left_alone(collected: Path, tmp_path: Path) -> None:
-    (tmp_path / "view").mkdir()
-    (tmp_path / "view" / "mine").write_text("mine")
-    with pytest.raises(ConfigError, match="view: "):
-        view(collected, tmp_path / "view", [0])
-    assert [path.name for path in tmp_path.rglob("*")] == ["view", "mine"]

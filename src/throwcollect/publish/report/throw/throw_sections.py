@@ -1,10 +1,9 @@
-"""The sections that the task of throwing adds to a report: landings and releases, and those on single flights."""
+"""The sections that the task of throwing adds to a report: landings, releases and flights."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from typing import cast
 
 import numpy as np
 import plotly.graph_objects as go
@@ -17,17 +16,15 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.publish.report.contents import Panel, ReportSection, TaskReport
 from throwcollect.publish.report.figures import BLUE, SCALE, Points, colour_bar, draw_coloured, draw_map, place_bars
 from throwcollect.publish.report.measured import MOST_POINTS, Outcomes, read_numbers
-from throwcollect.publish.report.throw.flights import choose_examples, measure_residuals, show_examples, show_physics
+from throwcollect.publish.report.throw.flights import measure_residuals, show_physics
 from throwcollect.robots.surroundings import BodyLook, looks_of
-from throwcollect.tasks.task import task_of
-from throwcollect.tasks.throw.throw_task import ThrowTask
 from throwcollect.wording import format_count
 
-_HEIGHTS = frozenset((LANDING_HEIGHT, "task.bin.height_m", "task.bin.depth_m"))
-"""Keys that the height of landings follows from."""
 _FEW = 8
 """Up to this many throws in a cell, the scale has a mark for each number of throws; plotly would also mark halves."""
 _BINS = 14
+_EXAMPLES = 9
+"""Throws whose bodies are drawn."""
 _TITLES = {
     "distance_m": ("landing distance", "landing distance [m]"),
     "hit_angle_rad": ("hit angle", "hit angle below the horizontal [°]"),
@@ -38,23 +35,18 @@ _TITLES = {
 
 def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     """Make the part of a report that only datasets of throws have."""
-    throws, varies = dataset.throws, not _HEIGHTS.isdisjoint(dataset.plan.keys)
-    height_m = None if varies else cast("ThrowTask", task_of(dataset.config)).landing_height_m
+    throws = dataset.throws
     landings = Points.read(throws, outcomes, "landing", None, "release_speed_mps")
     planned = landings[outcomes.are(outcomes.success)[landings.row]]
-    examples = list(dataset.select(choose_examples(dataset, planned, outcomes)))
-    configs = [throw.config for throw in examples] or [dataset.config]
-    bodies = tuple(dict.fromkeys(body for config in configs for body in looks_of(config)[:-1]))
+    few = dataset[:: -(-len(dataset) // _EXAMPLES)]
+    bodies = tuple(dict.fromkeys(body for throw in few for body in looks_of(throw.config)[:-1]))
     target = dataset.config.sweep.target
     cells = tuple(_show_cells(planned, throws, target, outcomes.verbs[1])) if len(planned) else ()
     return TaskReport(
         tiles=planned.show_ranges("landing distance", "release speed"),
-        results=(
-            _show_landings(landings, planned, outcomes, cells, height_m=height_m, bodies=bodies),
+        sections=(
+            _show_landings(landings, planned, outcomes, cells, bodies),
             _show_releases(landings, np.degrees(read_numbers(throws, "release_elevation_rad")[landings.row]), outcomes),
-        ),
-        episodes=(
-            show_examples(dataset, examples, outcomes, height_m=height_m, bodies=bodies),
             show_physics(measure_residuals(dataset), len(dataset.recorded)),
         ),
     )
@@ -65,8 +57,6 @@ def _show_landings(
     planned: Points,
     outcomes: Outcomes,
     cells: tuple[Panel, ...],
-    *,
-    height_m: float | None,
     bodies: Sequence[BodyLook],
 ) -> ReportSection:
     """Show where balls crossed the landing plane; `planned` are those that were thrown as planned, also by `cells`."""
@@ -78,10 +68,8 @@ def _show_landings(
         if outcomes.success != "landed":
             text += f"; the balls crossed the {_name_plane(outcomes)}"
         x, y, distance = planned.x_m, planned.y_m, planned.distance_m
-        text += (
-            f"{'' if height_m is None else f' at z = {height_m:g} m'}, {distance.min():.2f} to {distance.max():.2f} m "
-            f"from the robot: x {x.min():.2f} to {x.max():.2f} m, y {y.min():.2f} to {y.max():.2f} m"
-        )
+        text += f", {distance.min():.2f} to {distance.max():.2f} m from the robot: "
+        text += f"x {x.min():.2f} to {x.max():.2f} m, y {y.min():.2f} to {y.max():.2f} m"
     others = len(landings) - len(planned)
     text += f". {format_count(others, 'further ball')} crossed the {_name_plane(outcomes)}, too." if others else "."
     # A landing is all that a throw is about, but only a part of what other tasks are about.
@@ -159,7 +147,7 @@ def count_throws(
     angle = np.degrees(read_numbers(throws, "hit_angle_rad"))[landings.row]
     values = {"distance_m": landings.distance_m, "hit_angle_rad": angle}
     if target is None:
-        edges = {name: _choose_edges(column) for name, column in values.items()}
+        edges = {name: np.histogram_bin_edges(column, _BINS) for name, column in values.items()}
     else:
         if target.height_m is not None:
             # The column has the heights of all trials, but only trials with landings matter here.
@@ -173,25 +161,6 @@ def count_throws(
             edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack([values[name] for name in edges]), list(edges.values()))
     return edges, counts.astype(np.intp)
-
-
-def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose edges of cells whose width is a round number, which people can quote."""
-    low, high = float(values.min()), float(values.max())
-    width = _round_up((high - low) / _BINS) or 0.1
-    # There is one edge more, so that the largest value lies inside the last cell.
-    first, last = np.floor(low / width), np.floor(high / width) + 1
-    edges: NDArray[np.float64] = np.arange(first, last + 1) * width
-    return edges
-
-
-def _round_up(width: float) -> float:
-    """Round up to 1, 2 or 5 times a power of ten; to 0 if the width is too small to tell values apart."""
-    if width < 1e-9:
-        return 0.0
-    power = 10.0 ** np.floor(np.log10(width))
-    # The factor accepts a width that is a round number except for a rounding error.
-    return float(next(step * power for step in (1, 2, 5, 10) if step * power >= width * (1 - 1e-9)))
 
 
 def draw_coverage_map(edges: Mapping[str, NDArray[np.float64]], counts: NDArray[np.intp]) -> go.Figure:
