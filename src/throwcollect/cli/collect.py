@@ -270,7 +270,7 @@ def _collect(
     from throwcollect.cli.dataset.info import print_collected, print_summary
 
     if run is not None:
-        print_collected(summary, run.directory, as_json=json, hint=run.context.resume_command)
+        print_collected(summary, run.directory, as_json=json, hint=run.record.resume_command)
     elif directory is not None:
         from throwcollect.dataset.inspect import info
 

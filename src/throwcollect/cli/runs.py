@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -20,7 +19,7 @@ from throwcollect.wording import command, format_count
 if TYPE_CHECKING:
     from throwcollect.collect.cluster.cluster_run import ClusterRun
     from throwcollect.collect.runs.run import Run
-    from throwcollect.collect.runs.run_record import RunRecord
+    from throwcollect.collect.runtimes.run_record import RunRecord
 
 _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
@@ -92,7 +91,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     if found.status == "died":
         raise describe_death(found)
     if record.summary is not None:
-        print_summary(record.summary, Path(record.directory), as_json=json)
+        print_summary(record.summary, record.directory, as_json=json)
     if (error := record.error) is not None:
         raise error
 
@@ -238,7 +237,7 @@ def _make_document(run: Run) -> dict[str, Any]:
 def _make_row(run: Run) -> tuple[str, ...]:
     record = run.record
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
-    dataset = run.record.directory if record.kind == "collection" else "-"
+    dataset = str(record.directory) if record.kind == "collection" else "-"
     simulations = "-" if record.kind == "container" else str(record.simulations)
     return run.id, record.runtime, simulations, throws, _describe_status(run, record), dataset
 

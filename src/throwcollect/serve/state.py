@@ -21,9 +21,8 @@ from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.coordinator.resume import is_complete
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Kind, Planning
 from throwcollect.collect.runtimes.nodes import is_simulation
-from throwcollect.collect.runtimes.runtime import NodeState
+from throwcollect.collect.runtimes.run_record import Kind, NodeState, Planning
 from throwcollect.dataset.directory import CONFIG, METADATA
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError, ThrowcollectError
@@ -133,7 +132,7 @@ def describe(run: Run, *, is_growing: bool = False) -> InstanceState:
         "message": str((record.error if record.failure else None) or ""),
         "nodes": list(run.nodes),
         "planning": record.planning if run.status == "running" else None,
-        "dataset": record.directory if record.kind == "collection" else None,
+        "dataset": str(record.directory) if record.collects else None,
         "robots": simulations_of(run.nodes),
         "can_be_resumed": not is_growing and explain_refusal(run) is None,
     }
@@ -142,7 +141,7 @@ def describe(run: Run, *, is_growing: bool = False) -> InstanceState:
 
 def explain_refusal(run: Run) -> str | None:
     """Why clients cannot continue the dataset of a run; None if they can. This is cheap enough for many calls."""
-    directory = run.context.directory
+    directory = run.record.directory
     if run.status == "running":
         return f"run {run.id} is still running"
     if run.record.kind != "collection" or not os.path.isfile(directory / CONFIG):

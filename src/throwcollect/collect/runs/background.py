@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
-from typing import IO, Literal, cast
+from typing import IO, cast
 
 from pydantic import TypeAdapter
 
@@ -27,9 +27,9 @@ from throwcollect.collect.runs.launcher import launch
 from throwcollect.collect.runs.preparation import MANY_TRIALS, prepare, resume
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin, Planning, RunFailure, RunRecord
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
+from throwcollect.collect.runtimes.run_record import Kind, Origin, Planning, RunFailure, RunRecord
 from throwcollect.collect.runtimes.runtime import choose, get_runtime
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.run import ContainerSpec
@@ -67,7 +67,7 @@ def begin_run(
     output: Path,
     run: str | None = None,
     origin: Origin | None = None,
-    kind: Literal["collection", "session"] = "collection",
+    kind: Kind = "collection",
     resumed: bool = False,
 ) -> Run:
     """Begin a run in a process of its own, which outlives this one; return as soon as the run has a record.
@@ -86,12 +86,8 @@ def begin_run(
         _check_session(read)
     made = Records().new(read.name, run=run)
     directory = made.files / "data" if kind == "session" else output
-    record = replace(
-        # The directory of the dataset has to be empty until the plan is made, so logs cannot lie there yet.
-        RunRecord.begin(made.id, read.name, directory, logs=made.files / "logs", kind=kind, origin=origin),
-        domain_id=read.run.domain_id,
-        simulations=read.run.simulations,
-    )
+    record = made.begin(read.name, directory, kind=kind, origin=origin, domain_id=read.run.domain_id)
+    record = replace(record, simulations=read.run.simulations)
     order = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
     return _begin(made, record, _ORDERS.dump_json(order))
 
@@ -103,16 +99,14 @@ def begin_container(spec: ContainerSpec, *, run: str, origin: Origin, urdf: Path
     """
     check_request(spec, origin)
     made = Records().new(origin.component, run=run)
-    directory, logs = made.files / "data", made.files / "logs"
+    directory = made.files / "data"
 
     def lay_out() -> None:
         directory.mkdir()
         if urdf is not None:
             shutil.copyfile(urdf, directory / DESCRIPTION)
 
-    record = RunRecord.begin(
-        made.id, origin.component, directory, logs=logs, runtime="docker", kind="container", origin=origin
-    )
+    record = made.begin(origin.component, directory, runtime="docker", kind="container", origin=origin)
     return _begin(made, record, _SPECS.dump_json(spec), lay_out)
 
 
@@ -120,13 +114,12 @@ def _begin(run: Run, record: RunRecord, order: bytes, lay_out: Callable[[], None
     """Start the process of a run, write the record with its id, send it the order; `lay_out` makes further files."""
     process: subprocess.Popen[bytes] | None = None
     try:
-        logs = Path(record.logs)
-        logs.mkdir(exist_ok=True)
+        record.logs.mkdir(exist_ok=True)
         lay_out()
         # The process needs a second until it can handle signals; a request to stop stays blocked until then.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
         try:
-            process = run.start_process(logs, stdin=subprocess.PIPE)
+            process = run.start_process(record.logs, stdin=subprocess.PIPE)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         run.write(replace(record, launcher=process.pid))
@@ -154,12 +147,12 @@ def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interrupt
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
     run = Records().inherit(id, lock)
     if not order:
-        launch(run, interruptions, config=load(config_path(run.context.directory)), reporter=reporter)
+        launch(run, interruptions, config=load(config_path(run.record.directory)), reporter=reporter)
         return
     if run.record.kind == "container":
         launch_container(run, _SPECS.validate_json(order), reporter=reporter, interruptions=interruptions)
         return
-    log = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
+    log = NodeLogs(run.record.logs).path(LAUNCHER)
     # If anything fails before the launch, the error is written into the record, and then the files of the run are
     # removed.
     with ExitStack() as made:
@@ -170,7 +163,7 @@ def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interrupt
                 run.close()
                 return
             made.enter_context(run)
-            _move_log(log, NodeLogs(Path(run.record.logs)).path(LAUNCHER))
+            _move_log(log, NodeLogs(run.record.logs).path(LAUNCHER))
             # The last steps of the preparation do not check for a request to stop, and may have taken long.
             planner.end_if_asked()
         except ThrowcollectError as error:
@@ -250,17 +243,18 @@ def _prepare_session(run: Run, order: Order, reporter: Reporter) -> Run:
         _check_session(read)
         # Clients of a session act in real time. The file has the factor, as nodes and watchers take it from there.
         config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
-        directory = run.context.directory
+        directory = run.record.directory
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
         reserve_port(config.run).close()
-        choice = choose(config, say=reporter.say, warn=reporter.warn)
-        simulations = choice.runtime.simulations(config)
+        name, middleware = choose(config, say=reporter.say, warn=reporter.warn)
+        runtime = get_runtime(name)
         # Containers do not see the directory.
-        recordings = str(order.output) if choice.name == "local" else None
-        run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations, recordings=recordings)
+        recordings = str(order.output) if name == "local" else None
+        simulations = runtime.simulations(config)
+        run.update(runtime=name, middleware=middleware, simulations=simulations, recordings=recordings)
         # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
-        choice.runtime.host(run.context, config, warn=reporter.warn).close()
+        runtime.host(run.record, config, warn=reporter.warn).close()
         launching = partial(launch, config=config, reporter=reporter)
         return run.prepared(config, directory, launching, held=ExitStack(), undo=ExitStack())
 

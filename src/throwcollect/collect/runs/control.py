@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.collect.runs.run_selection import id_of, require_living, require_simulations
 from throwcollect.collect.runtimes.nodes import LAUNCHER, SIMULATIONS
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.runtime import find_runtime, get_runtime
 from throwcollect.errors import (
     ConfigError,

@@ -9,7 +9,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Literal
 
-from throwcollect.collect.runtimes.runtime import NodeState, RunEvent
+from throwcollect.collect.runtimes.run_record import NodeState
+from throwcollect.collect.runtimes.runtime import RunEvent
 from throwcollect.files import open_log
 from throwcollect.wording import format_count
 

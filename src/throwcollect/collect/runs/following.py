@@ -10,9 +10,9 @@ from pathlib import Path
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.runs.events import EVENTS, Event, parse
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Summary
 from throwcollect.collect.runs.run_selection import describe_death
 from throwcollect.collect.runtimes.node_logs import NodeLogs, Tail
+from throwcollect.collect.runtimes.run_record import Summary
 from throwcollect.errors import ConfigError
 from throwcollect.wording import suggest
 
@@ -85,13 +85,13 @@ def read_logs(
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.
     """
-    files = NodeLogs(Path(run.record.logs)).files()
+    files = NodeLogs(run.record.logs).files()
     known = {*files, *(state.name for state in run.record.nodes)}
     if unknown := [node for node in nodes if node not in known]:
         raise ConfigError(f"run {run.id}: no node {unknown[0]!r} has printed anything{suggest(unknown[0], files)}")
     tails: dict[str, Tail] = {}
     for now, last in _read_repeatedly(run, follow=follow, keep_on=keep_on):
-        files = NodeLogs(Path(now.record.logs)).files()
+        files = NodeLogs(now.record.logs).files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
             if not nodes or name in nodes:
@@ -123,7 +123,7 @@ def _read_new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
 
 
 def _locate_events(run: Run) -> Path:
-    return Path(run.record.logs) / EVENTS
+    return run.record.logs / EVENTS
 
 
 def _read_repeatedly(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:

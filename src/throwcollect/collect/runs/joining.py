@@ -26,7 +26,7 @@ from throwcollect.collect.runtimes.nodes import (
     simulation_name_of,
     simulation_nodes,
 )
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
@@ -139,8 +139,8 @@ def join_run(
         unpack_robot(files, scratch)
         config = load(scratch / "config.yaml")
         reporter.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
-        context = RunContext(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
-        _simulate(LocalNodes(context, config, elsewhere=token.endpoint), connection, config, reporter, interruptions)
+        record = RunRecord(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
+        _simulate(LocalNodes(record, config, elsewhere=token.endpoint), connection, config, reporter, interruptions)
 
 
 def _simulate(
@@ -152,7 +152,7 @@ def _simulate(
     reports = _Reports(reporter)
     # Names of nodes have to be unique, and several processes of one machine may join.
     name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
-    roster = simulation_nodes([f"{name}_{index}" for index in range(host.context.simulations)], host.data)
+    roster = simulation_nodes([f"{name}_{index}" for index in range(host.record.simulations)], host.data)
     with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
         supervisor.start()
         while not reports.over and not interruptions():

@@ -6,15 +6,14 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
-from pathlib import Path
 from typing import Any
 
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.runs.events import EventLog
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunFailure, Summary
-from throwcollect.collect.runtimes.runtime import Host, NodeState, RunContext, RunEvent, get_runtime
+from throwcollect.collect.runtimes.run_record import NodeState, RunFailure, RunRecord, Summary
+from throwcollect.collect.runtimes.runtime import Host, RunEvent, get_runtime
 from throwcollect.config.schema import Config
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.summary import explain_loss
@@ -35,16 +34,16 @@ def launch(run: Run, interruptions: Callable[[], int], *, config: Config, report
         The summary of the dataset, whose outcomes show whether trials are lost; None if the run collects none.
     """
 
-    def host(context: RunContext) -> Host:
+    def host(record: RunRecord) -> Host:
         run.record.middleware.joining.settle()
-        return get_runtime(run.record.runtime).host(context, config, warn=reporter.warn)
+        return get_runtime(run.record.runtime).host(record, config, warn=reporter.warn)
 
     return launch_host(run, host, reporter=reporter, interruptions=interruptions, is_open=config.run.open)
 
 
 def launch_host(
     run: Run,
-    make_host: Callable[[RunContext], Host],
+    make_host: Callable[[RunRecord], Host],
     *,
     reporter: Reporter,
     interruptions: Callable[[], int],
@@ -55,18 +54,18 @@ def launch_host(
     With `is_open`, joining the run takes no key.
     """
     session = _Session(run, reporter, interruptions)
-    context = run.context
+    record = run.record
     # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always has an end.
     code, summary = 1, None
     failure: RunFailure | None = RunFailure("internal error")
     host: Host | None = None
     try:
-        host = make_host(context)
-        with hold_lock(context.directory, alone=False):
+        host = make_host(record)
+        with hold_lock(record.directory, alone=False):
             run.update(launcher=os.getpid())
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
-        lost = None if summary is None else explain_loss(summary.outcomes, hint=context.resume_command)
+        lost = None if summary is None else explain_loss(summary.outcomes, hint=record.resume_command)
         code, failure = (0, None) if lost is None else (lost.exit_code, RunFailure.of(lost))
         return summary
     except ThrowcollectError as error:
@@ -94,7 +93,7 @@ class _Session:
         self.warn = reporter.warn
         self._run = run
         self._onlooker = reporter
-        self._events = EventLog(Path(run.record.logs), run.id)
+        self._events = EventLog(run.record.logs, run.id)
         self._states: list[NodeState] = []
         self._progress: Progress | None = None
         self._written_at = 0.0

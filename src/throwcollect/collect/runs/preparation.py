@@ -15,9 +15,8 @@ from throwcollect.collect.coordinator.reporter import SILENT, Reporter
 from throwcollect.collect.runs.launcher import launch
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.collect.runs.run_selection import refuse_busy
-from throwcollect.collect.runtimes.runtime import RuntimeChoice, choose, get_runtime
+from throwcollect.collect.runtimes.runtime import choose, get_runtime
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import reading_config
@@ -106,7 +105,7 @@ def resume(
     """
     directory = Path(directory)
     file = None if config is None else Path(config)
-    choices: list[RuntimeChoice] = []
+    choices: list[tuple[str, Middleware]] = []
     with reading_config(directory, file, overrides) as read:
         # This import takes long, and errors in the configuration need none of it.
         from throwcollect.collect.coordinator.resume import finish_without_simulating, has_all_trials
@@ -155,7 +154,7 @@ def prepare_run(
     *,
     reporter: Reporter,
     run: Run | None = None,
-    choice: RuntimeChoice | None = None,
+    choice: tuple[str, Middleware] | None = None,
 ) -> Run:
     """Prepare a run into a directory; if that fails, all files that this function made are removed.
 
@@ -165,13 +164,13 @@ def prepare_run(
         plan: The plan of the dataset in the directory, or a function that makes a new one in a directory.
         reporter: Receives the progress.
         run: The run, if it has a record already; None makes a new one.
-        choice: The runtime; None if it is not chosen yet.
+        choice: Name of the runtime and the middleware of its nodes; None if they are not chosen yet.
     """
     with ExitStack() as held, ExitStack() as undo:
         if run is None:
             run = Records().new(config.name)
             undo.callback(run.forget)
-            record = RunRecord.begin(run.id, config.name, directory, logs=directory)
+            record = run.begin(config.name, directory)
         else:
             record = run.record
         # The plan may take minutes, so a port that is taken is reported before it is made.
@@ -192,21 +191,22 @@ def prepare_run(
         if callable(plan):
             undo.callback(remove_plan, directory, made=is_new)
         # A runtime may take minutes to get an image, so it is chosen after all other checks.
-        choice = choice or choose(config, say=reporter.say, warn=reporter.warn)
+        name, middleware = choice or choose(config, say=reporter.say, warn=reporter.warn)
+        runtime = get_runtime(name)
         record = replace(
             record,
-            runtime=choice.name,
-            directory=os.path.realpath(directory),
-            logs=str(directory.absolute() / "logs"),
+            runtime=name,
+            directory=Path(os.path.realpath(directory)),
+            logs=directory.absolute() / "logs",
             launcher=os.getpid(),
             domain_id=config.run.domain_id,
-            simulations=choice.runtime.simulations(config),
-            middleware=choice.middleware,
+            simulations=runtime.simulations(config),
+            middleware=middleware,
         )
         # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
-        choice.runtime.host(record.context(run.key), config, warn=reporter.warn).close()
+        runtime.host(record, config, warn=reporter.warn).close()
         run.write(record)
-        _warn_if_others_may_join(config, choice.middleware, reporter)
+        _warn_if_others_may_join(config, middleware, reporter)
         reporter.say(f"plan: {describe_plan(made)}; dataset: {directory}")
         if config.sensors:
             from throwcollect.collect.coordinator.sensor_cost import measure_sensors

@@ -119,7 +119,7 @@ class Records:
         # There may be thousands of records, so only those that contain the directory's name are parsed.
         written = to_json(name)
         runs = self._read(run for run in self.ids() if written in self._read_bytes(run))
-        return [run for run in runs if run.record.directory == name]
+        return [run for run in runs if run.record.directory == Path(name)]
 
     def read_change_ns(self, run: str) -> int | None:
         """Time of the last change of a run's record, in ns of the file system's clock; None without a record."""

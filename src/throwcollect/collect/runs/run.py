@@ -16,15 +16,16 @@ from typing import Any, Literal, cast
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.collect.runs.run_record import RunRecord, Summary
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext, find_runtime
+from throwcollect.collect.runtimes.run_record import NodeState, RunRecord, Summary
+from throwcollect.collect.runtimes.runtime import find_runtime
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, NotFoundError, WorkerError
 from throwcollect.files import beside, open_log, write_all
 from throwcollect.own_process import count_interruptions, make_command
 from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import format_endpoint, reach_from_elsewhere, split_address
 from throwcollect.run_key import RunKey
 from throwcollect.state_directory import is_locked, unusable
@@ -85,11 +86,6 @@ class Run:
     def is_locked(self) -> bool:
         """Whether the launcher of the run lives now."""
         return is_locked(self._lock_path)
-
-    @property
-    def context(self) -> RunContext:
-        """The directories, key and middleware of the run, for its host."""
-        return self.record.context(self.key)
 
     @property
     def connection(self) -> Connection | None:
@@ -167,7 +163,7 @@ class Run:
         """
         self._hand_over()
         try:
-            process = self.start_process(Path(self.record.logs), stdin=subprocess.DEVNULL)
+            process = self.start_process(self.record.logs, stdin=subprocess.DEVNULL)
         except OSError as error:
             raise WorkerError(f"the launcher cannot be started: {error}") from error
         finally:
@@ -188,8 +184,13 @@ class Run:
             return run
         if forwarded:
             raise Interrupted("interrupted before any node was started")
-        evidence = NodeLogs(Path(run.record.logs)).tail(LAUNCHER)
+        evidence = NodeLogs(run.record.logs).tail(LAUNCHER)
         raise WorkerError(f"run {run.id}: its launcher died", evidence=evidence or None)
+
+    def begin(self, name: str, directory: Path, **facts: Any) -> RunRecord:
+        """Make the record of a run that this process launches; `facts` are further fields of it."""
+        shown = Path(os.path.realpath(directory))
+        return RunRecord(self.id, shown, self.files / "logs", 0, Middleware(), self.key, name=name, **facts)
 
     def prepared(self, config: Config, directory: Path, launch: Launch, *, held: ExitStack, undo: ExitStack) -> Run:
         """Make the run ready to be launched.

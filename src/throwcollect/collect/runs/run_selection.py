@@ -7,7 +7,7 @@ from pathlib import Path
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import StrPath
@@ -79,14 +79,14 @@ def describe_death(run: Run) -> WorkerError:
     hint = f"{command('down', '--run', run.id)} cleans up"
     if has_complete_dataset(run):
         return WorkerError(
-            f"run {run.id}: its launcher died, but the dataset is complete: {run.context.directory}", hint=hint
+            f"run {run.id}: its launcher died, but the dataset is complete: {run.record.directory}", hint=hint
         )
     what = f"run {run.id}: its launcher died"
     # A runtime is chosen after the plan is made, so a run with neither has simulated no trial.
-    is_planned = run.record.runtime != "" or config_path(run.context.directory).is_file()
+    is_planned = run.record.runtime != "" or config_path(run.record.directory).is_file()
     if run.record.kind == "collection" and is_planned:
-        what = f"{what}; finished throws are in {run.context.directory}"
-        if again := run.context.resume_command:
+        what = f"{what}; finished throws are in {run.record.directory}"
+        if again := run.record.resume_command:
             hint = f"{again} goes on where it ended; {hint}"
     return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
 
@@ -103,7 +103,7 @@ def has_complete_dataset(run: Run) -> bool:
     # This imports the libraries that read tables, which takes a while and is rarely needed.
     from throwcollect.collect.coordinator.resume import is_complete
 
-    return is_complete(run.context.directory)
+    return is_complete(run.record.directory)
 
 
 def require_living(run: Run) -> RunRecord:

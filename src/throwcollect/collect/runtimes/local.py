@@ -31,7 +31,8 @@ from throwcollect.collect.runtimes.nodes import (
     node_environment,
     protocol_of,
 )
-from throwcollect.collect.runtimes.runtime import RunContext, Runtime, Session
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import Runtime, Session
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
 from throwcollect.own_process import die_with_parent, make_command
@@ -55,9 +56,9 @@ class LocalRuntime(Runtime):
         """See `Runtime.describe`."""
         return "local processes"
 
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
         """Make the host of a run; see `Runtime.host`."""
-        return LocalNodes(context, config)
+        return LocalNodes(record, config)
 
 
 class LocalNodes(NodeHost):
@@ -72,21 +73,21 @@ class LocalNodes(NodeHost):
 
     cleared = True
 
-    def __init__(self, context: RunContext, config: Config, *, elsewhere: str | None = None) -> None:
-        self.context = context
+    def __init__(self, record: RunRecord, config: Config, *, elsewhere: str | None = None) -> None:
+        self.record = record
         self.config = config
-        self.data = str(context.directory)
-        self.logs = NodeLogs(context.logs)
+        self.data = str(record.directory)
+        self.logs = NodeLogs(record.logs)
         self._reserved: socket.socket | None = None
         if elsewhere is not None:
             self.listen = self._endpoint = elsewhere
         else:
             self._reserved = reserve_port(config.run)
             host, port = self._reserved.getsockname()[:2]
-            protocol = protocol_of(config.run, context.middleware)
+            protocol = protocol_of(config.run, record.middleware)
             self.listen = format_endpoint(protocol, host, port)
             self._endpoint = format_endpoint(protocol, reach_from_here(host), port)
-        connection = Connection(self._endpoint, context.key, config.run.domain_id, context.middleware)
+        connection = Connection(self._endpoint, record.key, config.run.domain_id, record.middleware)
         self._environment = {**os.environ, **node_environment(connection)}
         self._processes: dict[str, BaseProcess] = {}
 

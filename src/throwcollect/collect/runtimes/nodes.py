@@ -12,7 +12,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from throwcollect.collect.runtimes.node_logs import NodeLogs
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.run import RunConfig
 from throwcollect.own_process import SERIAL_LIBRARIES
 from throwcollect.ros.connection import Connection
@@ -137,7 +137,7 @@ class NodeHost(ABC):
     data: str
     listen: str
     cleared: bool
-    context: RunContext
+    record: RunRecord
     config: Config
     logs: NodeLogs
 
@@ -146,7 +146,7 @@ class NodeHost(ABC):
         """The connection with which this process joins the run; None while it cannot reach the router."""
         if (endpoint := self.endpoint) is None:
             return None
-        return Connection(endpoint, self.context.key, self.config.run.domain_id, self.context.middleware)
+        return Connection(endpoint, self.record.key, self.config.run.domain_id, self.record.middleware)
 
     def open(self) -> None:
         """Make everything that the nodes need, such as a network, and skip what earlier runs have logged."""
@@ -156,7 +156,7 @@ class NodeHost(ABC):
         """Read the summary of the finished dataset."""
         from throwcollect.dataset.inspect import info
 
-        return info(self.context.directory)
+        return info(self.record.directory)
 
     @property
     @abstractmethod

@@ -16,7 +16,7 @@ from throwcollect.collect.runs import background
 from throwcollect.collect.runs.background import begin_run, carry_out
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin
+from throwcollect.collect.runtimes.run_record import Origin
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerError
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -85,7 +85,7 @@ def test_a_run_begun_in_the_background_has_a_record_at_once(
     (process,) = processes
     assert run.status == "running"
     assert (run.record.launcher, run.record.origin, run.record.kind) == (process.pid, ORIGIN, "collection")
-    assert run.record.directory == str(tmp_path / "data")
+    assert run.record.directory == tmp_path / "data"
     assert not (tmp_path / "data").exists()
     order = end(process)
     made_from = background._ORDERS.validate_json(order)

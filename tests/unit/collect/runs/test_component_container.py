@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
-from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
@@ -16,10 +14,10 @@ from throwcollect.collect.runs.component_container import launch_container
 from throwcollect.collect.runs.control import down
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Kind, Origin, RunRecord
 from throwcollect.collect.runtimes.docker import component, containers
 from throwcollect.collect.runtimes.docker.component import find_join_options
 from throwcollect.collect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
+from throwcollect.collect.runtimes.run_record import Kind, Origin, RunRecord
 from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.errors import WorkerError
 from throwcollect.ros.connection import Connection
@@ -43,9 +41,8 @@ def remember(name: str, kind: Kind, runtime: str, *, joins: str | None = None) -
     run = Records().new(name, run=name)
     directory = run.files / "data"
     directory.mkdir()
-    logs = str(run.files / "logs")
-    record = RunRecord(name, name, runtime, str(directory), logs, 0, datetime.now(timezone.utc), 1, 0, kind=kind)
-    run.write(replace(record, origin=Origin(name, joins=joins), endpoint="tls/127.0.0.1:7447"))
+    origin = Origin(name, joins=joins)
+    run.write(run.begin(name, directory, runtime=runtime, kind=kind, origin=origin, endpoint="tls/127.0.0.1:7447"))
     return run
 
 

@@ -13,8 +13,7 @@ import pytest
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunFailure, RunRecord, Summary
-from throwcollect.collect.runtimes.runtime import NodeState
+from throwcollect.collect.runtimes.run_record import NodeState, RunFailure, RunRecord, Summary
 from throwcollect.errors import ConfigError
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -37,7 +36,7 @@ def mode(path: Path) -> int:
 
 
 def record(run: Run, **fields: Any) -> RunRecord:
-    begun = RunRecord.begin(run.id, "small", Path("/data/small"), logs=Path("/data/small/logs"), runtime="local")
+    begun = run.begin("small", Path("/data/small"), runtime="local")
     return replace(begun, **{"started": NOW, "launcher": 1, "simulations": 2, **fields})
 
 
@@ -169,7 +168,6 @@ def test_runs_are_remembered_for_a_week_after_their_end(
         lambda text: text[: len(text) // 2],
         lambda _: "",
         lambda text: text.replace('"launcher"', '"starter"'),
-        lambda text: text.replace('"version": 1', '"version": 2'),
     ],
 )
 def test_a_damaged_record_is_an_error_but_other_runs_can_be_listed(damage: Callable[[str], str], state: Path) -> None:

@@ -14,7 +14,7 @@ import pytest
 from throwcollect.collect.runtimes import local
 from throwcollect.collect.runtimes.local import LocalNodes
 from throwcollect.collect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
@@ -33,8 +33,8 @@ sys.stdin.read()
 """
 
 
-def context(directory: Path) -> RunContext:
-    return RunContext("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
+def context(directory: Path) -> RunRecord:
+    return RunRecord("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
 
 
 def nodes(directory: Path, **run: object) -> LocalNodes:

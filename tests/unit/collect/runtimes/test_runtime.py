@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from throwcollect import extras, members
-from throwcollect.collect.runtimes.runtime import AUTOMATIC, Host, RunContext, Runtime, choose, get_runtime
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import AUTOMATIC, Host, Runtime, choose, get_runtime
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
@@ -26,7 +27,7 @@ class Cluster(Runtime):
     def describe(self, config: Config) -> str:
         return "a cluster"
 
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> Host:
         raise ConfigError("no cluster here")
 
 
@@ -66,7 +67,7 @@ def test_a_runtime_can_be_added_by_another_package(added: None, tmp_path: Path) 
     assert type(get_runtime("cluster")).__name__ == "Cluster"
     config, said = Config(), list[str]()
     config = config.model_copy(update={"run": config.run.model_copy(update={"runtime": "cluster"})})
-    assert choose(config, say=said.append, warn=said.append).name == "cluster"
+    assert choose(config, say=said.append, warn=said.append)[0] == "cluster"
     assert said == ["runtime: a cluster"]
 
 

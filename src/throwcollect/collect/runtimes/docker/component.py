@@ -24,7 +24,8 @@ from throwcollect.collect.runtimes.docker.docker_engine import connect
 from throwcollect.collect.runtimes.docker.docker_nodes import describe_container_end
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import ROUTER
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext, Session
+from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
+from throwcollect.collect.runtimes.runtime import Session
 from throwcollect.config.run import ContainerSpec
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
@@ -79,7 +80,7 @@ class ComponentContainer:
     """Runs one container until it ends or the user asks to stop; a `runtime.Host`.
 
     Args:
-        context: The run that consists of this container.
+        record: The run that consists of this container.
         joining: The options for the run that the container joins; None if it joins none.
         is_running: Returns whether the run with an id is running; it is called again and again.
         warn: Gets a line when the engine is silent for long.
@@ -87,7 +88,7 @@ class ComponentContainer:
 
     def __init__(
         self,
-        context: RunContext,
+        record: RunRecord,
         component: str,
         spec: ContainerSpec,
         joining: JoinOptions | None,
@@ -99,11 +100,11 @@ class ComponentContainer:
         self._spec = spec
         self._joining = joining
         self._is_running = is_running
-        self._context = context
-        self._logs = NodeLogs(context.logs)
+        self._record = record
+        self._logs = NodeLogs(record.logs)
         client = connect(timeout_s=ANSWER_S)
         check_container(client, self._spec, component)
-        self._containers = Containers(client, context.run, self._logs, warn)
+        self._containers = Containers(client, record.run, self._logs, warn)
 
     def collect(self, session: Session) -> None:
         """Run the container until it ends, the user asks to stop, or the run that it has joined ends; then close."""
@@ -141,7 +142,7 @@ class ComponentContainer:
     def _make_options(self) -> dict[str, Any]:
         joining, spec = self._joining, self._spec
         options = container_options(
-            self._context,
+            self._record,
             spec.image,
             CONTAINER,
             spec.section,
@@ -174,7 +175,7 @@ class ComponentContainer:
         if containers.given_up:
             raise WorkerError(
                 f"the Docker engine has not answered for {containers.silent_s:.0f} s",
-                hint=f"once it answers, {command('down', '--run', self._context.run)} ends the container",
+                hint=f"once it answers, {command('down', '--run', self._record.run)} ends the container",
             )
         if (failure := containers.by_node[CONTAINER].failure) is not None:
             raise WorkerError(f"the container of {self._spec.image} cannot be started: {failure}")

@@ -19,7 +19,7 @@ from throwcollect.collect.runtimes.nodes import (
     node_environment,
     protocol_of,
 )
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.run import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE
@@ -61,9 +61,9 @@ def container_of(run: str, node: str) -> str:
     return f"throwcollect-{run}-{node}"
 
 
-def labels(context: RunContext) -> dict[str, str]:
+def labels(record: RunRecord) -> dict[str, str]:
     """Labels of everything that is made for a run."""
-    return {RUN_LABEL: context.run, DIRECTORY_LABEL: str(context.directory.resolve()), VERSION_LABEL: __version__}
+    return {RUN_LABEL: record.run, DIRECTORY_LABEL: str(record.directory.resolve()), VERSION_LABEL: __version__}
 
 
 def key_mount(key: RunKey) -> str:
@@ -96,28 +96,28 @@ def publishes_port(config: Config) -> bool:
 
 
 def node_options(
-    node: NodeSpec, *, context: RunContext, config: Config, image_id: str, address: str | None = None
+    node: NodeSpec, *, record: RunRecord, config: Config, image_id: str, address: str | None = None
 ) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
     The configuration may bind the node to another core. The id of the image goes into the dataset's provenance; the
     address is that in the run's network, None for any.
     """
-    section, network = section_of(config, node.name), network_of(context.run)
-    directory = str(context.directory.resolve())
-    endpoint = router_endpoint(config, context.middleware)
+    section, network = section_of(config, node.name), network_of(record.run)
+    directory = str(record.directory.resolve())
+    endpoint = router_endpoint(config, record.middleware)
     own = {
-        **node_environment(Connection(endpoint, KEY, config.run.domain_id, context.middleware)),
+        **node_environment(Connection(endpoint, KEY, config.run.domain_id, record.middleware)),
         # Otherwise nodes would write a random id and /data into the provenance, which mean nothing outside.
         HOST_VARIABLE: socket.gethostname(),
         IMAGE_VARIABLE: image_id,
         DIRECTORY_VARIABLE: directory,
         "THROWCOLLECT_NODE": node.name,
     }
-    mounts = [key_mount(context.key)]
+    mounts = [key_mount(record.key)]
     if node.name != ROUTER:
         mounts.append(f"{directory}:{DATA}:{'rw' if node.name == COORDINATOR else 'ro'},z")
-    options = container_options(context, image(config), node.name, section, environment=own, mounts=mounts)
+    options = container_options(record, image(config), node.name, section, environment=own, mounts=mounts)
     if node.name == ROUTER and config.run.router_port:
         options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
     return {
@@ -130,7 +130,7 @@ def node_options(
 
 
 def container_options(
-    context: RunContext,
+    record: RunRecord,
     image: str,
     node: str,
     section: NodeContainerConfig,
@@ -158,8 +158,8 @@ def container_options(
         "stop_signal": "SIGTERM",
         "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
         **options,
-        "name": container_of(context.run, node),
-        "labels": {**options.get("labels", {}), **labels(context), NODE_LABEL: node},
+        "name": container_of(record.run, node),
+        "labels": {**options.get("labels", {}), **labels(record), NODE_LABEL: node},
         # Nothing but /tmp can be written in the container.
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _join_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),

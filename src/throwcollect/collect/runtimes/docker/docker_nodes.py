@@ -26,7 +26,8 @@ from throwcollect.collect.runtimes.docker.containers import ANSWER_S, Container,
 from throwcollect.collect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
-from throwcollect.collect.runtimes.runtime import RunContext, Session
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import Session
 from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import Interrupted, WorkerError
@@ -45,28 +46,28 @@ class DockerNodes(NodeHost):
     Containers and networks carry the run's id as a label, by which `down` finds them if the launcher dies.
 
     Args:
-        context: The run; its id has to be unique on the engine.
+        record: The run; its id has to be unique on the engine.
         warn: Gets a line when the engine is silent for long.
         client: Client of the engine; None connects to the one that `engine_address` finds.
     """
 
     def __init__(
         self,
-        context: RunContext,
+        record: RunRecord,
         config: Config,
         *,
         warn: Callable[[str], None] = lambda _line: None,
         client: DockerClient | None = None,
     ) -> None:
-        self.context = context
+        self.record = record
         self.config = config
-        self.listen = router_endpoint(config, context.middleware)
+        self.listen = router_endpoint(config, record.middleware)
         self.cleared = False
         self.data = DATA
-        self.logs = NodeLogs(context.logs)
+        self.logs = NodeLogs(record.logs)
         self._client = client or connect(timeout_s=ANSWER_S)
         self._image_id = check(self._client, config)
-        self._containers = Containers(self._client, context.run, self.logs, warn)
+        self._containers = Containers(self._client, record.run, self.logs, warn)
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
@@ -78,7 +79,7 @@ class DockerNodes(NodeHost):
     def open(self) -> None:
         """Make the run's network, and watch its containers; see `NodeHost.open`."""
         hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
-        with engine_errors(f"run {self.context.run} cannot be prepared on the Docker engine", hint=hint):
+        with engine_errors(f"run {self.record.run} cannot be prepared on the Docker engine", hint=hint):
             self._create_network()
         super().open()
         self._containers.open()
@@ -89,10 +90,10 @@ class DockerNodes(NodeHost):
         Nodes on Fast DDS look up the address of their discovery server only once. A container can choose its address
         only in a network whose range was named, so a first network serves to find a free range.
         """
-        name = network_of(self.context.run)
-        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": labels(self.context)}
+        name = network_of(self.record.run)
+        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": labels(self.record)}
         network = self._client.networks.create(name, **options)
-        if self.context.middleware.is_fast_dds:
+        if self.record.middleware.is_fast_dds:
             network.reload()
             pool = IPAMPool(subnet=network.attrs["IPAM"]["Config"][0]["Subnet"])
             network.remove()
@@ -100,10 +101,10 @@ class DockerNodes(NodeHost):
 
     def _address_of(self, node: NodeSpec) -> str | None:
         """The address that a node is to have in the run's network; None if it may be any."""
-        if node.name != ROUTER or not self.context.middleware.is_fast_dds:
+        if node.name != ROUTER or not self.record.middleware.is_fast_dds:
             return None
         with engine_errors("the engine does not report which addresses the run's network has"):
-            network = self._client.networks.get(network_of(self.context.run))
+            network = self._client.networks.get(network_of(self.record.run))
         # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
@@ -114,7 +115,7 @@ class DockerNodes(NodeHost):
         state = None if router is None else router.state
         if state is None or state.ended:
             return None
-        protocol = protocol_of(self.config.run, self.context.middleware)
+        protocol = protocol_of(self.config.run, self.record.middleware)
         if self.config.run.router_port:
             return format_endpoint(protocol, LOOPBACK, self.config.run.router_port)
         return format_endpoint(protocol, state.address, ROUTER_PORT) if state.address else None
@@ -123,7 +124,7 @@ class DockerNodes(NodeHost):
         """Begin to start a node; if it cannot be started, one of the next `exits` reports it."""
         options = node_options(
             node,
-            context=self.context,
+            record=self.record,
             config=self.config,
             image_id=self._image_id,
             address=self._address_of(node),
@@ -172,15 +173,15 @@ class DockerNodes(NodeHost):
 
     def _make_silence_error(self) -> WorkerError:
         """The error of a silent engine, with the containers that may still run there, and how to go on."""
-        context = self.context
-        left = ", ".join(container_of(context.run, node) for node in self._containers.by_node) or "none"
+        record = self.record
+        left = ", ".join(container_of(record.run, node) for node in self._containers.by_node) or "none"
         hint = (
-            f"once it answers, {command('down', '--run', context.run)} ends them, "
-            f"and {command('resume', context.directory)} goes on without them"
+            f"once it answers, {command('down', '--run', record.run)} ends them, "
+            f"and {command('resume', record.directory)} goes on without them"
         )
         return WorkerError(
             f"the Docker engine has not answered for {self._containers.silent_s:.0f} s; "
-            f"finished throws are safe in {context.directory}",
+            f"finished throws are safe in {record.directory}",
             evidence="\n".join(filter(None, (self._containers.last_error, f"containers that may run on: {left}"))),
             hint=hint,
         )

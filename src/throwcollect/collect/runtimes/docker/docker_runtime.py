@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from throwcollect.collect.runtimes.docker.address import check_socket, engine_address, has_socket
 from throwcollect.collect.runtimes.image_sources import SOURCES_LABEL, are_others
-from throwcollect.collect.runtimes.runtime import Check, RunContext, Runtime
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import Check, Runtime
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
@@ -36,11 +37,11 @@ class DockerRuntime(Runtime):
 
         return f"Docker containers of {image(config)}"
 
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
         """Make the host of a run; see `Runtime.host`."""
         from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
 
-        return DockerNodes(context, config, warn=warn)
+        return DockerNodes(record, config, warn=warn)
 
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]

@@ -10,19 +10,19 @@ from rclzenoh.session_config import client_override
 from throwcollect.collect.runtimes.docker.container_options import image, node_options, publishes_port
 from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 from throwcollect.collect.runtimes.nodes import NodeRole, NodeSpec
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 
-PLACE = RunContext("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
+PLACE = RunRecord("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
 
 
 def options(name: str, *, core: int | None = None, run: Any = None, **containers: Any) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
     node = NodeSpec(name, ("command", "--option"), NodeRole.EXPENDABLE, core)
-    return node_options(node, context=PLACE, config=config, image_id="sha256:12ab")
+    return node_options(node, record=PLACE, config=config, image_id="sha256:12ab")
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])

@@ -16,7 +16,7 @@ from throwcollect.collect.runtimes.docker import docker_nodes as module
 from throwcollect.collect.runtimes.docker.containers import ContainerState
 from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.collect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
 from throwcollect.ros.middleware import Middleware
@@ -53,7 +53,7 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
         key.create()
         made.append(
             DockerNodes(
-                RunContext("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
+                RunRecord("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
                 CONFIG,
                 warn=warnings.append,
             )
