@@ -46,6 +46,7 @@ def launch_container(run: Run, spec: ContainerSpec, *, reporter: Reporter, inter
     def host(record: RunRecord) -> Host:
         from throwcollect.collect.runtimes.docker.component import ComponentContainer
 
+        run.record.middleware.joining.settle()
         joining = None if origin.joins is None else _wait_for_router(origin.joins, spec, interruptions)
         return ComponentContainer(record, origin.component, spec, joining, is_running=_is_running, warn=reporter.warn)
 

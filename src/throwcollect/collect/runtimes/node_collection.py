@@ -13,6 +13,7 @@ from throwcollect import ros
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.runtimes.nodes import (
     CONFIGURATION,
+    CONTAINER,
     COORDINATOR,
     LAUNCHER,
     ROBOT_FILES,
@@ -46,6 +47,8 @@ Something is wrong after the first of these times plus the second one for each s
 
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     """List the nodes of a run: a router, simulations, and a coordinator if the run collects a dataset."""
+    if host.record.kind == "container":
+        return [NodeSpec(CONTAINER, (), NodeRole.MAIN)]
     rest_s = SERVER_REST_S if host.record.middleware.is_fast_dds else 0.0
     return [
         NodeSpec(ROUTER, ("router", "--listen", host.listen), NodeRole.VITAL, rest_s=rest_s),
@@ -69,7 +72,7 @@ def offer_scaling(node: ros.Node, simulations: int, on_wanted: Callable[[int], N
 
 
 class NodeCollection:
-    """Drives one run with nodes, a collection or a session; closes the host at the end."""
+    """Drives one run with nodes; closes the host at the end."""
 
     def __init__(self, host: NodeHost, session: Session) -> None:
         self._host = host
@@ -88,9 +91,9 @@ class NodeCollection:
             self._session.event("started", simulations=self._simulations)
             self._supervisor.start()
             end = self._follow()
+            self._check(end)
             if not self._host.record.collects:
                 return None
-            self._check(end)
             # The simulations end while this process reads the dataset.
             self._supervisor.dismiss()
             return self._host.info()
@@ -99,7 +102,7 @@ class NodeCollection:
         """Look after the nodes until the run ends or is interrupted.
 
         Returns:
-            How the coordinator ended; None if it had to be ended by force, or there is none.
+            How the main node ended; None if it had to be ended by force, or there is none.
         """
         end = None
         while end is None and not self._session.interruptions():
@@ -125,13 +128,13 @@ class NodeCollection:
     def _check(self, end: NodeExit | None) -> None:
         record = self._host.record
         # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
-        finished = end is not None and end.code in (0, LossError.exit_code)
-        if self._session.interruptions() and not finished:
+        finished = end is not None and (end.code == 0 or (record.collects and end.code == LossError.exit_code))
+        if record.collects and self._session.interruptions() and not finished:
             raise record.interruption
         if end is not None and not finished:
             kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
             hint = record.resume_command if kind is WorkerError else None
-            raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
+            raise kind(f"the {end.name} stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
     def _listen(self) -> None:
         self._listener.spin(self._host.connection, _POLL_S)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 ROUTER = "router"
 COORDINATOR = "coordinator"
+CONTAINER = "container"
+"""Name of the only node of a run that is a container of the catalogue."""
 LAUNCHER = "launcher"
 """Name of the launcher's node; the launcher never runs in a container."""
 SIMULATIONS = "simulations"

@@ -87,7 +87,7 @@ def test_the_exit_code_of_a_container_that_has_ended_is_in_the_record(engine: En
     record = launch(engine, end)
     assert record.exit_code == WorkerError.exit_code
     assert record.failure is not None
-    assert record.failure.message == "the container of nodes has ended: exit code 7"
+    assert record.failure.message == "the container stopped: exit code 7"
     assert engine.names() == []
 
 

@@ -61,7 +61,7 @@ def container_of(run: str, node: str) -> str:
     return f"throwcollect-{run}-{node}"
 
 
-def labels(record: RunRecord) -> dict[str, str]:
+def make_labels(record: RunRecord) -> dict[str, str]:
     """Labels of everything that is made for a run."""
     return {RUN_LABEL: record.run, DIRECTORY_LABEL: str(record.directory.resolve()), VERSION_LABEL: __version__}
 
@@ -79,7 +79,7 @@ def router_endpoint(config: Config, middleware: Middleware) -> str:
     return f"{protocol_of(config.run, middleware)}/{ROUTER}:{ROUTER_PORT}"
 
 
-def image(config: Config) -> str:
+def image_of(config: Config) -> str:
     """Image of all nodes."""
     return config.containers.image or default_tag()
 
@@ -117,7 +117,7 @@ def node_options(
     mounts = [key_mount(record.key)]
     if node.name != ROUTER:
         mounts.append(f"{directory}:{DATA}:{'rw' if node.name == COORDINATOR else 'ro'},z")
-    options = container_options(record, image(config), node.name, section, environment=own, mounts=mounts)
+    options = container_options(record, image_of(config), node.name, section, environment=own, mounts=mounts)
     if node.name == ROUTER and config.run.router_port:
         options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
     return {
@@ -159,7 +159,7 @@ def container_options(
         "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
         **options,
         "name": container_of(record.run, node),
-        "labels": {**options.get("labels", {}), **labels(record), NODE_LABEL: node},
+        "labels": {**options.get("labels", {}), **make_labels(record), NODE_LABEL: node},
         # Nothing but /tmp can be written in the container.
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _join_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),
