@@ -245,9 +245,6 @@ def _make_row(run: Run) -> tuple[str, ...]:
 def _describe_status(run: Run, record: RunRecord) -> str:
     if record.ended is not None:
         return f"{run.status} {_format_age(record.ended)} ago, exit code {record.exit_code}"
-    if run.lives and record.planning is not None:
-        plan = record.planning
-        return f"planning for {_format_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
     if run.lives:
         return f"running for {_format_age(record.started)}"
     from throwcollect.collect.runs.run_selection import has_complete_dataset

@@ -9,9 +9,8 @@ import os
 import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
@@ -20,16 +19,15 @@ from typing import IO, cast
 
 from pydantic import TypeAdapter
 
-from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.runs.component_container import DESCRIPTION, check_request, launch_container
 from throwcollect.collect.runs.launcher import launch
-from throwcollect.collect.runs.preparation import MANY_TRIALS, prepare, resume
+from throwcollect.collect.runs.preparation import prepare, resume
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
-from throwcollect.collect.runtimes.run_record import Kind, Origin, Planning, RunFailure, RunRecord
+from throwcollect.collect.runtimes.run_record import Kind, Origin, RunFailure, RunRecord
 from throwcollect.collect.runtimes.runtime import choose, get_runtime
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.run import ContainerSpec
@@ -42,8 +40,6 @@ from throwcollect.files import open_log
 from throwcollect.own_process import stop_signals
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.side_by_side import count_cores
-
-_WRITE_PLANNING_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -153,60 +149,44 @@ def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interrupt
         launch_container(run, _SPECS.validate_json(order), reporter=reporter, interruptions=interruptions)
         return
     log = NodeLogs(run.record.logs).path(LAUNCHER)
+
+    def end_if_asked() -> None:
+        if interruptions():
+            raise Interrupted("stopped before any node was started")
+
     # If anything fails before the launch, the error is written into the record, and then the files of the run are
     # removed.
     with ExitStack() as made:
         try:
-            planner = _Planner(run, reporter, interruptions)
-            if _prepare(run, _ORDERS.validate_json(order), planner) is None:
+            if _prepare(run, _ORDERS.validate_json(order), _Planner(reporter, end_if_asked)) is None:
                 run.update(ended=datetime.now(timezone.utc), exit_code=0)
                 run.close()
                 return
             made.enter_context(run)
             _move_log(log, NodeLogs(run.record.logs).path(LAUNCHER))
             # The last steps of the preparation do not check for a request to stop, and may have taken long.
-            planner.end_if_asked()
+            end_if_asked()
         except ThrowcollectError as error:
-            end = datetime.now(timezone.utc)
-            run.update(ended=end, exit_code=error.exit_code, failure=RunFailure.of(error), planning=None)
+            run.update(ended=datetime.now(timezone.utc), exit_code=error.exit_code, failure=RunFailure.of(error))
             raise
         run.collect(interruptions=interruptions)
 
 
 class _Planner(Reporter):
-    """Writes the progress of the plan into the record, ends the planning on a request to stop, passes all else on.
+    """Passes what the preparation reports on, and ends it on a request to stop."""
 
-    It is the reporter of the preparation, and passes on to the reporter of the run.
-    """
-
-    def __init__(self, run: Run, reporter: Reporter, interruptions: Callable[[], int]) -> None:
-        self._onlooker = reporter
-        self._run = run
-        self._interruptions = interruptions
-        self._write_at = 0.0
-
-    def update(self, progress: Progress) -> None:
-        self._onlooker.update(progress)
+    def __init__(self, reporter: Reporter, end_if_asked: Callable[[], None]) -> None:
+        self._reporter = reporter
+        self._end_if_asked = end_if_asked
 
     def say(self, line: str) -> None:
-        self._onlooker.say(line)
+        self._reporter.say(line)
 
     def warn(self, line: str) -> None:
-        self._onlooker.warn(line)
+        self._reporter.warn(line)
 
-    def update_plan(self, checked: int, trials: int) -> None:
-        """Take in how many of a plan's trials have been checked."""
-        self.end_if_asked()
-        if trials >= MANY_TRIALS and time.monotonic() >= self._write_at:
-            self._write_at = time.monotonic() + _WRITE_PLANNING_S
-            # If the record cannot be written, planning goes on; the first write after the plan reports the error.
-            with suppress(ConfigError):
-                self._run.update(planning=Planning(checked, trials))
-
-    def end_if_asked(self) -> None:
-        """End the preparation on a request to stop."""
-        if self._interruptions():
-            raise Interrupted("stopped before any node was started")
+    def update_plan(self, checked: int, trials: int) -> None:  # noqa: ARG002
+        self._end_if_asked()
 
 
 def _move_log(before: Path, after: Path) -> None:

@@ -90,14 +90,6 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Planning:
-    """How far the plan of a run is: how many of its trials have been checked."""
-
-    checked: int
-    trials: int
-
-
-@dataclass(frozen=True)
 class RunRecord:
     """The record of a run; its launcher changes it, other processes read it.
 
@@ -122,7 +114,6 @@ class RunRecord:
         summary: Summary of the dataset; None if the dataset is not finished.
         origin: The request of a client; None if a command or a program began the run.
         stopping: Whether the run was asked to stop; it still finishes the trials that run.
-        planning: How far the plan is while a large one is made in the background; else None.
         recordings: Directory into which clients of a session record; None if they cannot.
     """
 
@@ -151,7 +142,6 @@ class RunRecord:
     summary: Summary | None = None
     origin: Origin | None = None
     stopping: bool = False
-    planning: Planning | None = None
     recordings: str | None = None
 
     @property
