@@ -221,26 +221,6 @@ def test_another_user_can_submit_the_printed_script_with_an_image(
     assert fingerprints(data) == whole
 
 
-def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=200)
-    grows = ("until.landed=20", "sweep.sampler=sobol")
-    with runs.prepare(config, overrides=["run.runtime=inprocess", *grows], output=tmp_path / "whole") as run:
-        run.collect()
-    data = tmp_path / "with blank" / "data"
-    # Slow enough that joining machines find trials left, even if this one is busy.
-    slowly = "sim.real_time_factor=4"
-    settings = [word for setting in ("cluster.memory=1G", slowly, *grows) for word in ("--set", setting)]
-    arguments = ("submit", config, "--output", data, "--tasks", "3", "--mode", "live", *settings)
-    said = call(slurm, *arguments, "--wait")
-    assert "one run on 3 nodes" in said
-    assert recordings(fingerprints(data)) == recordings(fingerprints(tmp_path / "whole"))
-    printed = call(slurm, "logs", "--run", data)
-    assert printed.count("1 simulation of this machine will join") == 2
-    # The joined simulations end some seconds later, and then the script ends.
-    wait_until(lambda: not (data / "cluster" / "token").exists())
-    assert "nothing is left to submit" in call(slurm, "resume", data)
-
-
 def test_the_file_of_the_site_gives_defaults_for_cluster_keys(
     slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:

@@ -103,7 +103,7 @@ def make_row(run: ClusterRun, look: SlicesState) -> tuple[str, ...]:
     return (
         _number_of(run),
         "slurm",
-        str(look.running * run.simulations_per_task),
+        str(look.running * run.config.cluster.cores),
         f"{ProgressOfSlices(run).at(look).ended}/{run.trials}",
         _describe_status(look, run),
         str(run.directory),
@@ -129,7 +129,5 @@ def _number_of(run: ClusterRun) -> str:
 
 
 def _describe_status(look: SlicesState, run: ClusterRun) -> str:
-    if run.submission.live:
-        return f"one run on {format_count(run.submission.tasks, 'node')}, {'running' if look.running else 'waiting'}"
     tasks = format_count(run.submission.tasks, "task")
     return f"{len(look.finished)} of {tasks} finished, {look.running} running, {look.waiting} waiting"

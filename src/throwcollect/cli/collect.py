@@ -90,10 +90,9 @@ def up(
 
 def _refuse_submitted(directory: Path) -> None:
     """Refuse a dataset whose slices tasks of a cluster collect."""
-    from throwcollect.collect.cluster.submission import is_submitted, read_submission
+    from throwcollect.collect.cluster.submission import is_submitted
 
-    # A submission that is one run on several nodes goes on by the same command.
-    if is_submitted(directory) and not read_submission(directory).live:
+    if is_submitted(directory):
         raise ConfigError(
             f"--resume {directory}: was submitted, so tasks of a cluster collect it",
             hint=f"{command('resume', directory)} submits what is missing",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -211,19 +212,15 @@ def _end_elsewhere(named: str | None) -> bool:
 
 
 def _find_submitted(run: str | None) -> ClusterRun | None:
-    """Find the submitted dataset that a command means; None if it means a run of this machine."""
-    from throwcollect.collect.runs.records import Records
+    """Find the submitted dataset whose directory a command names; None if it means a run of this machine."""
+    from throwcollect.collect.cluster.submission import is_submitted
 
-    # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
-    if run is None and any(each.status == "running" for each in Records().all()):
-        return None
-    from throwcollect.collect.cluster.submission import find_submitted
-
-    if (directory := find_submitted(run)) is None:
+    # An empty name would be the path of the current directory.
+    if not run or not is_submitted(Path(run)):
         return None
     from throwcollect.collect.cluster.cluster_run import ClusterRun
 
-    return ClusterRun.open(directory)
+    return ClusterRun.open(Path(run).absolute())
 
 
 def _make_document(run: Run) -> dict[str, Any]:

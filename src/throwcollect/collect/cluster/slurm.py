@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,19 +21,8 @@ _PATIENCE_S = 60.0
 _GLANCE_S = 5.0
 """Longest wait where the answer is only a courtesy, as in the list of all runs."""
 _RUNNING = frozenset({"RUNNING", "COMPLETING", "SIGNALING"})
-_ENDED = frozenset(
-    [
-        "BOOT_FAIL",
-        "CANCELLED",
-        "COMPLETED",
-        "DEADLINE",
-        "FAILED",
-        "NODE_FAIL",
-        "OUT_OF_MEMORY",
-        "PREEMPTED",
-        "REVOKED",
-        "TIMEOUT",
-    ]
+_ENDED = re.compile(
+    "BOOT_FAIL|CANCELLED|COMPLETED|DEADLINE|FAILED|NODE_FAIL|OUT_OF_MEMORY|PREEMPTED|REVOKED|TIMEOUT",
 )
 """States of tasks that have ended. All others, including those of future versions of Slurm, count as living."""
 _UNSEEN_OUTPUT = "0:53"
@@ -60,7 +50,7 @@ class ArrayTask:
     @property
     def lives(self) -> bool:
         """Whether it runs, or waits to run."""
-        return self.state not in _ENDED
+        return _ENDED.fullmatch(self.state) is None
 
     @property
     def runs(self) -> bool:
@@ -83,11 +73,8 @@ def submit(script: Path, *options: str) -> str:
         # With several clusters, sbatch prints NUMBER;CLUSTER.
         return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
     except WorkerError as error:
-        hint = (
-            error.hint
-            or f"correct the keys of cluster, by --set cluster.KEY=VALUE, in the YAML file or in {site_path()}"
-        )
-        raise ConfigError(error.message, hint=hint) from error
+        hint = f"correct the keys of cluster, by --set cluster.KEY=VALUE, in the YAML file or in {site_path()}"
+        raise ConfigError(error.message, hint=error.hint or hint) from error
 
 
 def find_tasks() -> dict[str, list[ArrayTask]]:

@@ -8,7 +8,6 @@ import subprocess
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from datetime import datetime, timezone
 from pathlib import Path
 
 from throwcollect.collect.cluster import slurm
@@ -27,7 +26,7 @@ from throwcollect.collect.cluster.submission import (
 from throwcollect.collect.coordinator.prepare import describe_plan, prepare
 from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.coordinator.resume import refuse_changes
-from throwcollect.collect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
+from throwcollect.collect.runs.slices import check_sliceable, read_changed_config, read_frozen_config
 from throwcollect.collect.runtimes.image_sources import SOURCES_LABEL, UNKNOWN, VERSION_LABEL, are_others
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
@@ -67,34 +66,29 @@ def submit(
     tasks: int,
     *,
     overrides: Sequence[str] = (),
-    live: bool = False,
     dry: bool = False,
     reporter: Reporter,
 ) -> Submitted:
-    """Plan a dataset and submit it as an array of tasks, or as one run on several nodes.
+    """Plan a dataset and submit it as an array of tasks.
 
     Args:
         config: The configuration's file.
         directory: Directory of the dataset: new or empty, or with the plan of this configuration; all nodes see it.
-        tasks: Number of slices, each of which is a task; of nodes, if it is one run.
+        tasks: Number of slices, each of which is a task.
         overrides: Overrides of keys of the configuration, as ``--set`` takes them.
-        live: Whether it is one run on several nodes, as a plan needs that grows with its results.
         dry: Whether to make only the script, and write nothing.
         reporter: Receives what is planned and submitted.
     """
     directory = directory.absolute()
     with load_locating_errors(config, overrides) as read, ExitStack() as undo:
         complete = read.model_copy(update={"cluster": with_site(read.cluster)})
-        check_closed(complete)
-        if not live:
-            check_sliceable(complete)
-            if complete.trials is not None:
-                Slice(0, tasks).trials_of(complete.trials, trials_per_shard=complete.record.trials_per_shard)
+        check_sliceable(complete)
+        if complete.trials is not None:
+            Slice(0, tasks).trials_of(complete.trials, trials_per_shard=complete.record.trials_per_shard)
         scripts = _make_scripts(complete, directory)
-        slices = () if live else tuple(range(tasks))
-        text = scripts.live(tasks) if live else scripts.collect(tasks, format_indexes(slices))
+        slices = tuple(range(tasks))
         if dry:
-            return Submitted(directory, text)
+            return Submitted(directory, scripts.collect(tasks, format_indexes(slices)))
         if is_submitted(directory):
             raise ConfigError(
                 f"{directory}: was submitted already", hint=f"{command('resume', directory)} submits what is missing"
@@ -103,17 +97,15 @@ def submit(
         _freeze(complete, directory, config.parent, reporter)
         # Only from here on, because a directory that was refused holds files of another user or program.
         undo.callback(_remove, directory, made=made, planned=planned)
-        if not live:
-            Plan.read(directory / PLAN, read_frozen_config(directory)).slice_of(Slice(0, tasks))
+        Plan.read(directory / PLAN, read_frozen_config(directory)).slice_of(Slice(0, tasks))
         image = str(scripts.image) if scripts.image else None
-        submission = Submission(complete.name, tasks, tuple(scripts.program), image, live=live)
-        submitted = _submit(scripts, submission, slices, reporter)
+        submitted = _submit(scripts, Submission(tasks, tuple(scripts.program), image), slices, reporter)
         undo.pop_all()
         return submitted
 
 
 def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: Reporter) -> Submitted | None:
-    """Submit the slices of a dataset that are neither finished nor in the queue; if it is one run, submit it again.
+    """Submit the slices of a dataset that are neither finished nor in the queue.
 
     Overrides may change only keys that do not change the dataset.
 
@@ -125,7 +117,7 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: 
     # Wrong changes are refused even if nothing is left to submit.
     config = read_changed_config(directory, overrides)
     look = ClusterRun(directory, submission).look()
-    if look.complete or (submission.live and look.lives):
+    if look.complete:
         return None
     living = {task.index for task in look.tasks if task.lives}
     missing = tuple(each.index for each in submission.slices if each not in look.finished and each.index not in living)
@@ -155,24 +147,17 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
             undo.callback(slurm.cancel, [job])
             return job
 
-        if submission.live:
-            text = scripts.live(submission.tasks)
-            array, joining = submit_job(_write(directory, _COLLECT, text)), ""
-            message = f"submitted job {array}: one run on {format_count(submission.tasks, 'node')}"
+        text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
+        join = _write(directory, _JOIN, scripts.join())
+        if slices:
+            array = submit_job(_write(directory, _COLLECT, text))
+            # The joining job starts after all tasks, however they end, and reports what is missing then.
+            joining = submit_job(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
+            message = f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
         else:
-            text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
-            join = _write(directory, _JOIN, scripts.join())
-            if slices:
-                array = submit_job(_write(directory, _COLLECT, text))
-                # The joining job starts after all tasks, however they end, and reports what is missing then.
-                joining = submit_job(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
-                message = (
-                    f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
-                )
-            else:
-                array, joining = "", submit_job(join)
-                message = f"submitted job {joining}, which joins the slices; all of them are finished"
-        job = Job(array, joining, slices, datetime.now(timezone.utc))
+            array, joining = "", submit_job(join)
+            message = f"submitted job {joining}, which joins the slices; all of them are finished"
+        job = Job(array, joining, slices)
         write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
         undo.pop_all()
     reporter.say(message)

@@ -109,7 +109,6 @@ def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config
     """Read the configuration of a dataset that is to be collected in slices, with overrides as `collect_slice` has."""
     config = read_changed_config(directory, overrides)
     check_sliceable(config)
-    check_closed(config)
     return config
 
 
@@ -147,11 +146,7 @@ def check_sliceable(config: Config) -> None:
         raise ConfigError(
             [Problem("a dataset whose end depends on its results cannot be collected in slices", key="until")],
             expected="a fixed number of trials",
-            hint="throwcollect submit --mode live collects it in one run on several nodes",
+            hint="throwcollect up --listen and throwcollect join-run collect it on several nodes",
         )
-
-
-def check_closed(config: Config) -> None:
-    """Check that others cannot join a run on a cluster, whose nodes many users share."""
     if config.run.open:
         raise ConfigError([Problem("should be false, as many users share the nodes of a cluster", key="run.open")])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
@@ -18,11 +17,10 @@ from throwcollect.collect.cluster.submission import (
 )
 
 SUBMISSION = Submission(
-    name="many",
     tasks=8,
     program=("throwcollect",),
     image=None,
-    jobs=(Job(array="12", join="13", slices=(0, 1, 5), submitted=datetime(2026, 1, 1, tzinfo=timezone.utc)),),
+    jobs=(Job(array="12", join="13", slices=(0, 1, 5)),),
 )
 
 
