@@ -165,13 +165,11 @@ def test_a_node_that_does_not_see_the_directory_is_named(
     assert fingerprints(data) == whole
 
 
-def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
+def test_a_run_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
     config = configure(tmp_path, trials=60)
     data = tmp_path / "data"
     array = submit(slurm, config, data, SLOW)
     wait_until(lambda: any(state == "RUNNING" for state, _ in states(slurm, array).values()))
-    (listed,) = [run for run in json.loads(call(slurm, "ps", "--json")) if run.get("directory") == str(data)]
-    assert (listed["run"], listed["tasks"]) == (array, TASKS)
     assert "not complete" in call(slurm, "stop", "--run", data)
     assert not any(state in ("PENDING", "RUNNING") for state, _ in states(slurm, array).values())
     assert "3 slices of 3 not collected: cancelled" in call(slurm, "wait", "--run", data, expect=130)

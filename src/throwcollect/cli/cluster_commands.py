@@ -49,4 +49,4 @@ def submit(
     else:
         show({"directory": done.directory, "array": done.job.array, "join": done.job.join}, json=json)
         if not json:
-            tell(f"follow it: {command('wait', '--run', done.directory)}   (or ps, logs, stop)")
+            tell(f"follow it: {command('wait', '--run', done.directory)}   (or logs, stop)")

@@ -32,7 +32,6 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
     Options:
         everything (-a --all): Runs that have ended, too.
     """
-    from throwcollect.collect.cluster.submission import find_queued
     from throwcollect.collect.runs.records import Records
     from throwcollect.serve.finding import SERVER, find_living
 
@@ -45,21 +44,16 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
             tell(f"throwcollect: {error}")
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
-    queued, server = find_queued(), find_living()
-    tasks = []
-    if queued:
-        from throwcollect.cli.cluster_runs import list_queued, make_document, make_row
-
-        tasks = list_queued(queued)
+    server = find_living()
     if json:
-        documents = [*map(_make_document, shown), *(make_document(*each) for each in tasks)]
+        documents = [*map(_make_document, shown)]
         if server is not None:
             documents.append(
                 {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
             )
         show(documents, json=True)
         return
-    rows = [*((_make_row(run), _list_node_lines(run)) for run in shown), *((make_row(*each), []) for each in tasks)]
+    rows = [(_make_row(run), _list_node_lines(run)) for run in shown]
     if server is not None:
         rows.append(((SERVER, "-", "-", "-", f"running at {server.url}, pid {server.pid}", "-"), []))
     for line in _make_table(rows):
@@ -118,11 +112,6 @@ def logs(nodes: list[str] | None = None, *, follow: bool = False, run: RunOption
 
 def events(run: RunOption = None, json: JsonOption = False) -> None:
     """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
-    if (submitted := _find_submitted(run)) is not None:
-        from throwcollect.cli.cluster_runs import print_events
-
-        print_events(submitted, as_json=json)
-        return
     from throwcollect.collect.runs.following import read_events
     from throwcollect.collect.runs.run_selection import find_run_to_watch
 

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.collect.cluster.slurm import MARK
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import Interrupted
@@ -101,7 +100,7 @@ class BatchScripts:
             "account": cluster.account,
             "qos": cluster.qos,
             "constraint": cluster.constraint,
-            "comment": f"{MARK}{self.directory}",
+            "comment": f"throwcollect:{self.directory}",
             "open-mode": "append",
             "nodes": 1,
             "ntasks": 1,

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.collect.cluster import slurm
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
 from throwcollect.plan.slice import Slice
 
@@ -86,11 +85,3 @@ def format_indexes(indexes: tuple[int, ...]) -> str:
         else:
             ranges.append([index, index])
     return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in ranges)
-
-
-def find_queued() -> list[Path]:
-    """Find the directories of this user's submitted datasets that have jobs in the queue; none without Slurm."""
-    try:
-        return [path for path in map(Path, slurm.find_directories()) if is_submitted(path)]
-    except (ConfigError, WorkerError):
-        return []
