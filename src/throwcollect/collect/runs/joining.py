@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import base64
-import binascii
-import json
 import os
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from throwcollect.build import build_digest
 from throwcollect.collect.coordinator.progress import Progress
@@ -40,7 +38,7 @@ from throwcollect.ros.router_endpoint import split_address
 from throwcollect.run_key import RunKey
 from throwcollect.wording import format_count
 
-_START = "tc2."
+_START = "tc3."
 """Beginning of every token; the number is the version of the format."""
 _ANSWER_S = 15.0
 """Time in which the router, and then the launcher, has to answer."""
@@ -58,56 +56,51 @@ class JoinToken:
     Attributes:
         endpoint: Endpoint at which other machines reach the router.
         secret: Secret of the key of the run, in hexadecimal.
-        build: Digest over the code that computes the run's throws with this engine, robot, tool and task; see
-            `throwcollect.build`.
+        parts: Engine, robot, tool, task and policy of the run, as arguments of `build_digest`.
+        build: Digest over the code that computes the run's throws with these; see `throwcollect.build`.
     """
 
     run: str
     endpoint: str
     secret: str
     domain_id: int
-    engine: str
+    parts: tuple[str, ...]
     build: str
-    robot: str = "talos"
-    tool: str = "spoon"
-    task: str = "throw"
-    policy: str = ""
 
     @classmethod
     def of(cls, run: str, endpoint: str, key: RunKey, config: Config) -> JoinToken:
         """Make the token of a run with this configuration."""
         policy = config.task.policy.use if config.task.policy else ""
-        names = config.sim.engine, build_of(config), config.robot.name, config.tool.name, config.task.name, policy
-        return cls(run, endpoint, key.secret.hex(), config.run.domain_id, *names)
+        parts = config.sim.engine, config.robot.name, config.tool.name, config.task.name, policy
+        return cls(run, endpoint, key.secret.hex(), config.run.domain_id, parts, build_of(config))
 
     def encode(self) -> str:
         """The token as one word."""
-        text = json.dumps(asdict(self), separators=(",", ":"))
-        return _START + base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
+        return _START + base64.urlsafe_b64encode(_JSON.dump_json(self)).decode().rstrip("=")
 
     @classmethod
     def decode(cls, word: str) -> JoinToken:
         """Read a token."""
-        data = word.strip().removeprefix(_START)
+        start, _, data = word.strip().partition(".")
         try:
-            if data == word.strip():
-                raise ValueError(word)
             # `encode` leaves out the padding, but `b64decode` demands it.
             text = base64.b64decode(data + "=" * (-len(data) % 4), altchars=b"-_", validate=True)
             token = _JSON.validate_json(text)
             bytes.fromhex(token.secret)
             split_address(token.endpoint)
-        except (ValueError, binascii.Error, ValidationError) as error:
+            if f"{start}." != _START:
+                raise ValueError(start)
+        # Errors of base64 and pydantic are ValueErrors, too.
+        except ValueError as error:
             raise ConfigError("this is no token of a run, or only a part of one", expected=f"{_START}...") from error
         return token
 
     def check_build(self) -> None:
         """Check that this machine would compute the same throws as the run's own machine."""
-        if self.build != build_digest(self.engine, self.robot, self.tool, self.task, self.policy):
+        if self.build != build_digest(*self.parts):
             raise ConfigError(
-                f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
-                f"package of the robot {self.robot}, the tool {self.tool} or the task {self.task}, and would collect "
-                "other bytes",
+                f"run {self.run}: this machine has other sources, or another build or package of one of "
+                f"{', '.join(filter(None, self.parts))}, and would collect other bytes",
                 hint="install the same versions on both machines, or the image on both; throwcollect doctor shows the "
                 "build of each",
             )
@@ -166,9 +159,8 @@ def _simulate(
     elif reports.finished:
         reporter.say("the run is over")
     else:
-        raise WorkerError(
-            f"no report of the run has arrived for {_SILENT_S:g} s", hint="join it again if it still goes on"
-        )
+        message = f"no report of the run has arrived for {_SILENT_S:g} s"
+        raise WorkerError(message, hint="join it again if it still goes on")
 
 
 class _Reports:
