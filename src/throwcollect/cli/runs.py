@@ -134,7 +134,7 @@ def scale(simulations: int, *, run: RunOption = None) -> None:
 
 
 def stop(run: RunOption = None) -> None:
-    """Finish the running trials of a run, close its files and end it; if no run lives, end the server."""
+    """Finish the running trials of a run, close its files and end it; `--run server` ends the server."""
     if _end_elsewhere(run):
         return
     from throwcollect.collect.runs import control
@@ -175,9 +175,7 @@ def down(*, run: RunOption = None) -> None:
 
 
 def _end_elsewhere(named: str | None) -> bool:
-    """End a submitted dataset, or the server, if a command means one of them.
-
-    It means the server by its name, unless a run has that, or if no run is there to end.
+    """End a submitted dataset, or the server, if a command names one of them, and no run has that name.
 
     Returns:
         Whether there was one to end.
@@ -190,11 +188,7 @@ def _end_elsewhere(named: str | None) -> bool:
     from throwcollect.collect.runs.records import Records
     from throwcollect.serve.finding import SERVER, end_server
 
-    if named is None:
-        is_run = any(run.status in ("running", "died") for run in Records().all())
-    else:
-        is_run = named != SERVER or named in Records().ids()
-    if is_run or (address := end_server()) is None:
+    if named != SERVER or named in Records().ids() or (address := end_server()) is None:
         return False
     typer.echo(f"{SERVER}: stopped; it was at {address.url}")
     return True
@@ -213,11 +207,8 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
 
 
 def _make_document(run: Run) -> dict[str, Any]:
-    from throwcollect.collect.runs.run_selection import has_complete_dataset
-
     error = run.record.error if run.record.failure else None
-    complete = has_complete_dataset(run)
-    return {**asdict(run.record), "message": str(error or ""), "status": run.status, "complete": complete}
+    return {**asdict(run.record), "message": str(error or ""), "status": run.status}
 
 
 def _make_row(run: Run) -> tuple[str, ...]:
@@ -233,9 +224,7 @@ def _describe_status(run: Run, record: RunRecord) -> str:
         return f"{run.status} {_format_age(record.ended)} ago, exit code {record.exit_code}"
     if run.lives:
         return f"running for {_format_age(record.started)}"
-    from throwcollect.collect.runs.run_selection import has_complete_dataset
-
-    return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
+    return run.status
 
 
 def _list_node_lines(run: Run) -> list[tuple[str, ...]]:

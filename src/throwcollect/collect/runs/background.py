@@ -180,13 +180,11 @@ class _Planner(Reporter):
         self._end_if_asked = end_if_asked
 
     def say(self, line: str) -> None:
+        self._end_if_asked()
         self._reporter.say(line)
 
     def warn(self, line: str) -> None:
         self._reporter.warn(line)
-
-    def update_plan(self, checked: int, trials: int) -> None:  # noqa: ARG002
-        self._end_if_asked()
 
 
 def _move_log(before: Path, after: Path) -> None:

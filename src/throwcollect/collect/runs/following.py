@@ -12,7 +12,7 @@ from throwcollect.collect.runs.events import EVENTS, Event, parse
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_selection import describe_death
 from throwcollect.collect.runtimes.node_logs import NodeLogs, Tail
-from throwcollect.collect.runtimes.run_record import Summary
+from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
 from throwcollect.wording import suggest
 
@@ -59,7 +59,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
             yield RunUpdate(run, reports[-1] if reports else None, happened)
 
 
-def wait(run: Run) -> Summary:
+def wait(run: Run) -> Info:
     """Wait until a run has ended.
 
     Returns:

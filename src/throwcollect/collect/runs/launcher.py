@@ -12,18 +12,18 @@ from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.runs.events import EventLog
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runtimes.run_record import NodeState, RunFailure, RunRecord, Summary
+from throwcollect.collect.runtimes.run_record import NodeState, RunFailure, RunRecord
 from throwcollect.collect.runtimes.runtime import Host, RunEvent, get_runtime
 from throwcollect.config.schema import Config
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.summary import explain_loss
+from throwcollect.dataset.summary import Info, explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError
 from throwcollect.wording import command
 
 _WRITE_PROGRESS_S = 1.0
 
 
-def launch(run: Run, interruptions: Callable[[], int], *, config: Config, reporter: Reporter) -> Summary | None:
+def launch(run: Run, interruptions: Callable[[], int], *, config: Config, reporter: Reporter) -> Info | None:
     """Launch a prepared run until its last trial has ended.
 
     A run that collects no dataset goes on until the user stops it. This function writes the end of the run into its
@@ -38,7 +38,7 @@ def launch(run: Run, interruptions: Callable[[], int], *, config: Config, report
         run.record.middleware.joining.settle()
         return get_runtime(run.record.runtime).host(record, config, warn=reporter.warn)
 
-    return launch_host(run, host, reporter=reporter, interruptions=interruptions, is_open=config.run.open)
+    return launch_host(run, host, reporter=reporter, interruptions=interruptions)
 
 
 def launch_host(
@@ -47,12 +47,8 @@ def launch_host(
     *,
     reporter: Reporter,
     interruptions: Callable[[], int],
-    is_open: bool = False,
-) -> Summary | None:
-    """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
-
-    With `is_open`, joining the run takes no key.
-    """
+) -> Info | None:
+    """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`."""
     session = _Session(run, reporter, interruptions)
     record = run.record
     # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always has an end.
@@ -63,8 +59,7 @@ def launch_host(
         host = make_host(record)
         with hold_lock(record.directory, alone=False):
             run.update(launcher=os.getpid())
-            info = host.collect(session)
-            summary = None if info is None else Summary(**vars(info), open=is_open)
+            summary = host.collect(session)
         lost = None if summary is None else explain_loss(summary.outcomes, hint=record.resume_command)
         code, failure = (0, None) if lost is None else (lost.exit_code, RunFailure.of(lost))
         return summary
@@ -121,7 +116,7 @@ class _Session:
             lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, progress=progress)
         )
 
-    def end(self, code: int, failure: RunFailure | None, summary: Summary | None, *, left: bool) -> None:
+    def end(self, code: int, failure: RunFailure | None, summary: Info | None, *, left: bool) -> None:
         """Write the end of the run; `left` is whether its containers may still exist."""
         event: RunEvent = "failed"
         if code in (0, LossError.exit_code):

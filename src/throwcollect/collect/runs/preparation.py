@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 
     from throwcollect.plan.plan import Plan
 
-MANY_TRIALS = 1000
-"""A plan of this many trials takes seconds, so it is announced before it is made."""
-
 
 def prepare(
     config: str | os.PathLike[str],
@@ -59,7 +56,12 @@ def prepare(
     with load_locating_errors(file, overrides) as read:
         directory = _name_directory(read.name) if output is None else Path(output)
         refuse_busy(directory, own=run)
-        draw = partial(_make_plan, read, file.parent, processes, reporter)
+
+        def draw() -> Plan:
+            from throwcollect.collect.coordinator.prepare import prepare as prepare_plan
+
+            return prepare_plan(read, directory, sweep_directory=file.parent, processes=processes, reporter=reporter)
+
         return prepare_run(read, directory, draw, reporter=reporter, run=run)
 
 
@@ -68,14 +70,6 @@ def _name_directory(name: str) -> Path:
     directory = Path("datasets", name)
     taken = os.path.lexists(directory) and not (directory.is_dir() and not any(directory.iterdir()))
     return directory.with_name(f"{name}-{datetime.now():%Y%m%d-%H%M%S}") if taken else directory
-
-
-def _make_plan(config: Config, sweep_directory: Path, processes: int, reporter: Reporter, directory: Path) -> Plan:
-    from throwcollect.collect.coordinator.prepare import prepare as prepare_plan
-
-    if (config.trials or 0) >= MANY_TRIALS and config.until is None:
-        reporter.say(f"plan: checking {config.trials} trials against limits and collisions, 0.3 to 3 ms for each")
-    return prepare_plan(config, directory, sweep_directory=sweep_directory, processes=processes, reporter=reporter)
 
 
 def resume(
@@ -150,7 +144,7 @@ def end_left(directory: Path, reporter: Reporter, *, own: Run | None = None) -> 
 def prepare_run(
     config: Config,
     directory: Path,
-    plan: Plan | Callable[[Path], Plan],
+    plan: Plan | Callable[[], Plan],
     *,
     reporter: Reporter,
     run: Run | None = None,
@@ -161,7 +155,7 @@ def prepare_run(
     Args:
         config: The configuration.
         directory: Directory of the dataset.
-        plan: The plan of the dataset in the directory, or a function that makes a new one in a directory.
+        plan: The plan of the dataset in the directory, or a function that makes a new one there.
         reporter: Receives the progress.
         run: The run, if it has a record already; None makes a new one.
         choice: Name of the runtime and the middleware of its nodes; None if they are not chosen yet.
@@ -181,7 +175,7 @@ def prepare_run(
             from throwcollect.collect.runtimes.local import begin_imports
 
             begin_imports(*find_modules("engines", config.sim.engine), foreseen=config.model_dump_json())
-        made = plan(directory) if callable(plan) else plan
+        made = plan() if callable(plan) else plan
         # These imports would take long, but making the plan has made them already.
         from throwcollect.collect.coordinator.prepare import describe_plan
         from throwcollect.dataset.creation import remove_plan

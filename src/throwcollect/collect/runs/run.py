@@ -18,9 +18,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
-from throwcollect.collect.runtimes.run_record import NodeState, RunRecord, Summary
+from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
 from throwcollect.collect.runtimes.runtime import find_runtime
 from throwcollect.config.schema import Config
+from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, NotFoundError, WorkerError
 from throwcollect.files import beside, open_log, write_all
 from throwcollect.own_process import count_interruptions, make_command
@@ -31,7 +32,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.state_directory import is_locked, unusable
 from throwcollect.wording import command
 
-Launch = Callable[["Run", Callable[[], int]], Summary | None]
+Launch = Callable[["Run", Callable[[], int]], Info | None]
 """Launches a run in this process; the function that it gets counts how often the user has asked to stop."""
 _ADAPTER = TypeAdapter(RunRecord)
 _POLL_S = 0.05
@@ -140,7 +141,7 @@ class Run:
             self._undo.close()
             self.close()
 
-    def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
+    def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Info:
         """Launch a prepared run in this process, and return when it has ended; see `launcher.launch`.
 
         `runs.stop` sends SIGTERM to the launcher of a run, which is this process. So that it does not end the program,
@@ -154,7 +155,7 @@ class Run:
         with count_interruptions(_find_fatal_signals()) as terminations:
             summary = launch(self, lambda: interruptions() + terminations())
         # Runs without a dataset have no summary. Only `background` prepares those, and it does not use the result.
-        return cast(Summary, summary)
+        return cast(Info, summary)
 
     def start(self, *, interruptions: Callable[[], int] = lambda: 0) -> Run:
         """Launch a prepared run in a process of its own, which outlives this one; return when its nodes are started.

@@ -76,34 +76,13 @@ def refuse_busy(directory: Path, *, own: Run | None = None) -> list[Run]:
 
 def describe_death(run: Run) -> WorkerError:
     """The error that the launcher of a run died before the run ended."""
-    hint = f"{command('down', '--run', run.id)} cleans up"
-    if has_complete_dataset(run):
-        return WorkerError(
-            f"run {run.id}: its launcher died, but the dataset is complete: {run.record.directory}", hint=hint
-        )
-    what = f"run {run.id}: its launcher died"
+    what, hint = f"run {run.id}: its launcher died", f"{command('down', '--run', run.id)} cleans up"
     # A runtime is chosen after the plan is made, so a run with neither has simulated no trial.
     is_planned = run.record.runtime != "" or config_path(run.record.directory).is_file()
-    if run.record.kind == "collection" and is_planned:
+    if is_planned and (again := run.record.resume_command):
         what = f"{what}; finished throws are in {run.record.directory}"
-        if again := run.record.resume_command:
-            hint = f"{again} goes on where it ended; {hint}"
+        hint = f"{again} goes on where it ended; {hint}"
     return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
-
-
-def has_complete_dataset(run: Run) -> bool:
-    """Whether nothing is left to collect into the directory of a run.
-
-    A later run may have continued the dataset. So the dataset itself is examined, unless this run has completed it.
-    """
-    if run.record.kind != "collection" or run.status == "running":
-        return False
-    if run.record.exit_code == 0:
-        return True
-    # This imports the libraries that read tables, which takes a while and is rarely needed.
-    from throwcollect.collect.coordinator.resume import is_complete
-
-    return is_complete(run.record.directory)
 
 
 def require_living(run: Run) -> RunRecord:

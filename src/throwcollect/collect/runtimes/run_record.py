@@ -44,13 +44,6 @@ class NodeState:
 
 
 @dataclass(frozen=True)
-class Summary(Info):
-    """Summary of a run's dataset; `open` is whether joining it took no key."""
-
-    open: bool = False
-
-
-@dataclass(frozen=True)
 class RunFailure:
     """The error that a run ended with, in a form that a record can hold; `errors.ThrowcollectError` has the fields."""
 
@@ -139,7 +132,7 @@ class RunRecord:
     exit_code: int | None = None
     left: bool = False
     failure: RunFailure | None = None
-    summary: Summary | None = None
+    summary: Info | None = None
     origin: Origin | None = None
     stopping: bool = False
     recordings: str | None = None

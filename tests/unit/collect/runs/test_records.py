@@ -13,14 +13,13 @@ import pytest
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runtimes.run_record import NodeState, RunFailure, RunRecord, Summary
+from throwcollect.collect.runtimes.run_record import NodeState, RunFailure, RunRecord
+from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
 from throwcollect.state_directory import STATE_VARIABLE
 
 NOW = datetime.now(timezone.utc)
-SUMMARY = Summary(
-    "small", 3, 3, {"landed": 3}, None, {"x_m": (1.0, 2.0), "y_m": (0.0, 0.1)}, 30, 1.0, 1, 10, 5, {}, "0", open=True
-)
+SUMMARY = Info("small", 3, 3, {"landed": 3}, None, {"x_m": (1.0, 2.0), "y_m": (0.0, 0.1)}, 30, 1.0, 1, 10, 5, {}, "0")
 PROGRESS = Progress(7, 0, {}, 2, 0.0, [])
 NODE = NodeState("sim_0", "restarting", 2, None, "ended by SIGKILL")
 

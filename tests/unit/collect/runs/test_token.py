@@ -40,9 +40,7 @@ def test_a_token_of_a_run_with_a_part_of_another_package_is_refused_where_that_d
 
 def test_a_token_of_a_run_with_other_sources_is_refused() -> None:
     make().check_build()
-    with pytest.raises(
-        ConfigError, match="other sources, or another build or package of one of bullet"
-    ) as refused:
+    with pytest.raises(ConfigError, match="other sources, or another build or package of one of bullet") as refused:
         make("f" * 64).check_build()
     # The image has a slimmed engine, so the same version is not enough.
     assert "or the image on both" in str(refused.value.hint)
