@@ -12,8 +12,9 @@ from throwcollect.collect.runs.launcher import launch_host
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_selection import require_living
+from throwcollect.collect.runtimes.nodes import NodeHost
 from throwcollect.collect.runtimes.run_record import Origin, RunRecord
-from throwcollect.collect.runtimes.runtime import Host, get_runtime
+from throwcollect.collect.runtimes.runtime import get_runtime
 from throwcollect.config.run import ContainerSpec
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
@@ -43,10 +44,9 @@ def launch_container(run: Run, spec: ContainerSpec, *, reporter: Reporter, inter
     """Run the container until it ends, the run that it joins ends, or the user asks to stop; close the run."""
     origin = cast(Origin, run.record.origin)
 
-    def host(record: RunRecord) -> Host:
+    def host(record: RunRecord) -> NodeHost:
         from throwcollect.collect.runtimes.docker.component import ComponentContainer
 
-        run.record.middleware.joining.settle()
         joining = None if origin.joins is None else _wait_for_router(origin.joins, spec, interruptions)
         return ComponentContainer(record, origin.component, spec, joining, is_running=_is_running, warn=reporter.warn)
 

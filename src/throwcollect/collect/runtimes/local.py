@@ -32,7 +32,7 @@ from throwcollect.collect.runtimes.nodes import (
     protocol_of,
 )
 from throwcollect.collect.runtimes.run_record import RunRecord
-from throwcollect.collect.runtimes.runtime import Runtime, Session
+from throwcollect.collect.runtimes.runtime import Runtime
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
 from throwcollect.own_process import die_with_parent, make_command
@@ -43,7 +43,6 @@ from throwcollect.side_by_side import launching
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
-    from throwcollect.dataset.summary import Info
 
 _KILLED_S = 5.0
 """Time that a process has to end after SIGKILL."""
@@ -90,13 +89,6 @@ class LocalNodes(NodeHost):
         connection = Connection(self._endpoint, record.key, config.run.domain_id, record.middleware)
         self._environment = {**os.environ, **node_environment(connection)}
         self._processes: dict[str, BaseProcess] = {}
-
-    def collect(self, session: Session) -> Info | None:
-        """See `runtime.Host.collect`."""
-        # This imports ROS, so it has to wait until the backend is chosen.
-        from throwcollect.collect.runtimes.node_collection import NodeCollection
-
-        return NodeCollection(self, session).run_to_the_end()
 
     @property
     def endpoint(self) -> str:

@@ -85,7 +85,7 @@ class NodeCollection:
         self._listener = RunListener(self._report, name=LAUNCHER, reports=host.record.collects, on_connect=self._offer)
 
     def run_to_the_end(self) -> Info | None:
-        """See `runtime.Host.collect`."""
+        """Collect until every trial has ended; a run without a dataset goes on until it is stopped."""
         with self._supervisor, self._listener:
             self._host.open()
             self._session.event("started", simulations=self._simulations)
@@ -96,7 +96,9 @@ class NodeCollection:
                 return None
             # The simulations end while this process reads the dataset.
             self._supervisor.dismiss()
-            return self._host.info()
+            from throwcollect.dataset.inspect import info
+
+            return info(self._host.record.directory)
 
     def _follow(self) -> NodeExit | None:
         """Look after the nodes until the run ends or is interrupted.

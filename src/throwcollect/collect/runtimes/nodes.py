@@ -21,7 +21,6 @@ from throwcollect.ros.middleware import Middleware
 if TYPE_CHECKING:
     # Modules that need only the names of nodes should not wait for these imports.
     from throwcollect.config.schema import Config
-    from throwcollect.dataset.summary import Info
 
 ROUTER = "router"
 COORDINATOR = "coordinator"
@@ -153,12 +152,6 @@ class NodeHost(ABC):
     def open(self) -> None:
         """Make everything that the nodes need, such as a network, and skip what earlier runs have logged."""
         self.logs.skip_earlier()
-
-    def info(self) -> Info:
-        """Read the summary of the finished dataset."""
-        from throwcollect.dataset.inspect import info
-
-        return info(self.record.directory)
 
     @property
     @abstractmethod

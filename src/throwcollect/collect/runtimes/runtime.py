@@ -20,6 +20,7 @@ from throwcollect.wording import suggest
 
 if TYPE_CHECKING:
     from throwcollect.collect.coordinator.progress import Progress
+    from throwcollect.collect.runtimes.nodes import NodeHost
     from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
     from throwcollect.config.schema import Config
     from throwcollect.dataset.summary import Info
@@ -65,7 +66,7 @@ class Session(Protocol):
 
 
 class Host(Protocol):
-    """Simulates the trials of one run.
+    """Simulates the trials of one run without nodes; see `nodes.NodeHost` for hosts with nodes.
 
     Attributes:
         cleared: Whether, after `close`, nothing of the run exists any more but its dataset.
@@ -73,11 +74,8 @@ class Host(Protocol):
 
     cleared: bool
 
-    def collect(self, session: Session) -> Info | None:
-        """Collect until every trial has ended, finish the dataset, and close; a session goes on until an interruption.
-
-        Returns:
-            The summary of the dataset; None for a run that collects none.
+    def collect(self, session: Session) -> Info:
+        """Collect until every trial has ended, finish the dataset, and close; return the summary of the dataset.
 
         Raises:
             WorkerError: If nodes cannot be started or kept alive.
@@ -107,7 +105,7 @@ class Runtime(ABC):
         """The runtime in words, as in ``runtime: local processes``."""
 
     @abstractmethod
-    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> Host:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> Host | NodeHost:
         """Make the host of a run, which starts nothing yet; `warn` gets a line about each long wait.
 
         Raises:

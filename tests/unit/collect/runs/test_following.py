@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.collect.runs.events import EventLog
+from throwcollect.collect.runs.events import Event, append_events
 from throwcollect.collect.runs.following import follow, read_logs
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
@@ -21,13 +21,13 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
     run.write(replace(run.begin("small", tmp_path / "data"), logs=first))
     first.mkdir()
     (first / "launcher.log").write_text("plan: 3 trials\n")
-    EventLog(later, "of-an-earlier-run").run_event("started", simulations=1)
+    append_events(later, [Event(run="of-an-earlier-run", event="started", simulations=1)])
 
     def launch() -> None:
         run.update(logs=later, runtime="local")
         (first / "launcher.log").rename(later / "launcher.log")
         (later / "sim_0.log").write_text("ready\n")
-        EventLog(later, run.id).run_event("started", simulations=1)
+        append_events(later, [Event(run=run.id, event="started", simulations=1)])
 
     steps = iter([lambda: None, launch, lambda: run.update(ended=datetime.now(timezone.utc), exit_code=0)])
 

@@ -92,32 +92,29 @@ def _refuse_mount(source: Path, root: str) -> str | None:
     if not source.exists():
         return f"{source} does not exist on this machine"
     real = source.resolve()
-    if real.is_socket():
-        return f"{source} is refused, as it is a socket; mounts are for data"
     kind, _, address = engine_address().partition("://")
     # The keys of all runs lie in the directory of the state.
-    more = [root, str(state_directory().resolve()), *([os.path.realpath(address)] if kind == "unix" else [])]
-    reason = refusal(str(real), more=more)
-    if reason is None and Path.home().resolve().is_relative_to(real):
-        reason = "is refused, as a home directory holds secrets; mounts are for data"
-    if reason is None:
+    system = [root, str(state_directory().resolve()), *([os.path.realpath(address)] if kind == "unix" else [])]
+    if (reason := find_secret(real, system)) is None:
         return None
-    return f"{source} {reason}" if real == source else f"{source}, which is {real}, {reason}"
+    shown = source if real == source else f"{source}, which is {real},"
+    return f"{shown} is refused, as {reason}; mounts are for data"
 
 
-def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
-    """Explain why a directory or file of the host must not be mounted; None if it may be.
+def find_secret(real: Path, system: Iterable[str] = ()) -> str | None:
+    """Explain why a directory or file must not be mounted, even for reading, as it may hold secrets; None if it may.
 
-    Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets. The
-    path is absolute and leads through no links; `more` are further directories of the system, such as those of the
-    engine.
+    The path leads through no links; `system` are further directories of the system, such as those of the engine.
     """
+    path = str(real)
+    if real.is_socket():
+        return "it is a socket"
     if path in _SHARED:
-        return f"is refused, as all users of the machine share {path}; mounts are for data"
-    for place in (*_SYSTEM, *more):
+        return f"all users of the machine share {path}"
+    for place in (*_SYSTEM, *system):
         if os.path.commonpath([path, place]) in (path, place):
-            return f"is refused, as {place} belongs to the system; mounts are for data"
-    if _HOME.fullmatch(path):
-        return "is refused, as a home directory holds secrets; mounts are for data"
-    hidden = next((part for part in PurePosixPath(path).parts if part.startswith(".")), None)
-    return None if hidden is None else f"is refused, as {hidden} may hold secrets of programs; mounts are for data"
+            return f"{place} belongs to the system"
+    if _HOME.fullmatch(path) or Path.home().resolve().is_relative_to(real):
+        return "a home directory holds secrets"
+    hidden = next((part for part in real.parts if part.startswith(".")), None)
+    return None if hidden is None else f"{hidden} may hold secrets of programs"

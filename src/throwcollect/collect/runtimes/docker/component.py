@@ -23,7 +23,6 @@ from throwcollect.collect.runtimes.docker.containers import ANSWER_S, ContainerH
 from throwcollect.collect.runtimes.docker.docker_engine import connect
 from throwcollect.collect.runtimes.nodes import CONTAINER, ROUTER, NodeExit, NodeSpec
 from throwcollect.collect.runtimes.run_record import RunRecord
-from throwcollect.collect.runtimes.runtime import Session
 from throwcollect.config.run import ContainerSpec, NodeContainerConfig, RunConfig
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
@@ -99,13 +98,6 @@ class ComponentContainer(ContainerHost):
         self._spec = spec
         self._joining = joining
         self._is_running = is_running
-
-    def collect(self, session: Session) -> None:
-        """See `runtime.Host.collect`."""
-        # This imports ROS, so it has to wait until the backend is chosen.
-        from throwcollect.collect.runtimes.node_collection import NodeCollection
-
-        NodeCollection(self, session).run_to_the_end()
 
     def section_of(self, name: str) -> NodeContainerConfig:
         """See `ContainerHost.section_of`."""

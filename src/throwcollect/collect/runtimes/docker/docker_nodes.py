@@ -24,10 +24,8 @@ from throwcollect.collect.runtimes.docker.containers import ANSWER_S, ContainerH
 from throwcollect.collect.runtimes.docker.docker_engine import connect, engine_errors
 from throwcollect.collect.runtimes.nodes import ROUTER, NodeSpec, protocol_of
 from throwcollect.collect.runtimes.run_record import RunRecord
-from throwcollect.collect.runtimes.runtime import Session
 from throwcollect.config.run import NodeContainerConfig
 from throwcollect.config.schema import Config
-from throwcollect.dataset.summary import Info
 from throwcollect.ros.router_endpoint import LOOPBACK, format_endpoint
 
 _ROUTER_HOST = -2
@@ -53,13 +51,6 @@ class DockerNodes(ContainerHost):
         self.listen = router_endpoint(config, record.middleware)
         self.data = DATA
         self._image_id = check(self._client, config)
-
-    def collect(self, session: Session) -> Info | None:
-        """See `runtime.Host.collect`."""
-        # This imports ROS, so it has to wait until the backend is chosen.
-        from throwcollect.collect.runtimes.node_collection import NodeCollection
-
-        return NodeCollection(self, session).run_to_the_end()
 
     def section_of(self, name: str) -> NodeContainerConfig:
         """See `ContainerHost.section_of`."""

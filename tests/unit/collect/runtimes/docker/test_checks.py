@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.unit.collect.runtimes.docker.engine import Engine, engine_at
 
-from throwcollect.collect.runtimes.docker.checks import check, refusal
+from throwcollect.collect.runtimes.docker.checks import check, find_secret
 from throwcollect.collect.runtimes.docker.docker_engine import connect
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
@@ -104,9 +104,9 @@ def test_the_network_of_the_host_is_refused(problems: Check) -> None:
     ],
 )
 def test_directories_that_hold_no_data_are_refused(path: str, reason: str) -> None:
-    assert refusal(path) == f"is refused, as {reason}; mounts are for data"
+    assert find_secret(Path(path)) == reason
 
 
 @pytest.mark.parametrize("path", ["/srv/models", "/home/me/data", "/var/tmp/x", "/tmpdata"])
 def test_directories_of_data_are_accepted(path: str) -> None:
-    assert refusal(path) is None
+    assert find_secret(Path(path)) is None
