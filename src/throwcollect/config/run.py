@@ -167,7 +167,6 @@ Time = Annotated[str, NUMBER_AS_STRING, Field(pattern=_TIME)]
 Memory = Annotated[str, Field(pattern=r"^[1-9][0-9]*[KMGT]$")]
 Word = Annotated[str, Field(pattern=r"^[!-~]+$")]
 Line = Annotated[str, Field(pattern=r"^[^\p{Cc}\p{Zl}\p{Zp}]*$")]
-Scratch = Annotated[str, Field(pattern=r"^[/$][A-Za-z0-9_./${}-]*$")]
 Bind = Annotated[Line, Field(pattern=r"^/[^:,]*(:/[^:,]*(:r[ow])?)?$")]
 
 
@@ -201,7 +200,5 @@ class ClusterConfig(Section):
     binds: list[Bind] = []
     """Further directories that tasks see inside the image, as DIRECTORY[:INSIDE[:ro]]; they always see the directory of
     the dataset."""
-    scratch: Scratch | None = None
-    """Directory on a disk of the node, such as `$TMPDIR`, in which a task collects before it hands its slice over."""
     requeue: Annotated[int, Field(ge=0, le=1000)] = 10
     """How often a task that was stopped, and has shut down properly, is queued again."""

@@ -6,7 +6,6 @@ Users may read the scripts, change them and submit them by hand.
 from __future__ import annotations
 
 import math
-import re
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,8 +18,6 @@ from throwcollect.errors import Interrupted
 _ENDING_S = 30
 """Time that a task needs, besides `run.grace_s`, to shut down: to end nodes and close files."""
 _JOIN_MEMORY = "4G"
-_EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=")
-"""Words in which the shell of the task replaces variables; all other words are quoted."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,6 @@ class BatchScripts:
         words = [
             *("up", "--slice", f"$SLURM_ARRAY_TASK_ID/{tasks}", "--output", str(self.directory)),
             *("-n", str(cluster.cores), "--runtime", "local"),
-            *(("--set", f"cluster.scratch={cluster.scratch}") if cluster.scratch else ()),
         ]
         return self._write(
             f"Collects one slice of {tasks} of a dataset of throwcollect.",
@@ -136,9 +132,6 @@ class BatchScripts:
         if self.image is None:
             return " ".join(map(_quote_for_shell, (*self.program, *words)))
         binds = [shlex.quote(f"--bind={bind}") for bind in (self.directory, *self.config.cluster.binds)]
-        if self.config.cluster.scratch:
-            # Its path may have variables anywhere.
-            binds.append(f'"--bind={self.config.cluster.scratch}"')
         image = shlex.quote(str(self.image))
         return " ".join(
             ["apptainer --quiet exec --cleanenv", *binds, image, "throwcollect", *map(_quote_for_shell, words)]
@@ -146,10 +139,8 @@ class BatchScripts:
 
 
 def _quote_for_shell(word: str) -> str:
-    """Quote a word for the shell, which replaces variables in names of tasks and of the scratch directory alone."""
-    if "$" in word and _EXPANDED.match(word):
-        return f'"{word}"'
-    return shlex.quote(word)
+    """Quote a word for the shell, which replaces variables of Slurm alone."""
+    return f'"{word}"' if word.startswith("$SLURM_") else shlex.quote(word)
 
 
 def _quote(text: str) -> str:

@@ -172,13 +172,7 @@ def _write(directory: Path, name: str, text: str) -> Path:
 
 
 def _make_scripts(config: Config, directory: Path) -> BatchScripts:
-    image, scratch = None, config.cluster.scratch
-    # Which directory a variable names, only the node of a task knows.
-    if scratch is not None and "$" not in scratch and not Path(scratch).is_dir():
-        raise ConfigError(
-            [Problem(f"there is no directory {scratch} on this machine", key="cluster.scratch")],
-            hint=f"if only nodes have it: cluster.lines: ['export SCRATCH={scratch}'] and cluster.scratch: $SCRATCH",
-        )
+    image = None
     if config.cluster.image is not None:
         image = Path(config.cluster.image).absolute()
         if not image.is_file():

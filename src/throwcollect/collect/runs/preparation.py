@@ -78,7 +78,6 @@ def resume(
     config: str | os.PathLike[str] | None = None,
     overrides: Sequence[str] = (),
     processes: int = 1,
-    simulate: bool = True,
     reporter: Reporter = SILENT,
     run: Run | None = None,
 ) -> Run | None:
@@ -89,31 +88,25 @@ def resume(
         config: The configuration's file; None takes the configuration that lies in the directory.
         overrides: Keys to change, as for `prepare`.
         processes: Number of processes that may check the trials of a larger plan, as for `prepare`.
-        simulate: Whether missing trials are run; if not, the dataset is finished at once with the episodes that are
-            whole, and all other trials are lost.
         reporter: Receives the progress.
         run: The run, if it has a record already; None makes a new one.
 
     Returns:
-        The run; None if every trial has ended, so that nothing is left to do, or if nothing should be simulated.
+        The run; None if every trial has ended, so that nothing is left to do.
     """
     directory = Path(directory)
     file = None if config is None else Path(config)
     choices: list[tuple[str, Middleware]] = []
     with reading_config(directory, file, overrides) as read:
         # This import takes long, and errors in the configuration need none of it.
-        from throwcollect.collect.coordinator.resume import finish_without_simulating, has_all_trials
+        from throwcollect.collect.coordinator.resume import has_all_trials
         from throwcollect.collect.coordinator.resume import resume as resume_plan
 
-        sweep_directory = directory if file is None else file.parent
-        if not simulate:
-            finish_without_simulating(read, directory, sweep_directory=sweep_directory, reporter=reporter)
-            return None
         end_left(directory, reporter, own=run)
         plan = resume_plan(
             read,
             directory,
-            sweep_directory=sweep_directory,
+            sweep_directory=directory if file is None else file.parent,
             processes=processes,
             # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
             before_writing=lambda: choices.append(choose(read, say=reporter.say, warn=reporter.warn)),

@@ -92,18 +92,16 @@ def test_an_array_task_collects_its_slice(directory: Path, tmp_path: Path) -> No
     assert words[words.index("-n") + 1] == "4"
 
 
-@pytest.mark.parametrize("scratch", ["$SCRATCH/mine", "/local/$NAME"])
-def test_a_task_in_an_image_gets_its_directories_and_no_variables_of_the_host(tmp_path: Path, scratch: str) -> None:
+def test_a_task_in_an_image_gets_its_directories_and_no_variables_of_the_host(tmp_path: Path) -> None:
     (tmp_path / "plan.parquet").touch()
-    made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro", "/$NAME"], scratch=scratch)
-    done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', SCRATCH="/local", NAME="mine")
+    made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro", "/$NAME"])
+    done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', NAME="mine")
     words = done.stdout.splitlines()
     assert words[2:5] == ["apptainer", "--quiet", "exec"]
     assert "--cleanenv" in words
     binds = [word.removeprefix("--bind=") for word in words if word.startswith("--bind=")]
-    assert binds == [str(tmp_path), "/data:/inside:ro", "/$NAME", "/local/mine"]
+    assert binds == [str(tmp_path), "/data:/inside:ro", "/$NAME"]
     assert words[words.index("/images/t.sif") + 1] == "throwcollect"
-    assert words[-2:] == ["--set", "cluster.scratch=/local/mine"]
 
 
 def test_lines_and_modules_of_the_site_come_before_the_task(tmp_path: Path) -> None:
@@ -151,7 +149,6 @@ def test_the_joining_job_calls_join_with_the_directory(directory: Path, tmp_path
         ("time", "soon"),
         ("partition", "a b"),
         ("binds", ["relative:/inside"]),
-        ("scratch", "tmp"),
     ],
 )
 def test_cluster_values_that_a_script_cannot_hold_are_refused(key: str, value: object) -> None:
