@@ -166,12 +166,10 @@ def down(*, run: RunOption = None) -> None:
     from throwcollect.collect.runs import control
     from throwcollect.collect.runs.run_selection import find_run_to_change
 
-    # A run without a record may be another user's, so it is removed only if it is named.
-    found = find_run_to_change(None, died=True) if run is None else run
-    ended, removed = control.down(found)
-    for name in removed:
+    found = find_run_to_change(run, died=True)
+    for name in control.down(found):
         tell(f"removed {name}")
-    typer.echo(f"{ended}: ended and forgotten")
+    typer.echo(f"{found.id}: ended and forgotten")
 
 
 def _end_elsewhere(named: str | None) -> bool:

@@ -141,7 +141,7 @@ def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interrupt
     from now on, `interruptions` counts them.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
-    run = Records().inherit(id, lock)
+    run = Records().open(id, lock=lock)
     if not order:
         launch(run, interruptions, config=load(config_path(run.record.directory)), reporter=reporter)
         return

@@ -74,8 +74,8 @@ class Records:
                 undo.pop_all()
             return made
 
-    def inherit(self, run: str, lock: int) -> Run:
-        """Open the run that the parent process has handed over, with the descriptor of its locked file."""
+    def open(self, run: str, *, lock: int = -1) -> Run:
+        """A run, whose record may be damaged; `lock` is the descriptor of the locked file of one that is taken over."""
         return Run(self._runs, run, lock=lock)
 
     def take(self, run: str) -> Run | None:

@@ -16,8 +16,7 @@ from throwcollect.wording import command, suggest
 
 def find(named: StrPath) -> Run:
     """Find a run of this machine by its id, a unique beginning of its id, or the directory of its dataset."""
-    records = Records()
-    return records.get(id_of(records, named))
+    return Records().open(_find_id(Records(), named))
 
 
 def find_run_to_change(named: str | None, *, died: bool = False) -> Run:
@@ -42,7 +41,7 @@ def find_run_to_watch(named: str | None) -> Run:
     return find_run_to_change(named)
 
 
-def id_of(records: Records, named: StrPath) -> str:
+def _find_id(records: Records, named: StrPath) -> str:
     """Find the id of the run that a user names by its id, a unique beginning of its id, or its dataset's directory."""
     directory, named = Path(named), os.fspath(named)
     # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.

@@ -107,7 +107,7 @@ def test_down_removes_the_container_of_a_launcher_that_died(engine: Engine) -> N
     run = remember("ear-1", "container", "docker")
     engine.create("throwcollect-ear-1-container", {RUN_LABEL: "ear-1", NODE_LABEL: "container"})
     run.close()
-    assert down(Records().get("ear-1")) == ("ear-1", ["throwcollect-ear-1-container"])
+    assert down(Records().get("ear-1")) == ["throwcollect-ear-1-container"]
     assert engine.names() == []
 
 

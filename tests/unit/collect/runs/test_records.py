@@ -1,7 +1,6 @@
 import os
 import stat
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
@@ -68,31 +67,12 @@ def test_the_id_of_a_run_begins_with_the_name_of_its_collection_and_is_unique(
     assert [records.new("small").id, records.new("small").id] == ["small-aaaa", "small-bbbb"]
 
 
-def test_a_killed_launcher_releases_its_run_even_if_its_pid_is_in_use(state: Path) -> None:
-    code = (
-        "import sys; from throwcollect.collect.runs.records import Records; sys.path.insert(0, sys.argv[1])\n"
-        "from test_records import record; run = Records().new('small'); run.write(record(run, launcher=1))\n"
-        "print(run.id, flush=True); sys.stdin.read()"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", code, str(Path(__file__).parent)], stdin=-1, stdout=-1, text=True
-    ) as process:
-        assert process.stdout is not None
-        run = process.stdout.readline().strip()
-        records = Records()
-        assert records.get(run).status == "running"
-        assert records.take(run) is None
-        process.kill()
-        process.wait()
-    assert records.get(run).status == "died"
-
-
 def test_a_run_is_handed_to_another_process_without_ever_seeming_dead(state: Path) -> None:
     records = Records()
     run = records.new("small")
     run.write(record(run))
     with subprocess.Popen(["/bin/cat"], stdin=-1, pass_fds=[run.lock]) as process:
-        inherited = records.inherit(run.id, os.dup(run.lock))
+        inherited = records.open(run.id, lock=os.dup(run.lock))
         run.close()
         inherited.close()
         assert run.is_locked()

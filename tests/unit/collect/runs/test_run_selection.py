@@ -21,7 +21,7 @@ from throwcollect.collect.runs.run_selection import (
 from throwcollect.collect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.collect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
 from throwcollect.collect.runtimes.run_record import RunFailure, RunRecord
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, NotFoundError, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.state_directory import STATE_VARIABLE
 
 NOW = datetime.now(timezone.utc)
@@ -188,7 +188,7 @@ def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
     make("a", "died", runtime="docker")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     end_left(tmp_path / "a", SILENT)
-    assert down("a") == ("a-0123", [])
+    assert down(records.get("a-0123")) == []
 
 
 def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
@@ -200,11 +200,3 @@ def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
         os.utime(path, times=(0, 0))
     records.new("c").close()
     assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
-
-
-def test_containers_of_a_run_without_a_record_are_removed_by_its_id(records: Records, engine: Engine) -> None:
-    engine.create("throwcollect-b-4567-sim_0", {RUN_LABEL: "b-4567", NODE_LABEL: "sim_0"})
-    with pytest.raises(NotFoundError, match="no run 'b'"):
-        down("b")
-    assert down("b-4567") == ("b-4567", ["throwcollect-b-4567-sim_0"])
-    assert engine.names() == []
