@@ -218,7 +218,6 @@ def _prepare(run: Run, order: Order, reporter: Reporter) -> Run | None:
 
 def _prepare_session(run: Run, order: Order, reporter: Reporter) -> Run:
     with load_locating_errors(order.config, order.overrides) as read:
-        _check_session(read)
         # Clients of a session act in real time. The file has the factor, as nodes and watchers take it from there.
         config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
         directory = run.record.directory

@@ -142,13 +142,19 @@ def _simulate(
     """Keep the simulations alive until the run is over."""
     from throwcollect.collect.runtimes.run_listener import RunListener
 
-    reports = _Reports(reporter)
+    heard_at, finished = time.monotonic(), False
+
+    def update(progress: Progress) -> None:
+        nonlocal heard_at, finished
+        heard_at, finished = time.monotonic(), progress.steps[0] >= progress.steps[1]
+        reporter.update(progress)
+
     # Names of nodes have to be unique, and several processes of one machine may join.
     name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
     roster = simulation_nodes([f"{name}_{index}" for index in range(host.record.simulations)], host.data)
-    with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
+    with Supervisor(host, config.run, roster) as supervisor, RunListener(update) as listener:
         supervisor.start()
-        while not reports.over and not interruptions():
+        while not interruptions() and time.monotonic() <= heard_at + (_OVER_S if finished else _SILENT_S):
             listener.spin(connection, _POLL_S)
             # The first value is the end of the main node, which is on another machine.
             _, news = supervisor.poll()
@@ -156,29 +162,11 @@ def _simulate(
                 reporter.warn(line)
     if interruptions():
         reporter.say("left; the run goes on without the simulations of this machine")
-    elif reports.finished:
+    elif finished:
         reporter.say("the run is over")
     else:
         message = f"no report of the run has arrived for {_SILENT_S:g} s"
         raise WorkerError(message, hint="join it again if it still goes on")
-
-
-class _Reports:
-    """Passes reports of the coordinator on, and concludes from them whether the run is over."""
-
-    def __init__(self, reporter: Reporter) -> None:
-        self._onlooker = reporter
-        self._last_at = time.monotonic()
-        self.finished = False
-
-    def update(self, progress: Progress) -> None:
-        self._last_at = time.monotonic()
-        self.finished = progress.steps[0] >= progress.steps[1]
-        self._onlooker.update(progress)
-
-    @property
-    def over(self) -> bool:
-        return time.monotonic() > self._last_at + (_OVER_S if self.finished else _SILENT_S)
 
 
 def _read_configuration(connection: Connection, token: JoinToken) -> tuple[str, str]:
