@@ -8,14 +8,12 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import subprocess
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
-from typing import IO, cast
 
 from pydantic import TypeAdapter
 
@@ -107,35 +105,21 @@ def begin_container(spec: ContainerSpec, *, run: str, origin: Origin, urdf: Path
 
 
 def _begin(run: Run, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
-    """Start the process of a run, write the record with its id, send it the order; `lay_out` makes further files."""
-    process: subprocess.Popen[bytes] | None = None
+    """Hand the run over to a process of its own; `lay_out` makes further files."""
     try:
         record.logs.mkdir(exist_ok=True)
         lay_out()
-        # The process needs a second until it can handle signals; a request to stop stays blocked until then.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
-        try:
-            process = run.start_process(record.logs, stdin=subprocess.PIPE)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        run.write(replace(record, launcher=process.pid))
-        # The process waits for the order before it changes the record, so the record has to be written first.
-        with cast(IO[bytes], process.stdin) as pipe:
-            pipe.write(order)
+        run.hand_over(record, order)
     except BaseException as error:
-        if process is not None:
-            process.kill()
-            process.wait()
         run.forget()
         if isinstance(error, OSError):
             raise WorkerError(f"run {run.id} cannot be begun: {error}") from error
         raise
-    run.close()
     return run.now()
 
 
 def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interruptions: Callable[[], int]) -> None:
-    """Launch a run in the process that `Run.start_process` has started, and prepare it before, if there is an order.
+    """Launch a run in the process that `Run.hand_over` has started, and prepare it before, if there is an order.
 
     This process has inherited the locked file. Signals that ask it to stop may be blocked until it calls this function;
     from now on, `interruptions` counts them.

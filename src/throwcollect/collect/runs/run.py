@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import IO, Any, Literal, cast
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -22,9 +22,9 @@ from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
 from throwcollect.collect.runtimes.runtime import find_runtime
 from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
-from throwcollect.errors import ConfigError, ConflictError, Interrupted, NotFoundError, WorkerError
+from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import beside, open_log, write_all
-from throwcollect.own_process import count_interruptions, make_command
+from throwcollect.own_process import count_interruptions, make_command, stop_signals
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import format_endpoint, reach_from_elsewhere, split_address
@@ -151,7 +151,7 @@ class Run:
         Returns:
             The summary of the dataset; its outcomes show whether trials are lost.
         """
-        launch = self._hand_over()
+        launch = self._take_launch()
         with count_interruptions(_find_fatal_signals()) as terminations:
             summary = launch(self, lambda: interruptions() + terminations())
         # Runs without a dataset have no summary. Only `background` prepares those, and it does not use the result.
@@ -162,9 +162,9 @@ class Run:
 
         If the user asks to stop, which `interruptions` counts, this method asks the launcher to stop, and waits for it.
         """
-        self._hand_over()
+        self._take_launch()
         try:
-            process = self.start_process(self.record.logs, stdin=subprocess.DEVNULL)
+            process = self.hand_over(self.record)
         except OSError as error:
             raise WorkerError(f"the launcher cannot be started: {error}") from error
         finally:
@@ -183,8 +183,6 @@ class Run:
             if (failure := run.record.error) is not None:
                 raise failure
             return run
-        if forwarded:
-            raise Interrupted("interrupted before any node was started")
         evidence = NodeLogs(run.record.logs).tail(LAUNCHER)
         raise WorkerError(f"run {run.id}: its launcher died", evidence=evidence or None)
 
@@ -207,7 +205,7 @@ class Run:
         self._config, self._launch, self._held, self._undo = config, launch, held, undo
         return self
 
-    def _hand_over(self) -> Launch:
+    def _take_launch(self) -> Launch:
         """Hand the prepared run over to its launcher, which writes its end and keeps its files."""
         if self._launch is None or self.lock < 0:
             raise ConflictError(f"run {self.id}: was launched already", expected="a run that is prepared, not launched")
@@ -230,17 +228,34 @@ class Run:
         if changed != self.record:
             self.write(changed)
 
-    def start_process(self, logs: Path, *, stdin: int) -> subprocess.Popen[bytes]:
-        """Start a process that takes this run over, see `background.carry_out`, and prints into the launcher's log.
+    def hand_over(self, record: RunRecord, order: bytes = b"") -> subprocess.Popen[bytes]:
+        """Start a process that takes this run over, write the record with its id, and send it the order.
 
-        The process has a session of its own, so that it outlives the terminal. It inherits the lock, which this process
-        has to close then: otherwise the run would seem to outlive its launcher.
+        The process calls `background.carry_out`, prints into the launcher's log, and has a session of its own, so that
+        it outlives the terminal. It inherits the lock, which this process releases: otherwise the run would seem to
+        outlive its launcher.
         """
         words = [*make_command(), "begin", self.id, "--lock", str(self.lock)]
-        with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
-            return subprocess.Popen(
-                words, stdin=stdin, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[self.lock]
-            )
+        # The process needs a second until it can handle signals; a request to stop stays blocked until then.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
+        try:
+            with open(open_log(NodeLogs(record.logs).path(LAUNCHER)), "ab") as log:
+                process = subprocess.Popen(
+                    words, stdin=subprocess.PIPE, stdout=log, stderr=log, start_new_session=True, pass_fds=[self.lock]
+                )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        try:
+            # The process waits for the order before it changes the record, so the record has to be written first.
+            self.write(replace(record, launcher=process.pid))
+            with cast(IO[bytes], process.stdin) as pipe:
+                pipe.write(order)
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+        self.close()
+        return process
 
     def close(self) -> None:
         """Release the lock of the run; the record stays."""

@@ -57,7 +57,7 @@ def processes(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[subprocess.Popen
         started.append(begin([sys.executable, "-ISc", PROCESS], **{**options, "stdout": subprocess.PIPE}))
         return started[-1]
 
-    monkeypatch.setattr(background.subprocess, "Popen", start)
+    monkeypatch.setattr(subprocess, "Popen", start)
     yield started
     for process in started:
         process.kill()
@@ -141,9 +141,7 @@ def test_a_run_that_cannot_be_begun_leaves_no_record_and_no_process(
     with pytest.raises(ConfigError, match="the disk is full"):
         begin(config, tmp_path)
     assert processes[0].poll() is not None
-    monkeypatch.setattr(
-        background.subprocess, "Popen", lambda *_, **__: (_ for _ in ()).throw(OSError(12, "no memory"))
-    )
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: (_ for _ in ()).throw(OSError(12, "no memory")))
     with pytest.raises(WorkerError, match=r"run a cannot be begun: .*no memory"):
         begin(config, tmp_path)
     assert list((state / "runs").iterdir()) == []

@@ -52,17 +52,6 @@ def test_every_runtime_of_the_table_is_valid_in_a_configuration() -> None:
         assert Config.model_validate({"run": {"runtime": name}}).run.runtime == name
 
 
-@pytest.mark.parametrize("name", ["docker", "local", "inprocess"])
-def test_a_runtime_describes_itself_and_holds_nothing_of_an_unknown_run(
-    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    member = get_runtime(name)
-    assert member.describe(Config())
-    assert member.simulations(Config()) in (1, Config().run.simulations)
-    assert member.outlives_launcher == (name == "docker")
-
-
 def test_a_runtime_can_be_added_by_another_package(added: None, tmp_path: Path) -> None:
     assert type(get_runtime("cluster")).__name__ == "Cluster"
     config, said = Config(), list[str]()
