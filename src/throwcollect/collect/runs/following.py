@@ -23,7 +23,7 @@ class RunUpdate:
     """A run as it was at one moment, and what has happened since the update before.
 
     Attributes:
-        progress: The latest report of the coordinator; None if there was no new one.
+        progress: The latest report of the coordinator since the last update; None if there was none.
         events: Events since the last update.
     """
 
@@ -42,7 +42,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
     """
     events = Tail(run.record.logs / EVENTS)
     events.skip()
-    yield RunUpdate(run, run.record.progress)
+    yield RunUpdate(run)
     while run.status == "running" and keep_on():
         time.sleep(_READ_S)
         known = run.record.progress
