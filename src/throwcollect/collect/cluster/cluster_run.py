@@ -133,11 +133,6 @@ class SlicesState:
         return sum(task.runs for task in self.tasks)
 
     @property
-    def waiting(self) -> int:
-        """Number of tasks that wait for a node."""
-        return sum(task.lives for task in self.tasks) - self.running
-
-    @property
     def lives(self) -> bool:
         """Whether a job of the dataset runs, or waits to run."""
         # With this reason a job waits for ever, as the job that it depends on can no longer end as it should.
