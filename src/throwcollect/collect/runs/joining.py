@@ -21,8 +21,8 @@ from throwcollect.collect.runtimes.nodes import (
     CONFIGURATION,
     LAUNCHER,
     ROBOT_FILES,
-    simulation_name_of,
-    simulation_nodes,
+    list_simulations,
+    name_simulation_on,
 )
 from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.supervisor import Supervisor
@@ -150,8 +150,8 @@ def _simulate(
         reporter.update(progress)
 
     # Names of nodes have to be unique, and several processes of one machine may join.
-    name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
-    roster = simulation_nodes([f"{name}_{index}" for index in range(host.record.simulations)], host.data)
+    name = name_simulation_on(f"{socket.gethostname()}_{os.getpid()}")
+    roster = list_simulations([f"{name}_{index}" for index in range(host.record.simulations)], host.data)
     with Supervisor(host, config.run, roster) as supervisor, RunListener(update) as listener:
         supervisor.start()
         while not interruptions() and time.monotonic() <= heard_at + (_OVER_S if finished else _SILENT_S):

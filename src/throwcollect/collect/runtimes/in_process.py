@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from throwcollect.collect.runtimes.nodes import COORDINATOR, simulation_name
+from throwcollect.collect.runtimes.nodes import COORDINATOR, name_simulation
 from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
 from throwcollect.collect.runtimes.runtime import Runtime, Session
 from throwcollect.errors import Interrupted, LossError, ThrowcollectError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _REPORT_EVERY_S = 0.2
 _IDLE_S = 0.05
-_SIMULATION = simulation_name(0)
+_SIMULATION = name_simulation(0)
 
 
 class InProcessRuntime(Runtime):

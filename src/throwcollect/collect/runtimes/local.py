@@ -27,9 +27,9 @@ from throwcollect.collect.runtimes.nodes import (
     NodeExit,
     NodeHost,
     NodeSpec,
+    choose_protocol,
     describe_end,
-    node_environment,
-    protocol_of,
+    make_environment,
 )
 from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.runtime import Runtime
@@ -83,11 +83,11 @@ class LocalNodes(NodeHost):
         else:
             self._reserved = reserve_port(config.run)
             host, port = self._reserved.getsockname()[:2]
-            protocol = protocol_of(config.run, record.middleware)
+            protocol = choose_protocol(config.run, record.middleware)
             self.listen = format_endpoint(protocol, host, port)
             self._endpoint = format_endpoint(protocol, reach_from_here(host), port)
         connection = Connection(self._endpoint, record.key, config.run.domain_id, record.middleware)
-        self._environment = {**os.environ, **node_environment(connection)}
+        self._environment = {**os.environ, **make_environment(connection)}
         self._processes: dict[str, BaseProcess] = {}
 
     @property

@@ -24,8 +24,8 @@ from throwcollect.collect.runtimes.nodes import (
     NodeRole,
     NodeSpec,
     is_simulation,
-    simulation_name,
-    simulation_nodes,
+    list_simulations,
+    name_simulation,
 )
 from throwcollect.collect.runtimes.run_listener import RunListener
 from throwcollect.collect.runtimes.runtime import Session
@@ -52,7 +52,7 @@ def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     rest_s = SERVER_REST_S if host.record.middleware.is_fast_dds else 0.0
     return [
         NodeSpec(ROUTER, ("router", "--listen", host.listen), NodeRole.VITAL, rest_s=rest_s),
-        *simulation_nodes([*map(simulation_name, range(simulations))], host.data, recordings=host.record.recordings),
+        *list_simulations([*map(name_simulation, range(simulations))], host.data, recordings=host.record.recordings),
         *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.record.collects else []),
     ]
 

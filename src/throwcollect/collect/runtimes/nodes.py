@@ -39,12 +39,12 @@ ROBOT_FILES = "robot_files"
 _SIMULATION = "sim_"
 
 
-def simulation_name(index: int) -> str:
+def name_simulation(index: int) -> str:
     """Name of a simulation's node, counted from 0."""
     return f"{_SIMULATION}{index}"
 
 
-def simulation_name_of(host: str) -> str:
+def name_simulation_on(host: str) -> str:
     """Name of the only simulation on a host, as in a container."""
     return _SIMULATION + re.sub(r"[^a-z0-9_]", "_", host.lower())
 
@@ -79,7 +79,7 @@ class NodeSpec:
     rest_s: float = 0.0
 
 
-def simulation_nodes(names: Sequence[str], data: str, *, recordings: str | None = None) -> list[NodeSpec]:
+def list_simulations(names: Sequence[str], data: str, *, recordings: str | None = None) -> list[NodeSpec]:
     """Simulations of these names, for the configuration in the directory `data`; each records for itself, if at all."""
     cores = sorted(os.sched_getaffinity(0))
     # Where simulations fill all cores, letting them move between cores was measured to cost a tenth of the speed.
@@ -191,13 +191,13 @@ class NodeHost(ABC):
         """See `runtime.Host.close`."""
 
 
-def protocol_of(run: RunConfig, middleware: Middleware) -> str:
+def choose_protocol(run: RunConfig, middleware: Middleware) -> str:
     """Protocol of a run's router: TLS, for which others have no key, unless the run is open or on Fast DDS."""
     if run.open:
         return "tcp"
     return "udp" if middleware.is_fast_dds else "tls"
 
 
-def node_environment(connection: Connection) -> Mapping[str, str]:
+def make_environment(connection: Connection) -> Mapping[str, str]:
     """Environment variables of a node that joins a run over this connection."""
     return {**connection.environment(), **SERIAL_LIBRARIES}

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from docker.client import DockerClient
 
 from throwcollect.collect.runtimes.docker.address import engine_address
-from throwcollect.collect.runtimes.docker.container_options import image_of
+from throwcollect.collect.runtimes.docker.container_options import choose_image
 from throwcollect.collect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors, find_image
 from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.config.schema import Config
@@ -39,7 +39,9 @@ def check(client: DockerClient, config: Config) -> str:
         Id of the image, which is a SHA-256 of its content.
     """
     kinds = ("router", "sim", "coordinator")
-    return _check(client, image_of(config), {f"containers.{kind}": getattr(config.containers, kind) for kind in kinds})
+    return _check(
+        client, choose_image(config), {f"containers.{kind}": getattr(config.containers, kind) for kind in kinds}
+    )
 
 
 def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:

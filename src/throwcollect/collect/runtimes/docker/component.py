@@ -15,9 +15,9 @@ from throwcollect.collect.runtimes.docker.container_options import (
     JOINED_LABEL,
     KEY,
     ROUTER_PORT,
-    container_options,
-    key_mount,
-    network_of,
+    make_container_options,
+    make_key_mount,
+    name_network,
 )
 from throwcollect.collect.runtimes.docker.containers import ANSWER_S, ContainerHost
 from throwcollect.collect.runtimes.docker.docker_engine import connect
@@ -59,7 +59,7 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
         )
     endpoint, network = connection.endpoint, None
     if runtime == "docker":
-        endpoint, network = f"{endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}", network_of(run)
+        endpoint, network = f"{endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}", name_network(run)
     elif spec.section.ports or spec.section.networks:
         raise ConfigError(
             f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",
@@ -68,7 +68,7 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
         )
     inside = Connection(endpoint, KEY, connection.domain_id, connection.middleware)
     environment = {**inside.environment(), RMW_VARIABLE: connection.middleware.rmw}
-    return JoinOptions(run, environment, key_mount(connection.key), network)
+    return JoinOptions(run, environment, make_key_mount(connection.key), network)
 
 
 class ComponentContainer(ContainerHost):
@@ -99,8 +99,8 @@ class ComponentContainer(ContainerHost):
         self._joining = joining
         self._is_running = is_running
 
-    def section_of(self, name: str) -> NodeContainerConfig:
-        """See `ContainerHost.section_of`."""
+    def find_section(self, name: str) -> NodeContainerConfig:
+        """See `ContainerHost.find_section`."""
         return self._spec.section
 
     def frozen(self) -> frozenset[str]:
@@ -123,7 +123,7 @@ class ComponentContainer(ContainerHost):
     def make_options(self, node: NodeSpec) -> tuple[dict[str, Any], Sequence[str]]:
         """See `ContainerHost.make_options`."""
         joining, spec = self._joining, self._spec
-        options = container_options(
+        options = make_container_options(
             self.record,
             spec.image,
             node.name,

@@ -21,8 +21,8 @@ from throwcollect.collect.runtimes.docker.container_options import (
     JOINED_LABEL,
     NODE_LABEL,
     RUN_LABEL,
-    container_of,
-    network_of,
+    name_container,
+    name_network,
 )
 from throwcollect.collect.runtimes.docker.docker_engine import ENGINE_ERRORS, describe_error, engine_errors
 from throwcollect.collect.runtimes.node_logs import NodeLogs
@@ -119,7 +119,7 @@ class ContainerHost(NodeHost):
         self._answered_at = time.monotonic()
 
     @abstractmethod
-    def section_of(self, name: str) -> NodeContainerConfig:
+    def find_section(self, name: str) -> NodeContainerConfig:
         """The section of the configuration, or of the catalogue, for a node's container."""
 
     @abstractmethod
@@ -217,7 +217,7 @@ class ContainerHost(NodeHost):
             return NodeExit(name, None, f"cannot be started: {describe_error(error)}", self.logs.tail(name))
         if not container.ended:
             return None
-        reason = container.describe_end(self.section_of(name).memory)
+        reason = container.describe_end(self.find_section(name).memory)
         return NodeExit(name, container.code, reason, self.logs.tail(name))
 
     def _check_engine(self) -> None:
@@ -228,7 +228,7 @@ class ContainerHost(NodeHost):
             silent = f"the Docker engine has not answered for {silent_s:.0f} s; waiting"
             self._warn(silent if self._warned else "the Docker engine answers again")
         if self._given_up:
-            left = ", ".join(container_of(self.record.run, name) for name in self.containers) or "none"
+            left = ", ".join(name_container(self.record.run, name) for name in self.containers) or "none"
             hint = f"once it answers, {command('down', '--run', self.record.run)} ends them"
             if (again := self.record.resume_command) is not None:
                 hint += f", and {again} goes on without them"
@@ -266,7 +266,7 @@ class ContainerHost(NodeHost):
         """Take in what the engine has listed of a container; None if it is gone."""
         status = "removed" if listed is None else listed["State"]
         if listed is not None:
-            network = listed["NetworkSettings"]["Networks"].get(network_of(self.record.run), {})
+            network = listed["NetworkSettings"]["Networks"].get(name_network(self.record.run), {})
             container.address = network.get("IPAddress") or None
         if status in ("exited", "dead"):
             try:

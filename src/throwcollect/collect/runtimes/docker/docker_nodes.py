@@ -13,16 +13,16 @@ from throwcollect.collect.runtimes.docker.checks import check
 from throwcollect.collect.runtimes.docker.container_options import (
     DATA,
     ROUTER_PORT,
+    find_section,
     make_labels,
-    network_of,
-    node_options,
+    make_node_options,
+    make_router_endpoint,
+    name_network,
     publishes_port,
-    router_endpoint,
-    section_of,
 )
 from throwcollect.collect.runtimes.docker.containers import ANSWER_S, ContainerHost
 from throwcollect.collect.runtimes.docker.docker_engine import connect, engine_errors
-from throwcollect.collect.runtimes.nodes import ROUTER, NodeSpec, protocol_of
+from throwcollect.collect.runtimes.nodes import ROUTER, NodeSpec, choose_protocol
 from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.run import NodeContainerConfig
 from throwcollect.config.schema import Config
@@ -48,13 +48,13 @@ class DockerNodes(ContainerHost):
         client: DockerClient | None = None,
     ) -> None:
         super().__init__(record, config, client or connect(timeout_s=ANSWER_S), warn)
-        self.listen = router_endpoint(config, record.middleware)
+        self.listen = make_router_endpoint(config, record.middleware)
         self.data = DATA
         self._image_id = check(self._client, config)
 
-    def section_of(self, name: str) -> NodeContainerConfig:
-        """See `ContainerHost.section_of`."""
-        return section_of(self.config, name)
+    def find_section(self, name: str) -> NodeContainerConfig:
+        """See `ContainerHost.find_section`."""
+        return find_section(self.config, name)
 
     def open(self) -> None:
         """Make the run's network, and watch its containers; see `NodeHost.open`."""
@@ -69,7 +69,7 @@ class DockerNodes(ContainerHost):
         Nodes on Fast DDS look up the address of their discovery server only once. A container can choose its address
         only in a network whose range was named, so a first network serves to find a free range.
         """
-        name = network_of(self.record.run)
+        name = name_network(self.record.run)
         options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": make_labels(self.record)}
         network = self._client.networks.create(name, **options)
         if self.record.middleware.is_fast_dds:
@@ -83,7 +83,7 @@ class DockerNodes(ContainerHost):
         if node.name != ROUTER or not self.record.middleware.is_fast_dds:
             return None
         with engine_errors("the engine does not report which addresses the run's network has"):
-            network = self._client.networks.get(network_of(self.record.run))
+            network = self._client.networks.get(name_network(self.record.run))
         # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
@@ -93,7 +93,7 @@ class DockerNodes(ContainerHost):
         router = self.containers.get(ROUTER)
         if router is None or router.status == "created" or router.ended:
             return None
-        protocol = protocol_of(self.config.run, self.record.middleware)
+        protocol = choose_protocol(self.config.run, self.record.middleware)
         if self.config.run.router_port:
             return format_endpoint(protocol, LOOPBACK, self.config.run.router_port)
         return format_endpoint(protocol, router.address, ROUTER_PORT) if router.address else None
@@ -101,5 +101,7 @@ class DockerNodes(ContainerHost):
     def make_options(self, node: NodeSpec) -> tuple[dict[str, Any], Sequence[str]]:
         """See `ContainerHost.make_options`."""
         address = self._address_of(node)
-        options = node_options(node, record=self.record, config=self.config, image_id=self._image_id, address=address)
-        return options, self.section_of(node.name).networks
+        options = make_node_options(
+            node, record=self.record, config=self.config, image_id=self._image_id, address=address
+        )
+        return options, self.find_section(node.name).networks

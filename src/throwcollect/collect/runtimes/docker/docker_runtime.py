@@ -33,9 +33,9 @@ class DockerRuntime(Runtime):
 
     def describe(self, config: Config) -> str:
         """See `Runtime.describe`."""
-        from throwcollect.collect.runtimes.docker.container_options import image_of
+        from throwcollect.collect.runtimes.docker.container_options import choose_image
 
-        return f"Docker containers of {image_of(config)}"
+        return f"Docker containers of {choose_image(config)}"
 
     def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
         """Make the host of a run; see `Runtime.host`."""
@@ -50,9 +50,9 @@ class DockerRuntime(Runtime):
         if is_installed("docker"):
             check_socket()
         from throwcollect.collect.runtimes.docker import docker_engine as docker
-        from throwcollect.collect.runtimes.docker.container_options import image_of
+        from throwcollect.collect.runtimes.docker.container_options import choose_image
 
-        name, patience_s = image_of(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
+        name, patience_s = choose_image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
         with closing(docker.connect(timeout_s=patience_s)) as client:
             labels = docker.ensure(client, name, say=say).labels
             if are_others(labels.get(SOURCES_LABEL)):
