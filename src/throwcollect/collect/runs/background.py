@@ -20,7 +20,7 @@ from pydantic import TypeAdapter
 from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.runs.component_container import DESCRIPTION, check_request, launch_container
 from throwcollect.collect.runs.launcher import launch
-from throwcollect.collect.runs.preparation import prepare, resume
+from throwcollect.collect.runs.preparation import add_runtime, prepare, resume
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runtimes.node_logs import NodeLogs
@@ -208,14 +208,10 @@ def _prepare_session(run: Run, order: Order, reporter: Reporter) -> Run:
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
         reserve_port(config.run).close()
-        name, middleware = choose(config, say=reporter.say, warn=reporter.warn)
-        runtime = get_runtime(name)
+        choice = choose(config, say=reporter.say, warn=reporter.warn)
         # Containers do not see the directory.
-        recordings = str(order.output) if name == "local" else None
-        simulations = runtime.simulations(config)
-        run.update(runtime=name, middleware=middleware, simulations=simulations, recordings=recordings)
-        # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
-        runtime.host(run.record, config, warn=reporter.warn).close()
+        record = replace(run.record, recordings=str(order.output) if choice[0] == "local" else None)
+        run.write(add_runtime(record, config, *choice, reporter=reporter))
         launching = partial(launch, config=config, reporter=reporter)
         return run.prepared(config, directory, launching, held=ExitStack(), undo=ExitStack())
 

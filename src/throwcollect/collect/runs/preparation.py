@@ -16,6 +16,7 @@ from throwcollect.collect.runs.launcher import launch
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runs.run_selection import refuse_busy
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.runtime import choose, get_runtime
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
@@ -178,22 +179,10 @@ def prepare_run(
         if callable(plan):
             undo.callback(remove_plan, directory, made=is_new)
         # A runtime may take minutes to get an image, so it is chosen after all other checks.
-        name, middleware = choice or choose(config, say=reporter.say, warn=reporter.warn)
-        runtime = get_runtime(name)
-        record = replace(
-            record,
-            runtime=name,
-            directory=Path(os.path.realpath(directory)),
-            logs=directory.absolute() / "logs",
-            launcher=os.getpid(),
-            domain_id=config.run.domain_id,
-            simulations=runtime.simulations(config),
-            middleware=middleware,
-        )
-        # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
-        runtime.host(record, config, warn=reporter.warn).close()
-        run.write(record)
-        _warn_if_others_may_join(config, middleware, reporter)
+        choice = choice or choose(config, say=reporter.say, warn=reporter.warn)
+        place, logs = Path(os.path.realpath(directory)), directory.absolute() / "logs"
+        run.write(add_runtime(replace(record, directory=place, logs=logs), config, *choice, reporter=reporter))
+        _warn_if_others_may_join(config, choice[1], reporter)
         reporter.say(f"plan: {describe_plan(made)}; dataset: {directory}")
         if config.sensors:
             from throwcollect.collect.coordinator.sensor_cost import measure_sensors
@@ -204,6 +193,21 @@ def prepare_run(
                     reporter.say(cost.words)
         launching = partial(launch, config=config, reporter=reporter)
         return run.prepared(config, directory, launching, held=held.pop_all(), undo=undo.pop_all())
+
+
+def add_runtime(
+    record: RunRecord, config: Config, name: str, middleware: Middleware, *, reporter: Reporter
+) -> RunRecord:
+    """Complete a record by the runtime of its run, and check that this can host the run."""
+    runtime = get_runtime(name)
+    simulations = config.run.simulations if runtime.can_be_scaled else 1
+    domain, launcher = config.run.domain_id, os.getpid()
+    record = replace(
+        record, runtime=name, middleware=middleware, simulations=simulations, domain_id=domain, launcher=launcher
+    )
+    # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
+    runtime.host(record, config, warn=reporter.warn).close()
+    return record
 
 
 def _warn_if_others_may_join(config: Config, middleware: Middleware, reporter: Reporter) -> None:

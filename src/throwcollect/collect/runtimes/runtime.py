@@ -139,10 +139,6 @@ class Runtime(ABC):
         """Examine the runtime for `doctor`; None if there is nothing to report."""
         return None
 
-    def simulations(self, config: Config) -> int:
-        """Number of simulations with which a run begins."""
-        return config.run.simulations if self.can_be_scaled else 1
-
     def remove(self, run: str) -> list[str]:
         """Remove everything that the runtime holds of a run, but no directory with a dataset.
 
