@@ -31,22 +31,26 @@ def submit(
         dry_run: Print the batch script, and do nothing else.
         wait: Follow it until the dataset is finished.
     """
+    from throwcollect.collect.cluster.submission import CLUSTER, LOGS
     from throwcollect.collect.cluster.submit import submit as submit_dataset
 
     changes = overrides(settings, trials=trials)
     reporter = display(quiet=json, bar=False)
-    done = submit_dataset(config, output, tasks, overrides=changes, dry=dry_run, reporter=reporter)
-    if done.job is None:
-        typer.echo(done.script, nl=False)
+    script, job = submit_dataset(config, output, tasks, overrides=changes, dry=dry_run, reporter=reporter)
+    directory = output.absolute()
+    if job is None:
+        typer.echo(script, nl=False)
         words = [word for change in changes for word in ("--set", change)]
-        tell(f"before it is submitted by hand: {command('plan', config, *words, '--output', done.directory)}")
-        tell(f"and, as Slurm makes no directory for logs: {shlex.join(['mkdir', '-p', str(done.logs)])}")
-        tell(f"after its last task: {command('join', done.directory)}")
+        tell(f"before it is submitted by hand: {command('plan', config, *words, '--output', directory)}")
+        tell(
+            f"and, as Slurm makes no directory for logs: {shlex.join(['mkdir', '-p', str(directory / CLUSTER / LOGS)])}"
+        )
+        tell(f"after its last task: {command('join', directory)}")
     elif wait:
         from throwcollect.cli.cluster_runs import follow_to_the_end
 
-        follow_to_the_end(done.directory, as_json=json)
+        follow_to_the_end(directory, as_json=json)
     else:
-        show({"directory": done.directory, "array": done.job.array, "join": done.job.join}, json=json)
+        show({"directory": directory, "array": job.array, "join": job.join}, json=json)
         if not json:
-            tell(f"follow it: {command('wait', '--run', done.directory)}   (or logs, stop)")
+            tell(f"follow it: {command('wait', '--run', directory)}   (or logs, stop)")

@@ -150,8 +150,7 @@ def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
 def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
     from throwcollect.collect.cluster.submit import submit_missing
 
-    submitted = submit_missing(directory, overrides=changes, reporter=display(quiet=json, bar=False))
-    job = submitted.job if submitted is not None else None
+    job = submit_missing(directory, overrides=changes, reporter=display(quiet=json, bar=False))
     numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
     show({"directory": directory.absolute(), **numbers}, json=json)
     if job is None and not json:

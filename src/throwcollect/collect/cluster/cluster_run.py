@@ -11,7 +11,7 @@ from pathlib import Path
 
 from throwcollect.collect.cluster import slurm
 from throwcollect.collect.cluster.slurm import ArrayTask
-from throwcollect.collect.cluster.submission import CLUSTER, Submission, read_submission
+from throwcollect.collect.cluster.submission import CLUSTER, LOGS, Submission, read_submission
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import read_config
@@ -95,7 +95,7 @@ class ClusterRun:
 
     def log(self, index: int) -> Path | None:
         """Find the latest log of a task of an array; None if it has written none."""
-        logs = self.directory / CLUSTER / "logs"
+        logs = self.directory / CLUSTER / LOGS
         found = [path for job in self.submission.jobs if (path := logs / f"{job.array}_{index}.log").exists()]
         return found[-1] if found else None
 

@@ -14,6 +14,8 @@ from throwcollect.plan.slice import Slice
 CLUSTER = "cluster"
 """Name of the directory of scripts and logs, inside the directory of a dataset."""
 
+LOGS = "logs"
+"""Name of the directory of logs in it."""
 _FILE = "submission.json"
 
 

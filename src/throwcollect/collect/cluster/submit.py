@@ -7,7 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from throwcollect.collect.cluster import slurm
@@ -16,6 +16,7 @@ from throwcollect.collect.cluster.script import BatchScripts
 from throwcollect.collect.cluster.slurm import with_site
 from throwcollect.collect.cluster.submission import (
     CLUSTER,
+    LOGS,
     Job,
     Submission,
     format_indexes,
@@ -43,21 +44,7 @@ from throwcollect.wording import command, format_count
 
 _SIF_COMMAND = "make sif"
 """Command that makes the SIF of this version, in a clone of the project."""
-_COLLECT, _JOIN, _LOGS = "collect.sh", "join.sh", "logs"
-
-
-@dataclass(frozen=True)
-class Submitted:
-    """What was submitted for a dataset, whose path is absolute; a dry run has only the script of a task, and no job."""
-
-    directory: Path
-    script: str
-    job: Job | None = None
-
-    @property
-    def logs(self) -> Path:
-        """Directory of the logs of tasks."""
-        return self.directory / CLUSTER / _LOGS
+_COLLECT, _JOIN = "collect.sh", "join.sh"
 
 
 def submit(
@@ -68,7 +55,7 @@ def submit(
     overrides: Sequence[str] = (),
     dry: bool = False,
     reporter: Reporter,
-) -> Submitted:
+) -> tuple[str, Job | None]:
     """Plan a dataset and submit it as an array of tasks.
 
     Args:
@@ -78,6 +65,9 @@ def submit(
         overrides: Overrides of keys of the configuration, as ``--set`` takes them.
         dry: Whether to make only the script, and write nothing.
         reporter: Receives what is planned and submitted.
+
+    Returns:
+        The script of a task, and what was submitted; None if nothing was.
     """
     directory = directory.absolute()
     with load_locating_errors(config, overrides) as read, ExitStack() as undo:
@@ -88,7 +78,7 @@ def submit(
         scripts = _make_scripts(complete, directory)
         slices = tuple(range(tasks))
         if dry:
-            return Submitted(directory, scripts.collect(tasks, format_indexes(slices)))
+            return scripts.collect(tasks, format_indexes(slices)), None
         if is_submitted(directory):
             raise ConfigError(
                 f"{directory}: was submitted already", hint=f"{command('resume', directory)} submits what is missing"
@@ -104,13 +94,13 @@ def submit(
         return submitted
 
 
-def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: Reporter) -> Submitted | None:
+def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: Reporter) -> Job | None:
     """Submit the slices of a dataset that are neither finished nor in the queue.
 
     Overrides may change only keys that do not change the dataset.
 
     Returns:
-        The submission; None if nothing is missing.
+        What was submitted; None if nothing is missing.
     """
     directory = directory.absolute()
     submission = read_submission(directory)
@@ -129,10 +119,12 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: 
         program=submission.program,
         image=None if submission.image is None else Path(submission.image),
     )
-    return _submit(scripts, submission, missing, reporter)
+    return _submit(scripts, submission, missing, reporter)[1]
 
 
-def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], reporter: Reporter) -> Submitted:
+def _submit(
+    scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], reporter: Reporter
+) -> tuple[str, Job]:
     """Write the scripts and submit them; without slices, submit only the job that joins what is finished."""
     directory = scripts.directory
     try:
@@ -141,34 +133,29 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
         raise unwritable(scripts.logs, error) from error
     with ExitStack() as undo:
 
-        def submit_job(script: Path, *options: str) -> str:
+        def submit_job(name: str, text: str, *options: str) -> str:
+            script = directory / CLUSTER / name
+            write_file(script, text.encode())
             job = slurm.submit(script, *options)
             # Until the record names the job, no command finds it again, and a failure removes the files that it needs.
             undo.callback(slurm.cancel, [job])
             return job
 
         text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
-        join = _write(directory, _JOIN, scripts.join())
+        join = _JOIN, scripts.join()
         if slices:
-            array = submit_job(_write(directory, _COLLECT, text))
+            array = submit_job(_COLLECT, text)
             # The joining job starts after all tasks, however they end, and reports what is missing then.
-            joining = submit_job(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
+            joining = submit_job(*join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
             message = f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
         else:
-            array, joining = "", submit_job(join)
+            array, joining = "", submit_job(*join)
             message = f"submitted job {joining}, which joins the slices; all of them are finished"
         job = Job(array, joining, slices)
         write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
         undo.pop_all()
     reporter.say(message)
-    return Submitted(directory, text, job)
-
-
-def _write(directory: Path, name: str, text: str) -> Path:
-    """Write a script into the directory of a dataset."""
-    path = directory / CLUSTER / name
-    write_file(path, text.encode())
-    return path
+    return text, job
 
 
 def _make_scripts(config: Config, directory: Path) -> BatchScripts:
@@ -183,7 +170,7 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
         # Many login nodes have no Apptainer, though the nodes of tasks have.
         if shutil.which("apptainer") is not None:
             check_sif(image)
-    return BatchScripts(config, directory, directory / CLUSTER / _LOGS, tuple(make_command()), image)
+    return BatchScripts(config, directory, directory / CLUSTER / LOGS, tuple(make_command()), image)
 
 
 def _freeze(config: Config, directory: Path, sweep_directory: Path, reporter: Reporter) -> None:
