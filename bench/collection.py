@@ -17,7 +17,7 @@ from throwcollect.collect.runtimes.local import LocalNodes
 from throwcollect.collect.runtimes.node_collection import roster
 from throwcollect.collect.runtimes.nodes import NodeHost
 from throwcollect.collect.runtimes.run_listener import RunListener
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
@@ -130,8 +130,8 @@ def _key(directory: Path) -> RunKey:
     return key
 
 
-def _place(name: str, directory: Path) -> RunContext:
-    return RunContext(name, directory, directory / "logs", 0, Middleware.of_process(), _key(directory))
+def _place(name: str, directory: Path) -> RunRecord:
+    return RunRecord(name, directory, directory / "logs", 0, Middleware.of_process(), _key(directory))
 
 
 def local_runtime(plan: Plan, directory: Path) -> NodeHost:

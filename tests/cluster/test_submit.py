@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import re
 import shlex
 import shutil
-import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -69,16 +66,6 @@ def states(slurm: Slurm, array: str) -> dict[str, tuple[str, str]]:
     return {index: (state, node) for index, state, node in (line.strip().split("|") for line in lines.splitlines())}
 
 
-@contextmanager
-def small_disk(directory: Path) -> Iterator[None]:
-    """A disk on which a slice has no room."""
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "throwcollect-test", directory], check=True)
-    try:
-        yield
-    finally:
-        subprocess.run(["umount", directory], check=True)
-
-
 def wait_until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
     deadline = time.monotonic() + seconds
     while not condition():
@@ -111,21 +98,14 @@ def limited(slurm: Slurm, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 def test_resume_submits_only_the_missing_slices(
     slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:
-    """A task is cancelled, the disk of another one is full, and then the joining job is cancelled."""
+    """A task is cancelled, and then the joining job."""
     config, whole = short
     data = tmp_path / "with blank" / "data"
-    for index in range(TASKS):
-        (tmp_path / "disk" / str(index)).mkdir(parents=True)
-    with small_disk(tmp_path / "disk" / "1"):
-        disks = f"cluster.scratch={tmp_path}/disk/$SLURM_ARRAY_TASK_ID"
-        array = submit(slurm, config, data, "cluster.at_once=2", disks)
-        slurm.run("scancel", f"{array}_2")
-        said = call(slurm, "wait", "--run", data, expect=3)
-        assert re.search(r"2 slices of 3 not collected: 1 \(FAILED, exit code 4:0, node \w+\) and 2", said)
+    array = submit(slurm, config, data, "cluster.at_once=2")
+    slurm.run("scancel", f"{array}_2")
+    assert "1 slice of 3 not collected: cancelled" in call(slurm, "wait", "--run", data, expect=130)
     assert "0 | slice 0/3: trials 0 to 7" in call(slurm, "logs", "0", "--run", data)
-    printed = call(slurm, "logs", "1", "--run", data)
-    assert re.search(r"/disk/1/.* cannot be written: No space left on device\n.*free space on that disk", printed)
-    assert "2 tasks;" in call(slurm, "resume", data)
+    assert "1 task;" in call(slurm, "resume", data)
     slurm.run("scancel", read_submission(data).jobs[-1].join)
     assert "all slices are finished, but they are not joined" in call(slurm, "wait", "--run", data, expect=3)
     assert "joins the slices; all of them are finished" in call(slurm, "resume", data)
@@ -165,13 +145,11 @@ def test_a_node_that_does_not_see_the_directory_is_named(
     assert fingerprints(data) == whole
 
 
-def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
+def test_a_run_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
     config = configure(tmp_path, trials=60)
     data = tmp_path / "data"
     array = submit(slurm, config, data, SLOW)
     wait_until(lambda: any(state == "RUNNING" for state, _ in states(slurm, array).values()))
-    (listed,) = [run for run in json.loads(call(slurm, "ps", "--json")) if run.get("directory") == str(data)]
-    assert (listed["run"], listed["tasks"]) == (array, TASKS)
     assert "not complete" in call(slurm, "stop", "--run", data)
     assert not any(state in ("PENDING", "RUNNING") for state, _ in states(slurm, array).values())
     assert "3 slices of 3 not collected: cancelled" in call(slurm, "wait", "--run", data, expect=130)
@@ -219,26 +197,6 @@ def test_another_user_can_submit_the_printed_script_with_an_image(
     slurm.run("sbatch", "--wait", "collect.sh", user=USER, cwd=shared)
     slurm.run(*inside, *join, user=USER, cwd=shared)
     assert fingerprints(data) == whole
-
-
-def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=200)
-    grows = ("until.landed=20", "sweep.sampler=sobol")
-    with runs.prepare(config, overrides=["run.runtime=inprocess", *grows], output=tmp_path / "whole") as run:
-        run.collect()
-    data = tmp_path / "with blank" / "data"
-    # Slow enough that joining machines find trials left, even if this one is busy.
-    slowly = "sim.real_time_factor=4"
-    settings = [word for setting in ("cluster.memory=1G", slowly, *grows) for word in ("--set", setting)]
-    arguments = ("submit", config, "--output", data, "--tasks", "3", "--mode", "live", *settings)
-    said = call(slurm, *arguments, "--wait")
-    assert "one run on 3 nodes" in said
-    assert recordings(fingerprints(data)) == recordings(fingerprints(tmp_path / "whole"))
-    printed = call(slurm, "logs", "--run", data)
-    assert printed.count("1 simulation of this machine will join") == 2
-    # The joined simulations end some seconds later, and then the script ends.
-    wait_until(lambda: not (data / "cluster" / "token").exists())
-    assert "nothing is left to submit" in call(slurm, "resume", data)
 
 
 def test_the_file_of_the_site_gives_defaults_for_cluster_keys(

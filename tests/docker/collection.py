@@ -19,7 +19,7 @@ from throwcollect.collect.runtimes.docker.containers import remove
 from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.collect.runtimes.node_collection import roster
 from throwcollect.collect.runtimes.nodes import NodeExit
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
@@ -110,9 +110,9 @@ def key_in(directory: Path) -> RunKey:
     return key
 
 
-def place_of(run: str, dataset: Path, key: RunKey) -> RunContext:
+def place_of(run: str, dataset: Path, key: RunKey) -> RunRecord:
     """A run whose logs lie beside the dataset."""
-    return RunContext(run, dataset, dataset / "logs", 2, Middleware(), key)
+    return RunRecord(run, dataset, dataset / "logs", 2, Middleware(), key)
 
 
 @contextmanager

@@ -12,9 +12,9 @@ from docker.client import DockerClient
 from throwcollect.collect.runs import control
 from throwcollect.collect.runs.background import begin_container, begin_run
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin
 from throwcollect.collect.runtimes.docker.container_options import RUN_LABEL
 from throwcollect.collect.runtimes.docker.docker_engine import default_tag
+from throwcollect.collect.runtimes.run_record import Origin
 from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -47,7 +47,7 @@ def test_a_container_hears_the_run_that_it_joined_and_ends_with_it(
         command = ("ros", "topic", "echo", "/sim_0/clock")
         spec = ContainerSpec(default_tag(), command, NodeContainerConfig(memory="512m"))
         ear = begin_container(spec, run="ear-1", origin=Origin("ear", joins=session.id), urdf=None)
-        heard = Path(ear.record.logs) / "container.log"
+        heard = ear.record.logs / "container.log"
         until(lambda: heard.is_file() and "nanosec:" in heard.read_text())
         assert runs_all(ear)
     finally:

@@ -249,7 +249,6 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     line: CutLine,
     bare: Any,
     client: DockerClient,
-    tmp_path: Path,
     trouble: str,
     evidence: str,
 ) -> None:
@@ -259,9 +258,8 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     until(lambda: runtime.logs.tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     getattr(line, trouble)()
-    with pytest.raises(WorkerError, match=r"engine has not answered for \d+ s; .* safe in \S+") as caught:
+    with pytest.raises(WorkerError, match=r"engine has not answered for \d+ s") as caught:
         until(lambda: bool(runtime.exits()))
-    assert caught.value.message.endswith(str(tmp_path))
     left = client.containers.get(handle).name
     assert (caught.value.evidence, caught.value.exit_code) == (f"{evidence}containers that may run on: {left}", 3)
     runtime.close()

@@ -14,7 +14,7 @@ import docker
 import pytest
 
 from tests.docker.collection import pause
-from tests.e2e.collection import FAST, SEEING, Running, call, call_here, collect_here, fingerprints, start, write_config
+from tests.e2e.collection import FAST, SEEING, Running, call, collect_here, fingerprints, start, write_config
 from throwcollect.collect.runtimes.docker.container_options import DIRECTORY_LABEL
 from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 
@@ -76,19 +76,6 @@ def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
     provenance = json.loads((directory / "provenance.json").read_text(encoding="utf-8"))
     assert provenance["image"] == engine.images.get(default_tag()).id
     assert {path.stat().st_uid for path in directory.rglob("*")} == {os.getuid()}
-
-
-def test_down_removes_the_containers_of_a_killed_launcher(
-    config: Path, engine: docker.DockerClient, tmp_path: Path
-) -> None:
-    directory = tmp_path / "data"
-    running = start(config, directory, 1, "--runtime", "docker")
-    running.wait_until(lambda: len(containers_of(engine, directory)) == 3)
-    running.process.kill()
-    running.process.communicate()
-    done = call_here("down", "--run", directory)
-    assert done.returncode == 0, done.stderr
-    assert not containers_of(engine, directory)
 
 
 def test_ctrl_c_leaves_no_containers_networks_or_keys_behind(

@@ -31,7 +31,7 @@ def serve(catalogue: Path, datasets: Path, models: Path | None = None) -> Iterat
             server.terminate()
             # Runs outlive their server, so they are ended here.
             for run in Records().all():
-                if run.lives and datasets in Path(run.record.directory).parents:
+                if run.lives and datasets in run.record.directory.parents:
                     os.kill(run.record.launcher, signal.SIGTERM)
 
 

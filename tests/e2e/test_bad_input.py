@@ -158,7 +158,7 @@ def test_a_collection_goes_on_when_its_output_pipe_is_closed(lost: str, small: P
     os.close(writing)
     collecting.communicate(timeout=60)
     assert collecting.returncode == (6 if lost == "both" else 0)
-    (run,) = [run for run in Records().all() if run.record.directory == str(tmp_path / "data")]
+    (run,) = [run for run in Records().all() if run.record.directory == tmp_path / "data"]
     assert (run.record.exit_code, run.record.failure) == (0, None)
     assert run.record.progress is not None
     assert run.record.progress.ended == 2

@@ -22,7 +22,7 @@ import pytest
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
 from tests.e2e.collection import FAST, Running, call, journal, start, write_config
 from throwcollect.collect.runs.records import Records
-from throwcollect.collect.runs.run_record import RunRecord
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.dataset.directory import CARD
 from throwcollect.errors import UnreachableError
 from throwcollect.run_key import RunKey

@@ -259,7 +259,7 @@ def test_a_machine_without_the_token_cannot_join(tmp_path: Path, machines: list[
 
 
 def test_a_token_is_read_from_standard_input() -> None:
-    done = subprocess.run(command("join-run", "-"), input="tc2.e30\n", capture_output=True, text=True, check=False)
+    done = subprocess.run(command("join-run", "-"), input="tc3.e30\n", capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "this is no token of a run" in done.stderr
 
@@ -272,9 +272,9 @@ def test_only_the_owner_can_read_the_file_of_the_token(tmp_path: Path) -> None:
     arguments = ("up", path, "--output", tmp_path / "data", "-n", "1", "--listen", f"tcp/127.0.0.1:{port}")
     done = call(*arguments, "--token-file", tmp_path / "token")
     assert done.returncode == 0, done.stderr
-    assert "tc2." not in done.stdout + done.stderr
+    assert "tc3." not in done.stdout + done.stderr
     assert (tmp_path / "token").stat().st_mode & 0o777 == 0o600
-    assert (tmp_path / "token").read_text().startswith("tc2.")
+    assert (tmp_path / "token").read_text().startswith("tc3.")
     done = call_here("up", path, "--output", tmp_path / "other", "--token-file", tmp_path / "token")
     assert done.returncode == 2
     assert "other machines cannot join the run" in done.stderr

@@ -268,7 +268,7 @@ def viewed() -> Iterator[str]:
     call_here("down", "--run", "server")
 
 
-def test_ps_lists_the_server_that_view_begins_and_stop_ends_it_if_no_run_lives(
+def test_ps_lists_the_server_that_view_begins_and_stop_ends_it_by_its_name(
     config: Path, records: Records, viewed: str, tmp_path: Path
 ) -> None:
     (listed,) = list_runs()
@@ -280,6 +280,6 @@ def test_ps_lists_the_server_that_view_begins_and_stop_ends_it_if_no_run_lives(
     assert [each["run"] for each in list_runs()] == [run, "server"]
     assert say("stop")[1].startswith(f"{run}: stopped")
     assert list_runs() == [listed]
-    assert say("stop") == (0, f"server: stopped; it was at {viewed}\n", "")
+    assert say("stop", "--run", "server") == (0, f"server: stopped; it was at {viewed}\n", "")
     assert list_runs() == []
     assert say("stop", "--run", "server")[0] == 2

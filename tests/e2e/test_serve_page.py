@@ -18,7 +18,6 @@ from tests.e2e.collection import FAST, collect_here, write_config
 from tests.e2e.page import CHANGED, find_own_errors, load, press, serve, slide
 from tests.unit.serve.made_model import make_model
 from throwcollect.collect.runs.records import Records
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.serve.finding import find_server, make_page_address
 
 pytestmark = pytest.mark.e2e
@@ -120,9 +119,8 @@ def test_a_session_is_recorded_by_a_button(address: str) -> None:
 def over(tmp_path: Path) -> Iterator[tuple[str, str]]:
     """Two runs that have ended; the dataset of the first one is not there."""
     runs, now = [Records().new(name) for name in ("early", "late")], datetime.now(timezone.utc)
-    for run, place in zip(runs, ("/none", str(tmp_path / "data")), strict=True):
-        record = RunRecord(run.id, "small", "local", place, f"{place}/logs", 0, now, 1, 1, ended=now, exit_code=0)
-        run.write(record)
+    for run, place in zip(runs, (Path("/none"), tmp_path / "data"), strict=True):
+        run.write(run.begin("small", place, runtime="local", ended=now, exit_code=0))
         run.close()
     yield runs[0].id, runs[1].id
     for run in runs:

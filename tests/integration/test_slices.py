@@ -23,7 +23,7 @@ from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.slices import SLICES, find_attempts, find_finished, join, make_attempt, publish
 from throwcollect.episode.episode_message import Episode
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError
+from throwcollect.errors import DatasetError, Interrupted, LossError, ThrowcollectError
 from throwcollect.files import unwritable
 from throwcollect.plan.slice import Slice
 from throwcollect.sim.simulator import Simulator
@@ -247,7 +247,7 @@ def test_a_full_disk_ends_the_attempt_and_a_later_one_goes_on_with_its_episodes(
 
 
 def test_a_slice_with_a_lost_trial_keeps_its_others_for_the_next_attempt(
-    frozen: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    frozen: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin, refused, begun = Simulator.begin, True, set[int]()
 
@@ -258,40 +258,12 @@ def test_a_slice_with_a_lost_trial_keeps_its_others_for_the_next_attempt(
         begin(self, trial, values, **further)
 
     monkeypatch.setattr(Simulator, "begin", begin_or_refuse)
-    on_scratch = [*INPROCESS, f"cluster.scratch={tmp_path / 'scratch'}"]
     with pytest.raises(LossError):
-        collect_slice(frozen, Slice(0, 2), overrides=on_scratch)
-    assert not list((tmp_path / "scratch").iterdir())
+        collect_slice(frozen, Slice(0, 2), overrides=INPROCESS)
     refused = False
     begun.clear()
-    collect_slice(frozen, Slice(0, 2), overrides=on_scratch)
+    collect_slice(frozen, Slice(0, 2), overrides=INPROCESS)
     assert begun == {1}
     collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
-
-
-def test_a_slice_is_collected_on_a_disk_of_the_node_and_handed_over(
-    frozen: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    scratch = tmp_path / "scratch"
-    monkeypatch.setenv("DISK_OF_THE_NODE", str(scratch))
-    on_scratch = [*INPROCESS, "cluster.scratch=$DISK_OF_THE_NODE"]
-    seen: list[Path] = []
-
-    def interruptions() -> int:
-        seen.extend(scratch.glob("0-of-2.attempt-*/*.part"))
-        return int(any(path.exists() and path.stat().st_size > 50_000 for path in seen))
-
-    with pytest.raises(Interrupted):
-        collect_slice(frozen, Slice(0, 2), overrides=on_scratch, interruptions=interruptions)
-    assert seen
-    assert not list(scratch.iterdir())
-    reporter = Listener()
-    collect_slice(frozen, Slice(0, 2), overrides=on_scratch, reporter=reporter)
-    assert any("of an earlier collection" in line for line in reporter.lines)
-    collect(frozen, "1/2")
-    join(frozen)
-    assert fingerprints(frozen) == fingerprints(whole)
-    with pytest.raises(ConfigError, match=r"cluster.scratch: \$MISSING is \$MISSING here, not an absolute path"):
-        collect_slice(frozen, Slice(0, 3), overrides=[*INPROCESS, "cluster.scratch=$MISSING"])

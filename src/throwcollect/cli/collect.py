@@ -90,10 +90,9 @@ def up(
 
 def _refuse_submitted(directory: Path) -> None:
     """Refuse a dataset whose slices tasks of a cluster collect."""
-    from throwcollect.collect.cluster.submission import is_submitted, read_submission
+    from throwcollect.collect.cluster.submission import is_submitted
 
-    # A submission that is one run on several nodes goes on by the same command.
-    if is_submitted(directory) and not read_submission(directory).live:
+    if is_submitted(directory):
         raise ConfigError(
             f"--resume {directory}: was submitted, so tasks of a cluster collect it",
             hint=f"{command('resume', directory)} submits what is missing",
@@ -151,8 +150,7 @@ def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
 def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
     from throwcollect.collect.cluster.submit import submit_missing
 
-    submitted = submit_missing(directory, overrides=changes, reporter=display(quiet=json, bar=False))
-    job = submitted.job if submitted is not None else None
+    job = submit_missing(directory, overrides=changes, reporter=display(quiet=json, bar=False))
     numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
     show({"directory": directory.absolute(), **numbers}, json=json)
     if job is None and not json:
@@ -270,7 +268,7 @@ def _collect(
     from throwcollect.cli.dataset.info import print_collected, print_summary
 
     if run is not None:
-        print_collected(summary, run.directory, as_json=json, hint=run.context.resume_command)
+        print_collected(summary, run.directory, as_json=json, hint=run.record.resume_command)
     elif directory is not None:
         from throwcollect.dataset.inspect import info
 

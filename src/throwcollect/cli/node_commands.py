@@ -39,10 +39,10 @@ def sim(
     """
     from socket import gethostname
 
-    from throwcollect.collect.runtimes.nodes import simulation_name_of
+    from throwcollect.collect.runtimes.nodes import name_simulation_on
     from throwcollect.ros.nodes.simulation.process import run
 
-    run(config, name=name or simulation_name_of(gethostname()), namespace=namespace, record=record)
+    run(config, name=name or name_simulation_on(gethostname()), namespace=namespace, record=record)
 
 
 def sensors(config: ConfigArgument = DEFAULT_CONFIG, *, namespace: str = "/sim_0") -> None:

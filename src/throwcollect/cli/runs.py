@@ -20,7 +20,7 @@ from throwcollect.wording import command, format_count
 if TYPE_CHECKING:
     from throwcollect.collect.cluster.cluster_run import ClusterRun
     from throwcollect.collect.runs.run import Run
-    from throwcollect.collect.runs.run_record import RunRecord
+    from throwcollect.collect.runtimes.run_record import RunRecord
 
 _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 _HEADINGS = ("RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET")
@@ -32,7 +32,6 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
     Options:
         everything (-a --all): Runs that have ended, too.
     """
-    from throwcollect.collect.cluster.submission import find_queued
     from throwcollect.collect.runs.records import Records
     from throwcollect.serve.finding import SERVER, find_living
 
@@ -45,21 +44,16 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
             tell(f"throwcollect: {error}")
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
-    queued, server = find_queued(), find_living()
-    tasks = []
-    if queued:
-        from throwcollect.cli.cluster_runs import list_queued, make_document, make_row
-
-        tasks = list_queued(queued)
+    server = find_living()
     if json:
-        documents = [*map(_make_document, shown), *(make_document(*each) for each in tasks)]
+        documents = [*map(_make_document, shown)]
         if server is not None:
             documents.append(
                 {"run": SERVER, "kind": "server", "status": "running", "url": server.url, "pid": server.pid}
             )
         show(documents, json=True)
         return
-    rows = [*((_make_row(run), _list_node_lines(run)) for run in shown), *((make_row(*each), []) for each in tasks)]
+    rows = [(_make_row(run), _list_node_lines(run)) for run in shown]
     if server is not None:
         rows.append(((SERVER, "-", "-", "-", f"running at {server.url}, pid {server.pid}", "-"), []))
     for line in _make_table(rows):
@@ -92,7 +86,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     if found.status == "died":
         raise describe_death(found)
     if record.summary is not None:
-        print_summary(record.summary, Path(record.directory), as_json=json)
+        print_summary(record.summary, record.directory, as_json=json)
     if (error := record.error) is not None:
         raise error
 
@@ -118,11 +112,6 @@ def logs(nodes: list[str] | None = None, *, follow: bool = False, run: RunOption
 
 def events(run: RunOption = None, json: JsonOption = False) -> None:
     """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
-    if (submitted := _find_submitted(run)) is not None:
-        from throwcollect.cli.cluster_runs import print_events
-
-        print_events(submitted, as_json=json)
-        return
     from throwcollect.collect.runs.following import read_events
     from throwcollect.collect.runs.run_selection import find_run_to_watch
 
@@ -145,7 +134,7 @@ def scale(simulations: int, *, run: RunOption = None) -> None:
 
 
 def stop(run: RunOption = None) -> None:
-    """Finish the running trials of a run, close its files and end it; if no run lives, end the server."""
+    """Finish the running trials of a run, close its files and end it; `--run server` ends the server."""
     if _end_elsewhere(run):
         return
     from throwcollect.collect.runs import control
@@ -177,18 +166,14 @@ def down(*, run: RunOption = None) -> None:
     from throwcollect.collect.runs import control
     from throwcollect.collect.runs.run_selection import find_run_to_change
 
-    # A run without a record may be another user's, so it is removed only if it is named.
-    found = find_run_to_change(None, died=True) if run is None else run
-    ended, removed = control.down(found)
-    for name in removed:
+    found = find_run_to_change(run, died=True)
+    for name in control.down(found):
         tell(f"removed {name}")
-    typer.echo(f"{ended}: ended and forgotten")
+    typer.echo(f"{found.id}: ended and forgotten")
 
 
 def _end_elsewhere(named: str | None) -> bool:
-    """End a submitted dataset, or the server, if a command means one of them.
-
-    It means the server by its name, unless a run has that, or if no run is there to end.
+    """End a submitted dataset, or the server, if a command names one of them, and no run has that name.
 
     Returns:
         Whether there was one to end.
@@ -201,44 +186,33 @@ def _end_elsewhere(named: str | None) -> bool:
     from throwcollect.collect.runs.records import Records
     from throwcollect.serve.finding import SERVER, end_server
 
-    if named is None:
-        is_run = any(run.status in ("running", "died") for run in Records().all())
-    else:
-        is_run = named != SERVER or named in Records().ids()
-    if is_run or (address := end_server()) is None:
+    if named != SERVER or named in Records().ids() or (address := end_server()) is None:
         return False
     typer.echo(f"{SERVER}: stopped; it was at {address.url}")
     return True
 
 
 def _find_submitted(run: str | None) -> ClusterRun | None:
-    """Find the submitted dataset that a command means; None if it means a run of this machine."""
-    from throwcollect.collect.runs.records import Records
+    """Find the submitted dataset whose directory a command names; None if it means a run of this machine."""
+    from throwcollect.collect.cluster.submission import is_submitted
 
-    # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
-    if run is None and any(each.status == "running" for each in Records().all()):
-        return None
-    from throwcollect.collect.cluster.submission import find_submitted
-
-    if (directory := find_submitted(run)) is None:
+    # An empty name would be the path of the current directory.
+    if not run or not is_submitted(Path(run)):
         return None
     from throwcollect.collect.cluster.cluster_run import ClusterRun
 
-    return ClusterRun.open(directory)
+    return ClusterRun.open(Path(run).absolute())
 
 
 def _make_document(run: Run) -> dict[str, Any]:
-    from throwcollect.collect.runs.run_selection import has_complete_dataset
-
     error = run.record.error if run.record.failure else None
-    complete = has_complete_dataset(run)
-    return {**asdict(run.record), "message": str(error or ""), "status": run.status, "complete": complete}
+    return {**asdict(run.record), "message": str(error or ""), "status": run.status}
 
 
 def _make_row(run: Run) -> tuple[str, ...]:
     record = run.record
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
-    dataset = run.record.directory if record.kind == "collection" else "-"
+    dataset = str(record.directory) if record.kind == "collection" else "-"
     simulations = "-" if record.kind == "container" else str(record.simulations)
     return run.id, record.runtime, simulations, throws, _describe_status(run, record), dataset
 
@@ -246,14 +220,9 @@ def _make_row(run: Run) -> tuple[str, ...]:
 def _describe_status(run: Run, record: RunRecord) -> str:
     if record.ended is not None:
         return f"{run.status} {_format_age(record.ended)} ago, exit code {record.exit_code}"
-    if run.lives and record.planning is not None:
-        plan = record.planning
-        return f"planning for {_format_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
     if run.lives:
         return f"running for {_format_age(record.started)}"
-    from throwcollect.collect.runs.run_selection import has_complete_dataset
-
-    return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
+    return run.status
 
 
 def _list_node_lines(run: Run) -> list[tuple[str, ...]]:

@@ -75,9 +75,8 @@ class RunConfig(Section):
 
 Size = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,17}[bkmg]?$")]
 Cores = Annotated[str, Field(pattern=r"^[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*$")]
-# Which directories and devices of the host may be used is checked when a run begins, after links have been followed.
+# Which directories of the host may be used is checked when a run begins, after links have been followed.
 Mount = Annotated[str, Field(pattern=r"^/[^/:][^:]*:/[^:]*(:(ro|(ro,)?[zZ]))?$")]
-Device = Annotated[str, Field(pattern=r"^/dev/[^:]+:/dev/[^:]+:(r|w|rw)$")]
 Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 ContainerPort = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,4}(/tcp|/udp)?$")]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
@@ -104,12 +103,6 @@ class ContainerOptions(TypedDict, total=False):
     ]
     ulimits: Annotated[dict[str, int], Field(description="Resource limits by their names, such as `nofile`.")]
     pids_limit: Annotated[PositiveInt, Field(description="Upper bound of threads and processes, instead of 512.")]
-    devices: Annotated[
-        list[Device],
-        Field(
-            description="Graphics processors of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."
-        ),
-    ]
     gpus: Annotated[
         int,
         Field(ge=-1, description="Number of GPUs that the engine provides, as `docker run --gpus` does; -1 for all."),
@@ -174,7 +167,6 @@ Time = Annotated[str, Field(pattern=_TIME)]
 Memory = Annotated[str, Field(pattern=r"^[1-9][0-9]*[KMGT]$")]
 Word = Annotated[str, Field(pattern=r"^[!-~]+$")]
 Line = Annotated[str, Field(pattern=r"^[^\p{Cc}\p{Zl}\p{Zp}]*$")]
-Scratch = Annotated[str, Field(pattern=r"^[/$][A-Za-z0-9_./${}-]*$")]
 Bind = Annotated[Line, Field(pattern=r"^/[^:,]*(:/[^:,]*(:r[ow])?)?$")]
 
 
@@ -208,7 +200,5 @@ class ClusterConfig(Section):
     binds: list[Bind] = []
     """Further directories that tasks see inside the image, as DIRECTORY[:INSIDE[:ro]]; they always see the directory of
     the dataset."""
-    scratch: Scratch | None = None
-    """Directory on a disk of the node, such as `$TMPDIR`, in which a task collects before it hands its slice over."""
     requeue: Annotated[int, Field(ge=0, le=1000)] = 10
     """How often a task that was stopped, and has shut down properly, is queued again."""

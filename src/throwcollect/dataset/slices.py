@@ -71,10 +71,10 @@ def find_attempts(directory: Path, slice: Slice) -> list[Path]:
     return sorted(directory / SLICES / name for name in _list(directory / SLICES) if name.startswith(start))
 
 
-def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) -> Path:
-    """Make an empty directory for an attempt at a slice, in `scratch` or else next to all slices, unlike any other."""
+def make_attempt(directory: Path, slice: Slice) -> Path:
+    """Make an empty directory for an attempt at a slice, unlike any other."""
     name = f"{slice_directory(directory, slice).name}{ATTEMPT}{socket.gethostname()}-{secrets.token_hex(4)}"
-    path = (scratch or directory / SLICES) / name
+    path = directory / SLICES / name
     try:
         path.mkdir(parents=True)
     except OSError as error:
@@ -137,7 +137,7 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
         packed.mkdir(parents=True, exist_ok=True)
         shards = [name for name in _list(attempt) if name.endswith(SHARD_SUFFIX)]
         for name in (*shards, THROWS, MANIFEST):
-            _move(attempt / name, packed / name)
+            os.rename(attempt / name, packed / name)
         try:
             # A rename replaces no directory with files in it, so the first attempt wins.
             packed.rename(place)
@@ -151,17 +151,6 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
         raise unwritable(packed, error) from error
     shutil.rmtree(attempt, ignore_errors=True)
     return first
-
-
-def _move(source: Path, target: Path) -> None:
-    """Rename a file, or copy it where it lies on another file system; then it is on disk before this returns."""
-    # A rename to another file system fails, and then the file is copied below.
-    with suppress(OSError):
-        os.rename(source, target)
-        return
-    shutil.copyfile(source, target, follow_symlinks=False)
-    with target.open("rb") as file:
-        os.fsync(file.fileno())
 
 
 def _list(directory: Path) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, PositiveInt, model_validator
 
-from throwcollect.collect.runs.run_record import Kind
+from throwcollect.collect.runtimes.run_record import Kind
 from throwcollect.config.document import Document
 from throwcollect.config.loader import load
 from throwcollect.config.run import ContainerSpec, Mount, NodeContainerConfig

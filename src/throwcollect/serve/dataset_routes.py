@@ -110,7 +110,7 @@ def is_finished(directory: Path) -> bool:
 def _find_finished(instances: Instances, instance: str) -> Path:
     """Directory of the finished dataset of a run."""
     run = get_collection(instances, instance)
-    directory = run.context.directory
+    directory = run.record.directory
     if not is_finished(directory):
         raise ConflictError(f"run {instance}: its dataset is not finished")
     return directory

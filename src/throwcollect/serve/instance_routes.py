@@ -14,8 +14,8 @@ from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, StrictInt
 
 from throwcollect.collect.runs.events import EVENTS, parse
-from throwcollect.collect.runs.run_record import Origin
 from throwcollect.collect.runtimes.node_logs import NodeLogs
+from throwcollect.collect.runtimes.run_record import Origin
 from throwcollect.config.loader import load
 from throwcollect.config.shape import shape_of
 from throwcollect.config.values import leaves
@@ -158,7 +158,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
         # The file does not exist before the first event.
         with (
             suppress(OSError),
-            open(open_log(Path(record.logs) / EVENTS, os.O_RDONLY), encoding="utf-8", errors="replace") as file,
+            open(open_log(record.logs / EVENTS, os.O_RDONLY), encoding="utf-8", errors="replace") as file,
         ):
             # If the run resumes a dataset, the file has the events of earlier runs, too.
             lines += (line for line in file if (event := parse(line)) and event.run == record.run)

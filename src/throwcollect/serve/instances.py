@@ -17,8 +17,8 @@ from throwcollect.collect.runs import control
 from throwcollect.collect.runs.background import begin_container, begin_run
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin
 from throwcollect.collect.runs.run_selection import require_living, require_simulations
+from throwcollect.collect.runtimes.run_record import Origin
 from throwcollect.config.loader import load
 from throwcollect.config.run import ContainerSpec
 from throwcollect.config.values import list_operator_keys
@@ -96,13 +96,13 @@ class Instances:
         with _ONE_AT_A_TIME:
             if (reason := explain_refusal(run.now())) is not None:
                 raise ConflictError(reason)
-            for other in Records().into(run.context.directory):
+            for other in Records().into(run.record.directory):
                 if other.status == "running":
                     raise ConflictError(f"run {other.id} collects into the dataset of run {run.id}")
             if origin is not None and origin.component in self.catalogue.components:
                 _check_room(self.catalogue.get(origin.component))
-            config = config_path(run.context.directory)
-            return begin_run(config, overrides=(), output=run.context.directory, origin=origin, resumed=True)
+            config = config_path(run.record.directory)
+            return begin_run(config, overrides=(), output=run.record.directory, origin=origin, resumed=True)
 
     def stop(self, instance: str, *, force: bool = False) -> None:
         """Ask an instance to finish its running trials and end; by force, end it at once, and forget it.
@@ -143,7 +143,7 @@ class Instances:
             check_appearance(own, urdf)
         with _conflicts():
             record = require_living(run)
-        config = load(config_path(run.context.directory))
+        config = load(config_path(run.record.directory))
         nodes = [name_node(config, name) for name in simulations_of(record.nodes)]
         if not nodes:
             raise ConflictError(f"run {run.id}: no simulation runs")

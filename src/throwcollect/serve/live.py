@@ -129,7 +129,7 @@ def _runs(run: Run, simulation: str) -> bool:
 
 def _set_speed(run: Run, simulation: str, factor: float | None) -> None:
     """Set the real-time factor of a simulation; None for that of its configuration."""
-    config = load(config_path(run.context.directory))
+    config = load(config_path(run.record.directory))
     value = (config.sim.real_time_factor or _FULL_SPEED) if factor is None else factor
     (result,) = set_parameter(run, [name_node(config, simulation)], _PARAMETER, value)
     if not result.successful:

@@ -33,7 +33,7 @@ _carried: dict[str, Path] = {}
 def description_of(run: Run) -> str:
     """URDF of the robot of a run, with its tool; meshes are ``package://`` URLs."""
     if run.record.kind == "container":
-        path = run.context.directory / DESCRIPTION
+        path = run.record.directory / DESCRIPTION
         if not path.is_file():
             raise NotFoundError(f"run {run.id}: its component has no urdf")
         return read_urdf_text(path)
@@ -77,7 +77,7 @@ def scene_of(run: Run) -> SceneFacts:
 
 def _find_config(run: Run) -> Path:
     """File of the configuration of a run."""
-    path = config_path(run.context.directory)
+    path = config_path(run.record.directory)
     if not path.is_file():
         raise NotFoundError(f"run {run.id} has no configuration yet")
     return path
@@ -113,7 +113,7 @@ def _find_carried(*names: str) -> Path | None:
 def _look_for_carried() -> None:
     for run in Records().all():
         with suppress(OSError):
-            directory = run.context.directory.resolve(strict=True)
+            directory = run.record.directory.resolve(strict=True)
             for name in list_carried(directory):
                 # A link may lead out of the directory.
                 if (file := directory / name).resolve() == file:

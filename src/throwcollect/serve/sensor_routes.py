@@ -167,7 +167,7 @@ def _find(run: Run, simulation: str) -> tuple[Config, str]:
     """Configuration of a run, and full name of the node and the topic of the sensors of a simulation."""
     if simulation not in (known := simulations_of(require_living(run).nodes)):
         raise NotFoundError(f"run {run.id}: no simulation {simulation!r} runs{suggest(simulation, known)}")
-    config = load(config_path(run.context.directory))
+    config = load(config_path(run.record.directory))
     return config, name_node(config, simulation).removesuffix(simulation) + NAME
 
 

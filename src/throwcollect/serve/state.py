@@ -21,9 +21,8 @@ from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.coordinator.resume import is_complete
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Kind, Planning
 from throwcollect.collect.runtimes.nodes import is_simulation
-from throwcollect.collect.runtimes.runtime import NodeState
+from throwcollect.collect.runtimes.run_record import Kind, NodeState
 from throwcollect.dataset.directory import CONFIG, METADATA
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError, ThrowcollectError
@@ -34,7 +33,7 @@ _FRESH_S = 0.1
 """Clients that follow the state get one that is not older."""
 _MOST_OVER = 100
 
-Status = Literal["planning", "starting", "running", "ended", "died"]
+Status = Literal["starting", "running", "ended", "died"]
 
 
 # These are dataclasses of pydantic, which makes their schema once; for plain ones, it would do so for each route.
@@ -65,13 +64,12 @@ class InstanceState:
         component: Name of the component that it is an instance of; None if a command or a program began it.
         kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
         joins: Id of the run that a container has joined; None if it has joined none.
-        status: ``planning`` while a large plan is made, ``starting`` until all nodes run, ``running``, ``ended``, or
-            ``died`` if its launcher died before the end.
+        status: ``starting`` until all nodes run, ``running``, ``ended``, or ``died`` if its launcher died before the
+            end.
         stopping: Whether it ends because it was asked to; running trials are finished.
         exit_code: Exit code of its launcher; None before it ended.
         message: The error with which it ended, in words; empty if there was none.
         nodes: Its nodes; none once it has ended, or died with them.
-        planning: How far the plan is while it is made; else None.
         progress: How far it has come; None before the first report, and without a coordinator.
         dataset: Directory of the dataset; None if it collects none.
         summary: What the dataset holds; None if it is not finished.
@@ -92,7 +90,6 @@ class InstanceState:
     message: str
     simulations: int
     nodes: list[NodeState]
-    planning: Planning | None
     progress: Progress | None
     dataset: str | None
     summary: Info | None
@@ -132,8 +129,7 @@ def describe(run: Run, *, is_growing: bool = False) -> InstanceState:
         "stopping": record.stopping and run.status == "running",
         "message": str((record.error if record.failure else None) or ""),
         "nodes": list(run.nodes),
-        "planning": record.planning if run.status == "running" else None,
-        "dataset": record.directory if record.kind == "collection" else None,
+        "dataset": str(record.directory) if record.collects else None,
         "robots": simulations_of(run.nodes),
         "can_be_resumed": not is_growing and explain_refusal(run) is None,
     }
@@ -142,7 +138,7 @@ def describe(run: Run, *, is_growing: bool = False) -> InstanceState:
 
 def explain_refusal(run: Run) -> str | None:
     """Why clients cannot continue the dataset of a run; None if they can. This is cheap enough for many calls."""
-    directory = run.context.directory
+    directory = run.record.directory
     if run.status == "running":
         return f"run {run.id} is still running"
     if run.record.kind != "collection" or not os.path.isfile(directory / CONFIG):
@@ -170,8 +166,6 @@ def _find_status(run: Run) -> Status:
         return "ended"
     if run.status == "died":
         return "died"
-    if run.record.planning is not None:
-        return "planning"
     nodes = run.record.nodes
     return "running" if nodes and all(node.status != "starting" for node in nodes) else "starting"
 

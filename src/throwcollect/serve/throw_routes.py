@@ -89,7 +89,7 @@ def make_throw_routes(instances: Instances) -> APIRouter:
     def throw(instance: str, trial: int) -> Response:
         """A throw as the page replays it: as a message of the socket `shown`, without the name of a simulation."""
         _, found = find_throw(instances, instance, trial)
-        directory = get_collection(instances, instance).context.directory
+        directory = get_collection(instances, instance).record.directory
         message = encode_throw(found, "", *describe_trial(directory, trial))
         return Response(message, media_type="application/octet-stream")
 
@@ -109,7 +109,7 @@ def find_throw(instances: Instances, instance: str, trial: int) -> tuple[Plan, E
 
 def find_plan(instances: Instances, instance: str) -> tuple[Path, Plan]:
     """Directory of the dataset of a run, and its plan."""
-    directory = get_collection(instances, instance).context.directory
+    directory = get_collection(instances, instance).record.directory
     try:
         return directory, read_plan(directory)
     except FileNotFoundError:

@@ -160,7 +160,7 @@ class ThrowWatch:
             episode = unpack(message, Signer.of_key(self._run.key))
             if not isinstance(episode, Episode) or not episode.result:
                 return None
-            planned = describe_trial(self._run.context.directory, episode.header.trial)
+            planned = describe_trial(self._run.record.directory, episode.header.trial)
             return encode_throw(episode, simulation, *planned)
         except ThrowcollectError:
             # Another node has published something else on this topic.

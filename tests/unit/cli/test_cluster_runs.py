@@ -1,4 +1,4 @@
-"""What `events`, `ps` and `logs` print of datasets that were submitted to a cluster."""
+"""What `logs` prints of datasets that were submitted to a cluster."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 from throwcollect.cli import cluster_runs
 from throwcollect.collect.cluster.cluster_run import SlicesState
 from throwcollect.collect.cluster.slurm import ArrayTask
-from throwcollect.errors import ConfigError
 
 
 def look(*tasks: ArrayTask, complete: bool = False) -> SlicesState:
@@ -43,18 +42,3 @@ def test_logs_of_a_cluster_run_are_followed_until_it_ends(
     logs.clear()
     cluster_runs.print_logs(run, ["1"], until_end=True)
     assert capsys.readouterr().out.splitlines() == ["1 | ends"]
-
-
-def test_a_submission_that_is_gone_does_not_hide_the_others(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    there = SimpleNamespace(look=look)
-
-    def open_run(directory: Path) -> SimpleNamespace:
-        if directory == tmp_path / "gone":
-            raise ConfigError(f"{directory}: no submission")
-        return there
-
-    monkeypatch.setattr(cluster_runs, "ClusterRun", SimpleNamespace(open=open_run))
-    assert [run for run, _ in cluster_runs.list_queued([tmp_path / "gone", tmp_path])] == [there]
-    assert "gone: no submission" in capsys.readouterr().err

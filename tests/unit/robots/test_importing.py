@@ -43,16 +43,16 @@ FINGERS = """
 </robot>"""
 
 
-def section_of(path: Path, **keys: object) -> DescribedRobotConfig:
+def find_section(path: Path, **keys: object) -> DescribedRobotConfig:
     return DescribedRobotConfig.model_validate({"urdf": str(path), "flange": FLANGE, **keys})
 
 
 def describe(path: Path, **keys: object) -> Robot:
-    return find_robot(section_of(path, **keys))
+    return find_robot(find_section(path, **keys))
 
 
 def hash_of(path: Path, **keys: object) -> str | None:
-    return import_robot(section_of(path, **keys)).sha256
+    return import_robot(find_section(path, **keys)).sha256
 
 
 def read_original(path: Path) -> pinocchio.Model:
@@ -159,7 +159,7 @@ def test_an_import_gives_the_same_files_again(name: str, tmp_path: Path, monkeyp
 
 def test_an_imported_robot_can_be_imported_again(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl())
-    once = import_robot(section_of(write_arm(tmp_path, (BOX, mesh("a.stl")))))
+    once = import_robot(find_section(write_arm(tmp_path, (BOX, mesh("a.stl")))))
     keys = {key: getattr(once, key) for key in ("name", "urdf", "srdf", "flange", "controllers", "holding")}
     again = import_robot(DescribedRobotConfig.model_validate(keys))
     assert again.urdf != once.urdf
@@ -183,7 +183,7 @@ def test_a_change_of_a_mesh_or_of_the_urdf_gives_another_hash(tmp_path: Path) ->
 
 
 def test_an_import_that_was_changed_afterwards_is_rejected(tmp_path: Path) -> None:
-    section = import_robot(section_of(write_arm(tmp_path)))
+    section = import_robot(find_section(write_arm(tmp_path)))
     urdf = Path(section.urdf)
     text = urdf.read_text()
     try:
@@ -237,7 +237,7 @@ def test_a_sliding_joint_has_metres_in_names_limits_and_frames(tmp_path: Path) -
         (RANGE, 'lower="0.1" upper="0.4" velocity="1" effort="900"'),
         ('xyz="0 0 0.15"', 'xyz="0 0 0.15" rpy="0.4 -0.3 0.2"'),
     )
-    section = import_robot(section_of(path, home={"turn": 0.2}))
+    section = import_robot(find_section(path, home={"turn": 0.2}))
     robot = find_robot(section)
     assert (section.prismatic, robot.sliding) == (["turn"], {"turn"})
     assert [robot.unit_of(joint) for joint in robot.joints] == ["m", "rad", "rad"]
@@ -314,6 +314,6 @@ def test_a_mesh_is_scaled_where_the_urdf_scales_it(tmp_path: Path) -> None:
 
 
 def test_a_name_that_no_robot_has_is_taken_from_the_urdf(tmp_path: Path) -> None:
-    section = import_robot(section_of(write_arm(tmp_path)))
+    section = import_robot(find_section(write_arm(tmp_path)))
     assert ARM.startswith('<robot name="Foreign Arm">')
     assert (section.name, find_robot(section).name) == ("foreign_arm", "foreign_arm")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from tests.e2e.collection import FAST, collect_here, write_config
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
@@ -92,16 +91,12 @@ def remember(tmp_path: Path) -> Iterator[Remember]:
     def make(name: str = "small-0001", *, lives: bool = True, **fields: Any) -> Run:
         run = Records().new("small", run=name)
         values = {
-            "name": "small",
-            "runtime": "local",
-            "directory": str(tmp_path / "datasets" / name),
-            "logs": str(tmp_path / "datasets" / name / "logs"),
-            "domain_id": 0,
-            "started": datetime.now(timezone.utc),
+            "logs": tmp_path / "datasets" / name / "logs",
             "launcher": 2**22,
             "simulations": 2,
         }
-        run.write(RunRecord(run=run.id, **{**values, **fields}))
+        record = run.begin("small", tmp_path / "datasets" / name, runtime="local")
+        run.write(replace(record, **{**values, **fields}))
         if lives:
             opened.append(run)
         else:

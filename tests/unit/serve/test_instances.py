@@ -12,8 +12,7 @@ from tests.unit.serve.conftest import Remember, Served, make_end_fields
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin, RunFailure
-from throwcollect.collect.runtimes.runtime import NodeState
+from throwcollect.collect.runtimes.run_record import NodeState, Origin, RunFailure
 from throwcollect.config.run import ContainerSpec
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.catalogue import Catalogue

@@ -12,7 +12,7 @@ from tests.unit.serve.conftest import CONFIG, Remember, make_end_fields
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runtimes.runtime import NodeState
+from throwcollect.collect.runtimes.run_record import NodeState
 from throwcollect.errors import NotFoundError, WorkerError
 from throwcollect.serve import live
 from throwcollect.serve.live import restore_abandoned, slow_down

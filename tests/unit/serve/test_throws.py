@@ -15,7 +15,7 @@ from tests.unit.dataset.conftest import Collection
 from tests.unit.serve.conftest import Remember
 
 from throwcollect.collect.runs.records import Records
-from throwcollect.collect.runtimes.runtime import NodeState
+from throwcollect.collect.runtimes.run_record import NodeState
 from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.channels import Channels

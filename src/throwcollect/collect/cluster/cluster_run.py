@@ -11,12 +11,11 @@ from pathlib import Path
 
 from throwcollect.collect.cluster import slurm
 from throwcollect.collect.cluster.slurm import ArrayTask
-from throwcollect.collect.cluster.submission import CLUSTER, Submission, read_submission
+from throwcollect.collect.cluster.submission import CLUSTER, LOGS, Submission, read_submission
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import JOURNAL, METADATA, PLAN, THROWS
-from throwcollect.dataset.journal import read_journal
+from throwcollect.dataset.directory import METADATA, PLAN, THROWS
 from throwcollect.dataset.slices import find_finished, slice_directory
 from throwcollect.errors import Interrupted, ThrowcollectError, WorkerError
 from throwcollect.plan.parquet_file import read_parquet
@@ -52,11 +51,6 @@ class ClusterRun:
         trials = Plan.read(self.directory / PLAN, self.config).trials
         return len(trials) - len(trials.refused)
 
-    @property
-    def simulations_per_task(self) -> int:
-        """Number of simulations of a task; for one run on several nodes, of all nodes."""
-        return self.config.cluster.cores * (self.submission.tasks if self.submission.live else 1)
-
     def look(self) -> SlicesState:
         """Look at the queue and the files."""
         # Ask the queue before the files are read: a task puts its slice into place before it leaves the queue.
@@ -79,8 +73,6 @@ class ClusterRun:
         if look.complete:
             return None
         again = command("resume", self.directory)
-        if self.submission.live:
-            return self._explain_live(again)
         missing = [each for each in self.submission.slices if each not in look.finished]
         if not missing:
             hint = f"{command('join', self.directory)} joins them"
@@ -95,28 +87,15 @@ class ClusterRun:
             return Interrupted(f"{message}cancelled", hint=f"{again} submits what is missing")
         return WorkerError(f"{message}{join_names(reasons)}{more}", hint=f"{again} submits what is missing")
 
-    def _explain_live(self, again: str) -> ThrowcollectError:
-        job = self.submission.jobs[-1].array
-        task = slurm.find_ended(job).get(None)
-        if task is not None and task.state == "CANCELLED":
-            return Interrupted(f"job {job} was cancelled", hint=f"{again} submits it again")
-        how = "ended" if task is None else f"ended: {task.state}, exit code {task.reason}"
-        return WorkerError(
-            f"job {job} {how}", hint=f"{again} submits it again; throwcollect logs shows what it printed"
-        )
-
     @property
     def logs(self) -> dict[str, Path]:
-        """The latest log of each task, by its index; for one run on several nodes, its only log."""
-        if self.submission.live:
-            path = self.directory / CLUSTER / "logs" / f"{self.submission.jobs[-1].array}_live.log"
-            return {"0": path} if path.exists() else {}
+        """The latest log of each task, by its index."""
         found = {str(index): self.log(index) for index in range(self.submission.tasks)}
         return {index: path for index, path in found.items() if path is not None}
 
     def log(self, index: int) -> Path | None:
         """Find the latest log of a task of an array; None if it has written none."""
-        logs = self.directory / CLUSTER / "logs"
+        logs = self.directory / CLUSTER / LOGS
         found = [path for job in self.submission.jobs if (path := logs / f"{job.array}_{index}.log").exists()]
         return found[-1] if found else None
 
@@ -154,11 +133,6 @@ class SlicesState:
         return sum(task.runs for task in self.tasks)
 
     @property
-    def waiting(self) -> int:
-        """Number of tasks that wait for a node."""
-        return sum(task.lives for task in self.tasks) - self.running
-
-    @property
     def lives(self) -> bool:
         """Whether a job of the dataset runs, or waits to run."""
         # With this reason a job waits for ever, as the job that it depends on can no longer end as it should.
@@ -183,9 +157,6 @@ class ProgressOfSlices:
         directory = self._run.directory
         if look.complete:
             self._outcomes = _count_outcomes(directory)
-        elif self._run.submission.live:
-            entries = read_journal(directory / JOURNAL)
-            self._outcomes = Counter(entry.outcome for entry in entries if entry.outcome is not None)
         else:
             for each in look.finished - self._read:
                 try:
@@ -198,7 +169,7 @@ class ProgressOfSlices:
             total=self._run.trials,
             ended=ended,
             outcomes=dict(self._outcomes),
-            simulations=look.running * self._run.simulations_per_task,
+            simulations=look.running * self._run.config.cluster.cores,
             throws_per_s=self._measure_speed(ended),
             hung=[],
             success=task.success,

@@ -6,14 +6,11 @@ Users may read the scripts, change them and submit them by hand.
 from __future__ import annotations
 
 import math
-import re
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.collect.cluster.slurm import MARK
-from throwcollect.collect.cluster.submission import CLUSTER
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import Interrupted
@@ -21,8 +18,6 @@ from throwcollect.errors import Interrupted
 _ENDING_S = 30
 """Time that a task needs, besides `run.grace_s`, to shut down: to end nodes and close files."""
 _JOIN_MEMORY = "4G"
-_EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|tcp/0\.0\.0\.0:\$PORT$")
-"""Words in which the shell of the task replaces variables; all other words are quoted."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +38,7 @@ class BatchScripts:
 
     def collect(self, tasks: int, indexes: str) -> str:
         """Write the script of a task that collects a slice, for indexes of slices as ``sbatch --array`` takes them."""
-        cluster = self.config.cluster
+        cluster, stopped = self.config.cluster, Interrupted.exit_code
         directives: dict[str, object] = {
             "array": indexes + (f"%{cluster.at_once}" if cluster.at_once else ""),
             "output": self._name_output("%A_%a.log"),
@@ -51,65 +46,19 @@ class BatchScripts:
         words = [
             *("up", "--slice", f"$SLURM_ARRAY_TASK_ID/{tasks}", "--output", str(self.directory)),
             *("-n", str(cluster.cores), "--runtime", "local"),
-            *(("--set", f"cluster.scratch={cluster.scratch}") if cluster.scratch else ()),
         ]
         return self._write(
             f"Collects one slice of {tasks} of a dataset of throwcollect.",
             directives,
-            (self._requeue_flag,),
+            "--requeue" if cluster.requeue else "--no-requeue",
             "# As a step, so that signals reach it.",
             self._write_step(words, cores=cluster.cores),
             "code=$?",
+            f"# {stopped}: it was stopped, and goes on where it left off when it is started again.",
+            f'if [ $code = {stopped} ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt {cluster.requeue} ]; then',
             # SLURM_JOB_ID of the last task is the id of the whole array, all of which would be queued again.
-            *_write_requeue(cluster.requeue, "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"),
-            "exit $code",
-        )
-
-    def live(self, nodes: int) -> str:
-        """Write the script of one run on several nodes: the first has the coordinator, and the others join it."""
-        cluster = self.config.cluster
-        directives: dict[str, object] = {
-            "output": self._name_output("%j_live.log"),
-            "nodes": nodes,
-            "ntasks": nodes,
-            "ntasks-per-node": 1,
-        }
-        path = str(self.directory / CLUSTER / "token")
-        begin = [
-            *("up", "--resume", str(self.directory), "-n", str(cluster.cores), "--runtime", "local"),
-            *("--listen", "tcp/0.0.0.0:$PORT", "--token-file", path),
-        ]
-        join = ["join-run", "-", "-n", str(cluster.cores)]
-        token = shlex.quote(path)
-        return self._write(
-            f"Collects a dataset of throwcollect in one run on {nodes} nodes.",
-            directives,
-            ("--no-kill", self._requeue_flag),
-            # The number of the job gives each job a port of its own, as several jobs may share a node. Ports from 32768
-            # on are left out, as Linux gives them to outgoing connections.
-            "export PORT=$((20000 + SLURM_JOB_ID % 12768))",
-            # A token of an earlier start of this job would lead the other tasks to a router that is gone.
-            f"rm -f {token} {token}.over",
-            "# The first task begins the run; the others go on without one that is lost.",
-            f"srun --no-kill --kill-on-bad-exit=0 --cpus-per-task={cluster.cores} bash -c '",
-            'if [ "$SLURM_PROCID" = 0 ]; then',
-            "    # Slurm signals this shell, too, which has to outlive the run.",
-            "    trap : TERM INT HUP",
-            f"    {_escape_quotes(self._write_command(begin))}",
-            "    code=$?",
-            "    # A run that ends before it has a token has no need of the others.",
-            f"    touch {_escape_quotes(token)}.over",
-            "    exit $code",
+            '    scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"',
             "fi",
-            f"until [ -s {_escape_quotes(token)} ]; do",
-            f"    [ ! -e {_escape_quotes(token)}.over ] || exit 0",
-            "    sleep 0.5",
-            "done",
-            f"exec {_escape_quotes(self._write_command(join))} < {_escape_quotes(token)}",
-            "'",
-            "code=$?",
-            f"rm -f {token} {token}.over",
-            *_write_requeue(cluster.requeue, "$SLURM_JOB_ID"),
             "exit $code",
         )
 
@@ -123,21 +72,17 @@ class BatchScripts:
             "signal": None,
         }
         step = self._write_step(["join", str(self.directory)], cores=1)
-        return self._write("Joins the slices of a dataset of throwcollect.", directives, ("--requeue",), step)
+        return self._write("Joins the slices of a dataset of throwcollect.", directives, "--requeue", step)
 
-    def _write(self, purpose: str, directives: dict[str, object], flags: Sequence[str], *commands: str) -> str:
+    def _write(self, purpose: str, directives: dict[str, object], flag: str, *commands: str) -> str:
         """Write a script: the options for Slurm, what all scripts begin with, and then its own commands."""
         head = [
             "#!/bin/bash",
             f"# {purpose}",
             *self._list_directives(directives),
-            *(f"#SBATCH {flag}" for flag in flags),
+            f"#SBATCH {flag}",
         ]
         return "\n".join([*head, *self._list_opening_lines(), "", *commands, ""])
-
-    @property
-    def _requeue_flag(self) -> str:
-        return "--requeue" if self.config.cluster.requeue else "--no-requeue"
 
     def _name_output(self, name: str) -> str:
         # Slurm replaces patterns such as %j in names of logs, and takes %% for a percent sign.
@@ -151,7 +96,7 @@ class BatchScripts:
             "account": cluster.account,
             "qos": cluster.qos,
             "constraint": cluster.constraint,
-            "comment": f"{MARK}{self.directory}",
+            "comment": f"throwcollect:{self.directory}",
             "open-mode": "append",
             "nodes": 1,
             "ntasks": 1,
@@ -187,33 +132,15 @@ class BatchScripts:
         if self.image is None:
             return " ".join(map(_quote_for_shell, (*self.program, *words)))
         binds = [shlex.quote(f"--bind={bind}") for bind in (self.directory, *self.config.cluster.binds)]
-        if self.config.cluster.scratch:
-            # Its path may have variables anywhere.
-            binds.append(f'"--bind={self.config.cluster.scratch}"')
         image = shlex.quote(str(self.image))
         return " ".join(
             ["apptainer --quiet exec --cleanenv", *binds, image, "throwcollect", *map(_quote_for_shell, words)]
         )
 
 
-def _write_requeue(times: int, job: str) -> Iterator[str]:
-    if times:
-        yield f"# {Interrupted.exit_code}: it was stopped, and goes on where it left off when it is started again."
-        yield f'if [ $code = {Interrupted.exit_code} ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt {times} ]; then'
-        yield f'    scontrol requeue "{job}"'
-        yield "fi"
-
-
 def _quote_for_shell(word: str) -> str:
-    """Quote a word for the shell, which replaces variables in names of tasks and of the scratch directory alone."""
-    if "$" in word and _EXPANDED.match(word):
-        return f'"{word}"'
-    return shlex.quote(word)
-
-
-def _escape_quotes(text: str) -> str:
-    """Write a part of a command that stands in single quotes."""
-    return text.replace("'", "'\\''")
+    """Quote a word for the shell, which replaces variables of Slurm alone."""
+    return f'"{word}"' if word.startswith("$SLURM_") else shlex.quote(word)
 
 
 def _quote(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,27 +13,11 @@ from throwcollect.config.document import Document
 from throwcollect.config.run import ClusterConfig
 from throwcollect.errors import ConfigError, WorkerError
 
-MARK = "throwcollect:"
-"""Beginning of the comment of our jobs; the directory of the dataset follows."""
-
 _PATIENCE_S = 60.0
 """Longest wait for a command of Slurm."""
-_GLANCE_S = 5.0
-"""Longest wait where the answer is only a courtesy, as in the list of all runs."""
 _RUNNING = frozenset({"RUNNING", "COMPLETING", "SIGNALING"})
-_ENDED = frozenset(
-    [
-        "BOOT_FAIL",
-        "CANCELLED",
-        "COMPLETED",
-        "DEADLINE",
-        "FAILED",
-        "NODE_FAIL",
-        "OUT_OF_MEMORY",
-        "PREEMPTED",
-        "REVOKED",
-        "TIMEOUT",
-    ]
+_ENDED = re.compile(
+    "BOOT_FAIL|CANCELLED|COMPLETED|DEADLINE|FAILED|NODE_FAIL|OUT_OF_MEMORY|PREEMPTED|REVOKED|TIMEOUT",
 )
 """States of tasks that have ended. All others, including those of future versions of Slurm, count as living."""
 _UNSEEN_OUTPUT = "0:53"
@@ -60,7 +45,7 @@ class ArrayTask:
     @property
     def lives(self) -> bool:
         """Whether it runs, or waits to run."""
-        return self.state not in _ENDED
+        return _ENDED.fullmatch(self.state) is None
 
     @property
     def runs(self) -> bool:
@@ -83,11 +68,8 @@ def submit(script: Path, *options: str) -> str:
         # With several clusters, sbatch prints NUMBER;CLUSTER.
         return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
     except WorkerError as error:
-        hint = (
-            error.hint
-            or f"correct the keys of cluster, by --set cluster.KEY=VALUE, in the YAML file or in {site_path()}"
-        )
-        raise ConfigError(error.message, hint=hint) from error
+        hint = f"correct the keys of cluster, by --set cluster.KEY=VALUE, in the YAML file or in {site_path()}"
+        raise ConfigError(error.message, hint=error.hint or hint) from error
 
 
 def find_tasks() -> dict[str, list[ArrayTask]]:
@@ -135,13 +117,6 @@ def _find_accounted(job: str) -> dict[int | None, ArrayTask]:
     return found
 
 
-def find_directories() -> list[str]:
-    """Find the directories of the datasets that jobs of this user in the queue collect, sorted."""
-    lines = _run("squeue", "--noheader", "--me", "--format=%F|%k", patience_s=_GLANCE_S).splitlines()
-    rows = (line.strip().partition(f"|{MARK}") for line in lines)
-    return sorted({directory for _, mark, directory in rows if mark})
-
-
 def cancel(jobs: Sequence[str]) -> None:
     """End jobs; those that have ended stay as they are."""
     _run("scancel", "--quiet", *jobs)
@@ -161,7 +136,7 @@ def _read_index(text: str) -> int | None:
     return int(text) if text.isdigit() else None
 
 
-def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
+def _run(program: str, *arguments: str) -> str:
     """Run a command of Slurm, and return its output."""
     try:
         done = subprocess.run(
@@ -169,7 +144,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=patience_s,
+            timeout=_PATIENCE_S,
             check=False,
             # These variables and the locale of the user would change the format of its output.
             env={**{k: v for k, v in os.environ.items() if not k.startswith(("SQUEUE_", "SACCT_"))}, "LC_ALL": "C"},
@@ -180,7 +155,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
             hint="run this on a login node, or see docs/running.md for other schedulers",
         ) from error
     except subprocess.TimeoutExpired as error:
-        raise WorkerError(f"{program} has not answered within {patience_s:g} s") from error
+        raise WorkerError(f"{program} has not answered within {_PATIENCE_S:g} s") from error
     if done.returncode:
         printed = [line for line in done.stderr.splitlines() if line.strip()]
         if any(words in line for words in _UNREACHED for line in printed):

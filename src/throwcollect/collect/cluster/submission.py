@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.collect.cluster import slurm
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
 from throwcollect.plan.slice import Slice
 
 CLUSTER = "cluster"
 """Name of the directory of scripts and logs, inside the directory of a dataset."""
 
+LOGS = "logs"
+"""Name of the directory of logs in it."""
 _FILE = "submission.json"
 
 
@@ -25,15 +25,13 @@ class Job:
 
     Attributes:
         array: Number of the array; empty if the slices were only to be joined.
-        join: Number of the joining job; empty for one run on several nodes.
+        join: Number of the joining job.
         slices: Indexes of the slices that the array collects.
-        submitted: Time of the submission.
     """
 
     array: str
     join: str
     slices: tuple[int, ...]
-    submitted: datetime
 
 
 @dataclass(frozen=True)
@@ -41,25 +39,21 @@ class Submission:
     """Everything that was submitted for a dataset.
 
     Attributes:
-        name: Name of the collection.
-        tasks: Number of slices; of nodes, if it is one run.
+        tasks: Number of slices.
         program: Words that start ``throwcollect`` outside of an image.
         image: Image that tasks run in; None for none.
         jobs: The jobs, in the order in which they were submitted.
-        live: Whether it is one run on several nodes, and not an array.
     """
 
-    name: str
     tasks: int
     program: tuple[str, ...]
     image: str | None
     jobs: tuple[Job, ...] = ()
-    live: bool = False
 
     @property
     def slices(self) -> tuple[Slice, ...]:
-        """All slices; none if it is one run."""
-        return () if self.live else Slice.all_of(self.tasks)
+        """All slices."""
+        return Slice.all_of(self.tasks)
 
 
 _JSON = TypeAdapter(Submission)
@@ -93,23 +87,3 @@ def format_indexes(indexes: tuple[int, ...]) -> str:
         else:
             ranges.append([index, index])
     return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in ranges)
-
-
-def find_queued() -> list[Path]:
-    """Find the directories of this user's submitted datasets that have jobs in the queue; none without Slurm."""
-    try:
-        return [path for path in map(Path, slurm.find_directories()) if is_submitted(path)]
-    except (ConfigError, WorkerError):
-        return []
-
-
-def find_submitted(named: str | None) -> Path | None:
-    """Find the submitted dataset that a command names by its directory; None if it names something else.
-
-    Without a name, the command means the only dataset in the queue that lies below the current directory.
-    """
-    if named is not None:
-        # An empty name would be the path of the current directory.
-        return Path(named).absolute() if named and is_submitted(Path(named)) else None
-    here = [each for each in find_queued() if each.is_relative_to(Path.cwd())]
-    return here[0] if len(here) == 1 else None

@@ -7,8 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
-from datetime import datetime, timezone
+from dataclasses import replace
 from pathlib import Path
 
 from throwcollect.collect.cluster import slurm
@@ -17,6 +16,7 @@ from throwcollect.collect.cluster.script import BatchScripts
 from throwcollect.collect.cluster.slurm import with_site
 from throwcollect.collect.cluster.submission import (
     CLUSTER,
+    LOGS,
     Job,
     Submission,
     format_indexes,
@@ -27,7 +27,7 @@ from throwcollect.collect.cluster.submission import (
 from throwcollect.collect.coordinator.prepare import describe_plan, prepare
 from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.coordinator.resume import refuse_changes
-from throwcollect.collect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
+from throwcollect.collect.runs.slices import check_sliceable, read_changed_config, read_frozen_config
 from throwcollect.collect.runtimes.image_sources import SOURCES_LABEL, UNKNOWN, VERSION_LABEL, are_others
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
@@ -44,21 +44,7 @@ from throwcollect.wording import command, format_count
 
 _SIF_COMMAND = "make sif"
 """Command that makes the SIF of this version, in a clone of the project."""
-_COLLECT, _JOIN, _LOGS = "collect.sh", "join.sh", "logs"
-
-
-@dataclass(frozen=True)
-class Submitted:
-    """What was submitted for a dataset, whose path is absolute; a dry run has only the script of a task, and no job."""
-
-    directory: Path
-    script: str
-    job: Job | None = None
-
-    @property
-    def logs(self) -> Path:
-        """Directory of the logs of tasks."""
-        return self.directory / CLUSTER / _LOGS
+_COLLECT, _JOIN = "collect.sh", "join.sh"
 
 
 def submit(
@@ -67,34 +53,32 @@ def submit(
     tasks: int,
     *,
     overrides: Sequence[str] = (),
-    live: bool = False,
     dry: bool = False,
     reporter: Reporter,
-) -> Submitted:
-    """Plan a dataset and submit it as an array of tasks, or as one run on several nodes.
+) -> tuple[str, Job | None]:
+    """Plan a dataset and submit it as an array of tasks.
 
     Args:
         config: The configuration's file.
         directory: Directory of the dataset: new or empty, or with the plan of this configuration; all nodes see it.
-        tasks: Number of slices, each of which is a task; of nodes, if it is one run.
+        tasks: Number of slices, each of which is a task.
         overrides: Overrides of keys of the configuration, as ``--set`` takes them.
-        live: Whether it is one run on several nodes, as a plan needs that grows with its results.
         dry: Whether to make only the script, and write nothing.
         reporter: Receives what is planned and submitted.
+
+    Returns:
+        The script of a task, and what was submitted; None if nothing was.
     """
     directory = directory.absolute()
     with load_locating_errors(config, overrides) as read, ExitStack() as undo:
         complete = read.model_copy(update={"cluster": with_site(read.cluster)})
-        check_closed(complete)
-        if not live:
-            check_sliceable(complete)
-            if complete.trials is not None:
-                Slice(0, tasks).trials_of(complete.trials, trials_per_shard=complete.record.trials_per_shard)
+        check_sliceable(complete)
+        if complete.trials is not None:
+            Slice(0, tasks).trials_of(complete.trials, trials_per_shard=complete.record.trials_per_shard)
         scripts = _make_scripts(complete, directory)
-        slices = () if live else tuple(range(tasks))
-        text = scripts.live(tasks) if live else scripts.collect(tasks, format_indexes(slices))
+        slices = tuple(range(tasks))
         if dry:
-            return Submitted(directory, text)
+            return scripts.collect(tasks, format_indexes(slices)), None
         if is_submitted(directory):
             raise ConfigError(
                 f"{directory}: was submitted already", hint=f"{command('resume', directory)} submits what is missing"
@@ -103,29 +87,27 @@ def submit(
         _freeze(complete, directory, config.parent, reporter)
         # Only from here on, because a directory that was refused holds files of another user or program.
         undo.callback(_remove, directory, made=made, planned=planned)
-        if not live:
-            Plan.read(directory / PLAN, read_frozen_config(directory)).slice_of(Slice(0, tasks))
+        Plan.read(directory / PLAN, read_frozen_config(directory)).slice_of(Slice(0, tasks))
         image = str(scripts.image) if scripts.image else None
-        submission = Submission(complete.name, tasks, tuple(scripts.program), image, live=live)
-        submitted = _submit(scripts, submission, slices, reporter)
+        submitted = _submit(scripts, Submission(tasks, tuple(scripts.program), image), slices, reporter)
         undo.pop_all()
         return submitted
 
 
-def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: Reporter) -> Submitted | None:
-    """Submit the slices of a dataset that are neither finished nor in the queue; if it is one run, submit it again.
+def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: Reporter) -> Job | None:
+    """Submit the slices of a dataset that are neither finished nor in the queue.
 
     Overrides may change only keys that do not change the dataset.
 
     Returns:
-        The submission; None if nothing is missing.
+        What was submitted; None if nothing is missing.
     """
     directory = directory.absolute()
     submission = read_submission(directory)
     # Wrong changes are refused even if nothing is left to submit.
     config = read_changed_config(directory, overrides)
     look = ClusterRun(directory, submission).look()
-    if look.complete or (submission.live and look.lives):
+    if look.complete:
         return None
     living = {task.index for task in look.tasks if task.lives}
     missing = tuple(each.index for each in submission.slices if each not in look.finished and each.index not in living)
@@ -137,10 +119,12 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), reporter: 
         program=submission.program,
         image=None if submission.image is None else Path(submission.image),
     )
-    return _submit(scripts, submission, missing, reporter)
+    return _submit(scripts, submission, missing, reporter)[1]
 
 
-def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], reporter: Reporter) -> Submitted:
+def _submit(
+    scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], reporter: Reporter
+) -> tuple[str, Job]:
     """Write the scripts and submit them; without slices, submit only the job that joins what is finished."""
     directory = scripts.directory
     try:
@@ -149,51 +133,33 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
         raise unwritable(scripts.logs, error) from error
     with ExitStack() as undo:
 
-        def submit_job(script: Path, *options: str) -> str:
+        def submit_job(name: str, text: str, *options: str) -> str:
+            script = directory / CLUSTER / name
+            write_file(script, text.encode())
             job = slurm.submit(script, *options)
             # Until the record names the job, no command finds it again, and a failure removes the files that it needs.
             undo.callback(slurm.cancel, [job])
             return job
 
-        if submission.live:
-            text = scripts.live(submission.tasks)
-            array, joining = submit_job(_write(directory, _COLLECT, text)), ""
-            message = f"submitted job {array}: one run on {format_count(submission.tasks, 'node')}"
+        text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
+        join = _JOIN, scripts.join()
+        if slices:
+            array = submit_job(_COLLECT, text)
+            # The joining job starts after all tasks, however they end, and reports what is missing then.
+            joining = submit_job(*join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
+            message = f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
         else:
-            text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
-            join = _write(directory, _JOIN, scripts.join())
-            if slices:
-                array = submit_job(_write(directory, _COLLECT, text))
-                # The joining job starts after all tasks, however they end, and reports what is missing then.
-                joining = submit_job(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
-                message = (
-                    f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
-                )
-            else:
-                array, joining = "", submit_job(join)
-                message = f"submitted job {joining}, which joins the slices; all of them are finished"
-        job = Job(array, joining, slices, datetime.now(timezone.utc))
+            array, joining = "", submit_job(*join)
+            message = f"submitted job {joining}, which joins the slices; all of them are finished"
+        job = Job(array, joining, slices)
         write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
         undo.pop_all()
     reporter.say(message)
-    return Submitted(directory, text, job)
-
-
-def _write(directory: Path, name: str, text: str) -> Path:
-    """Write a script into the directory of a dataset."""
-    path = directory / CLUSTER / name
-    write_file(path, text.encode())
-    return path
+    return text, job
 
 
 def _make_scripts(config: Config, directory: Path) -> BatchScripts:
-    image, scratch = None, config.cluster.scratch
-    # Which directory a variable names, only the node of a task knows.
-    if scratch is not None and "$" not in scratch and not Path(scratch).is_dir():
-        raise ConfigError(
-            [Problem(f"there is no directory {scratch} on this machine", key="cluster.scratch")],
-            hint=f"if only nodes have it: cluster.lines: ['export SCRATCH={scratch}'] and cluster.scratch: $SCRATCH",
-        )
+    image = None
     if config.cluster.image is not None:
         image = Path(config.cluster.image).absolute()
         if not image.is_file():
@@ -204,7 +170,7 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
         # Many login nodes have no Apptainer, though the nodes of tasks have.
         if shutil.which("apptainer") is not None:
             check_sif(image)
-    return BatchScripts(config, directory, directory / CLUSTER / _LOGS, tuple(make_command()), image)
+    return BatchScripts(config, directory, directory / CLUSTER / LOGS, tuple(make_command()), image)
 
 
 def _freeze(config: Config, directory: Path, sweep_directory: Path, reporter: Reporter) -> None:

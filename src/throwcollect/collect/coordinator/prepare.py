@@ -67,12 +67,10 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, reporter: 
     pieces = [points[first : min(first + size, count)] for first in range(0, count, size)]
     processes = processes if count >= _MANY_TRIALS else 1
     say_at = time.monotonic() + _REPORT_FIRST_S
-    reporter.update_plan(0, count)
     reasons: list[str | None] = []
     with working_side_by_side(pieces, _make_checks, (config,), processes=processes, doing="checks trials") as checked:
         for piece in checked:
             reasons += piece
-            reporter.update_plan(len(reasons), count)
             if time.monotonic() >= say_at:
                 say_at = time.monotonic() + _REPORT_EVERY_S
                 reporter.say(f"plan: {len(reasons)} of {count} trials checked")
@@ -181,7 +179,6 @@ def prepare(
     """
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
-    reporter.update_plan(0, config.trials or 0)
     plan = draw_plan(config, directory=sweep_directory, processes=processes, reporter=reporter)
     # This comes after the plan is drawn, because the configuration as it was given names the place of its list.
     plan = replace(plan, config=make_self_contained(config))

@@ -15,11 +15,8 @@ class Reporter:
     def update(self, progress: Progress) -> None:
         """Take in a progress report of the coordinator."""
 
-    def update_plan(self, checked: int, trials: int) -> None:
-        """Take in how many of a plan's trials have been checked; an error that is raised here ends the planning."""
-
     def say(self, line: str) -> None:
-        """Take in a line of information."""
+        """Take in a line of information; an error that is raised here ends a preparation."""
 
     def warn(self, line: str) -> None:
         """Take in a warning."""

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from throwcollect.collect.runs.preparation import prepare as prepare
     from throwcollect.collect.runs.preparation import resume as resume
     from throwcollect.collect.runs.run import Run as Run
-    from throwcollect.collect.runs.run_record import Summary as Summary
     from throwcollect.collect.runs.run_selection import find as find
+    from throwcollect.dataset.summary import Info as Summary  # noqa: F401
 else:
     _PLACES = {
         "Reporter": "collect.coordinator.reporter:Reporter",
         "Run": "collect.runs.run:Run",
         "RunUpdate": "collect.runs.following:RunUpdate",
-        "Summary": "collect.runs.run_record:Summary",
+        "Summary": "dataset.summary:Info",
         "down": "collect.runs.control:down",
         "find": "collect.runs.run_selection:find",
         "follow": "collect.runs.following:follow",

@@ -8,28 +8,24 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import subprocess
-import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
-from typing import IO, Literal, cast
 
 from pydantic import TypeAdapter
 
-from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.runs.component_container import DESCRIPTION, check_request, launch_container
 from throwcollect.collect.runs.launcher import launch
-from throwcollect.collect.runs.preparation import MANY_TRIALS, prepare, resume
+from throwcollect.collect.runs.preparation import add_runtime, prepare, resume
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin, Planning, RunFailure, RunRecord
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
+from throwcollect.collect.runtimes.run_record import Kind, Origin, RunFailure, RunRecord
 from throwcollect.collect.runtimes.runtime import choose, get_runtime
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.run import ContainerSpec
@@ -42,8 +38,6 @@ from throwcollect.files import open_log
 from throwcollect.own_process import stop_signals
 from throwcollect.ros.router_endpoint import reserve_port
 from throwcollect.side_by_side import count_cores
-
-_WRITE_PLANNING_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -67,7 +61,7 @@ def begin_run(
     output: Path,
     run: str | None = None,
     origin: Origin | None = None,
-    kind: Literal["collection", "session"] = "collection",
+    kind: Kind = "collection",
     resumed: bool = False,
 ) -> Run:
     """Begin a run in a process of its own, which outlives this one; return as soon as the run has a record.
@@ -86,12 +80,8 @@ def begin_run(
         _check_session(read)
     made = Records().new(read.name, run=run)
     directory = made.files / "data" if kind == "session" else output
-    record = replace(
-        # The directory of the dataset has to be empty until the plan is made, so logs cannot lie there yet.
-        RunRecord.begin(made.id, read.name, directory, logs=made.files / "logs", kind=kind, origin=origin),
-        domain_id=read.run.domain_id,
-        simulations=read.run.simulations,
-    )
+    record = made.begin(read.name, directory, kind=kind, origin=origin, domain_id=read.run.domain_id)
+    record = replace(record, simulations=read.run.simulations)
     order = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
     return _begin(made, record, _ORDERS.dump_json(order))
 
@@ -103,117 +93,82 @@ def begin_container(spec: ContainerSpec, *, run: str, origin: Origin, urdf: Path
     """
     check_request(spec, origin)
     made = Records().new(origin.component, run=run)
-    directory, logs = made.files / "data", made.files / "logs"
+    directory = made.files / "data"
 
     def lay_out() -> None:
         directory.mkdir()
         if urdf is not None:
             shutil.copyfile(urdf, directory / DESCRIPTION)
 
-    record = RunRecord.begin(
-        made.id, origin.component, directory, logs=logs, runtime="docker", kind="container", origin=origin
-    )
+    record = made.begin(origin.component, directory, runtime="docker", kind="container", origin=origin)
     return _begin(made, record, _SPECS.dump_json(spec), lay_out)
 
 
 def _begin(run: Run, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
-    """Start the process of a run, write the record with its id, send it the order; `lay_out` makes further files."""
-    process: subprocess.Popen[bytes] | None = None
+    """Hand the run over to a process of its own; `lay_out` makes further files."""
     try:
-        logs = Path(record.logs)
-        logs.mkdir(exist_ok=True)
+        record.logs.mkdir(exist_ok=True)
         lay_out()
-        # The process needs a second until it can handle signals; a request to stop stays blocked until then.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
-        try:
-            process = run.start_process(logs, stdin=subprocess.PIPE)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        run.write(replace(record, launcher=process.pid))
-        # The process waits for the order before it changes the record, so the record has to be written first.
-        with cast(IO[bytes], process.stdin) as pipe:
-            pipe.write(order)
+        run.hand_over(record, order)
     except BaseException as error:
-        if process is not None:
-            process.kill()
-            process.wait()
         run.forget()
         if isinstance(error, OSError):
             raise WorkerError(f"run {run.id} cannot be begun: {error}") from error
         raise
-    run.close()
     return run.now()
 
 
 def carry_out(id: str, lock: int, order: bytes, *, reporter: Reporter, interruptions: Callable[[], int]) -> None:
-    """Launch a run in the process that `Run.start_process` has started, and prepare it before, if there is an order.
+    """Launch a run in the process that `Run.hand_over` has started, and prepare it before, if there is an order.
 
     This process has inherited the locked file. Signals that ask it to stop may be blocked until it calls this function;
     from now on, `interruptions` counts them.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
-    run = Records().inherit(id, lock)
+    run = Records().open(id, lock=lock)
     if not order:
-        launch(run, interruptions, config=load(config_path(run.context.directory)), reporter=reporter)
+        launch(run, interruptions, config=load(config_path(run.record.directory)), reporter=reporter)
         return
     if run.record.kind == "container":
         launch_container(run, _SPECS.validate_json(order), reporter=reporter, interruptions=interruptions)
         return
-    log = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
+    log = NodeLogs(run.record.logs).path(LAUNCHER)
+
+    def end_if_asked() -> None:
+        if interruptions():
+            raise Interrupted("stopped before any node was started")
+
     # If anything fails before the launch, the error is written into the record, and then the files of the run are
     # removed.
     with ExitStack() as made:
         try:
-            planner = _Planner(run, reporter, interruptions)
-            if _prepare(run, _ORDERS.validate_json(order), planner) is None:
+            if _prepare(run, _ORDERS.validate_json(order), _Planner(reporter, end_if_asked)) is None:
                 run.update(ended=datetime.now(timezone.utc), exit_code=0)
                 run.close()
                 return
             made.enter_context(run)
-            _move_log(log, NodeLogs(Path(run.record.logs)).path(LAUNCHER))
+            _move_log(log, NodeLogs(run.record.logs).path(LAUNCHER))
             # The last steps of the preparation do not check for a request to stop, and may have taken long.
-            planner.end_if_asked()
+            end_if_asked()
         except ThrowcollectError as error:
-            end = datetime.now(timezone.utc)
-            run.update(ended=end, exit_code=error.exit_code, failure=RunFailure.of(error), planning=None)
+            run.update(ended=datetime.now(timezone.utc), exit_code=error.exit_code, failure=RunFailure.of(error))
             raise
         run.collect(interruptions=interruptions)
 
 
 class _Planner(Reporter):
-    """Writes the progress of the plan into the record, ends the planning on a request to stop, passes all else on.
+    """Passes what the preparation reports on, and ends it on a request to stop."""
 
-    It is the reporter of the preparation, and passes on to the reporter of the run.
-    """
-
-    def __init__(self, run: Run, reporter: Reporter, interruptions: Callable[[], int]) -> None:
-        self._onlooker = reporter
-        self._run = run
-        self._interruptions = interruptions
-        self._write_at = 0.0
-
-    def update(self, progress: Progress) -> None:
-        self._onlooker.update(progress)
+    def __init__(self, reporter: Reporter, end_if_asked: Callable[[], None]) -> None:
+        self._reporter = reporter
+        self._end_if_asked = end_if_asked
 
     def say(self, line: str) -> None:
-        self._onlooker.say(line)
+        self._end_if_asked()
+        self._reporter.say(line)
 
     def warn(self, line: str) -> None:
-        self._onlooker.warn(line)
-
-    def update_plan(self, checked: int, trials: int) -> None:
-        """Take in how many of a plan's trials have been checked."""
-        self.end_if_asked()
-        if trials >= MANY_TRIALS and time.monotonic() >= self._write_at:
-            self._write_at = time.monotonic() + _WRITE_PLANNING_S
-            # If the record cannot be written, planning goes on; the first write after the plan reports the error.
-            with suppress(ConfigError):
-                self._run.update(planning=Planning(checked, trials))
-
-    def end_if_asked(self) -> None:
-        """End the preparation on a request to stop."""
-        if self._interruptions():
-            raise Interrupted("stopped before any node was started")
+        self._reporter.warn(line)
 
 
 def _move_log(before: Path, after: Path) -> None:
@@ -247,20 +202,16 @@ def _prepare(run: Run, order: Order, reporter: Reporter) -> Run | None:
 
 def _prepare_session(run: Run, order: Order, reporter: Reporter) -> Run:
     with load_locating_errors(order.config, order.overrides) as read:
-        _check_session(read)
         # Clients of a session act in real time. The file has the factor, as nodes and watchers take it from there.
         config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
-        directory = run.context.directory
+        directory = run.record.directory
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
         reserve_port(config.run).close()
         choice = choose(config, say=reporter.say, warn=reporter.warn)
-        simulations = choice.runtime.simulations(config)
         # Containers do not see the directory.
-        recordings = str(order.output) if choice.name == "local" else None
-        run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations, recordings=recordings)
-        # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
-        choice.runtime.host(run.context, config, warn=reporter.warn).close()
+        record = replace(run.record, recordings=str(order.output) if choice[0] == "local" else None)
+        run.write(add_runtime(record, config, *choice, reporter=reporter))
         launching = partial(launch, config=config, reporter=reporter)
         return run.prepared(config, directory, launching, held=ExitStack(), undo=ExitStack())
 

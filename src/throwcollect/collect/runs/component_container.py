@@ -11,9 +11,10 @@ from throwcollect.collect.coordinator.reporter import Reporter
 from throwcollect.collect.runs.launcher import launch_host
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin
 from throwcollect.collect.runs.run_selection import require_living
-from throwcollect.collect.runtimes.runtime import Host, RunContext, get_runtime
+from throwcollect.collect.runtimes.nodes import NodeHost
+from throwcollect.collect.runtimes.run_record import Origin, RunRecord
+from throwcollect.collect.runtimes.runtime import get_runtime
 from throwcollect.config.run import ContainerSpec
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
@@ -43,11 +44,11 @@ def launch_container(run: Run, spec: ContainerSpec, *, reporter: Reporter, inter
     """Run the container until it ends, the run that it joins ends, or the user asks to stop; close the run."""
     origin = cast(Origin, run.record.origin)
 
-    def host(context: RunContext) -> Host:
+    def host(record: RunRecord) -> NodeHost:
         from throwcollect.collect.runtimes.docker.component import ComponentContainer
 
         joining = None if origin.joins is None else _wait_for_router(origin.joins, spec, interruptions)
-        return ComponentContainer(context, origin.component, spec, joining, is_running=_is_running, warn=reporter.warn)
+        return ComponentContainer(record, origin.component, spec, joining, is_running=_is_running, warn=reporter.warn)
 
     launch_host(run, host, reporter=reporter, interruptions=interruptions)
 

@@ -11,19 +11,16 @@ from typing import TYPE_CHECKING
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
-from throwcollect.collect.runs.run_selection import id_of, require_living, require_simulations
+from throwcollect.collect.runs.run_selection import require_living, require_simulations
 from throwcollect.collect.runtimes.nodes import LAUNCHER, SIMULATIONS
 from throwcollect.collect.runtimes.runtime import find_runtime, get_runtime
 from throwcollect.errors import (
     ConfigError,
     ConflictError,
-    NotFoundError,
     ThrowcollectError,
     UnreachableError,
     WorkerError,
 )
-from throwcollect.files import StrPath
 from throwcollect.members import names_of
 from throwcollect.wording import command
 
@@ -57,47 +54,31 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
     return run.now()
 
 
-def down(named: StrPath | Run) -> tuple[str, list[str]]:
+def down(run: Run) -> list[str]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
-    `named` is a run, or a name that `find` accepts, or the id of a run without a record whose containers a runtime
-    still holds.
-
     Returns:
-        Id of the run, and names of the containers and networks that were removed.
+        Names of the containers and networks that were removed.
     """
-    records = Records()
-    try:
-        run = named.id if isinstance(named, Run) else id_of(records, named)
-    except NotFoundError:
-        run = os.fspath(named)  # type: ignore[arg-type]
-        if "/" in run or not (removed := _remove(run, names_of("runtimes"))):
-            raise
-        return run, removed
+    runtimes: Iterable[str] = names_of("runtimes")
+    evidence = None
     # A run whose record is damaged can be removed, too, but without the record its launcher's process id is unknown.
-    record: RunRecord | None = None
     with suppress(ConfigError):
-        found = records.get(run)
-        record = found.record
-        _end_launcher(found)
-    taken = records.take(run)
+        record = run.now().record
+        runtimes, evidence = (record.runtime,), f"its pid is {record.launcher}"
+        _end_launcher(run)
+    taken = Records().take(run.id)
     if taken is None:
-        evidence = None if record is None else f"its pid is {record.launcher}"
-        raise WorkerError(f"run {run}: its launcher does not end", evidence=evidence)
+        raise WorkerError(f"run {run.id}: its launcher does not end", evidence=evidence)
     try:
-        removed = _remove(run, names_of("runtimes") if record is None else (record.runtime,))
+        # A runtime that cannot be used here holds nothing.
+        removed = [name for each in filter(None, map(find_runtime, runtimes)) for name in each.remove(run.id)]
     except ThrowcollectError:
         # The record stays, so that the command can be repeated.
         taken.close()
         raise
     taken.forget()
-    return run, removed
-
-
-def _remove(run: str, runtimes: Iterable[str]) -> list[str]:
-    """Remove everything that runtimes hold of a run; one that cannot be used here holds nothing."""
-    usable = filter(None, map(find_runtime, runtimes))
-    return [name for runtime in usable for name in runtime.remove(run)]
+    return removed
 
 
 def scale(run: Run, simulations: int) -> None:

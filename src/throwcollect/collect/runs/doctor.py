@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
@@ -45,17 +46,14 @@ def _check_python() -> Check:
     return Check("python", "ok", found)
 
 
-def _check_cores() -> Check:
+def _check_machine() -> Iterator[Check]:
     cores = len(os.sched_getaffinity(0))
-    return Check("cores", "ok", f"{cores}; up to {format_count(cores, 'simulation')} side by side (`-n {cores}`)")
-
-
-def _check_memory() -> Check:
+    yield Check("cores", "ok", f"{cores}; up to {format_count(cores, 'simulation')} side by side (`-n {cores}`)")
     lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
     available = next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")) * 1024 / _GIB
     room = int(available / _SIMULATION_MEMORY_GIB)
     found = f"{available:.1f} GiB available, enough for {format_count(room, 'simulation')}"
-    return Check("memory", "ok" if room >= 1 else "problem", found)
+    yield Check("memory", "ok" if room >= 1 else "problem", found)
 
 
 def _check_engine(name: str) -> Check:
@@ -113,13 +111,6 @@ def _check_runtime(name: str) -> Check | None:
         return Check(name, "note", error.one_line)
 
 
-def _check_state() -> Check:
-    try:
-        return Check("state", "ok", f"runs are remembered in {state_directory()}")
-    except ConfigError as error:
-        return Check("state", "problem", error.one_line)
-
-
 def _check_rclpy() -> Check:
     lacking = ros_installation.missing()
     if "rclpy" in lacking:
@@ -143,9 +134,13 @@ def _check_embedded() -> Check:
     return Check("embedded", "ok", f"{found}; nodes run on {chosen}, as {VARIABLE} is {value or 'not set'}")
 
 
-def _check_disk(directory: Path) -> Check:
+def _check_disk(directory: Path) -> Iterator[Check]:
+    try:
+        yield Check("state", "ok", f"runs are remembered in {state_directory()}")
+    except ConfigError as error:
+        yield Check("state", "problem", error.one_line)
     free = shutil.disk_usage(directory).free / _GIB
-    return Check("disk", "ok" if free >= _LEAST_DISK_GIB else "problem", f"{free:.1f} GiB free in {directory}")
+    yield Check("disk", "ok" if free >= _LEAST_DISK_GIB else "problem", f"{free:.1f} GiB free in {directory}")
 
 
 def examine(directory: Path) -> list[Check]:
@@ -153,13 +148,11 @@ def examine(directory: Path) -> list[Check]:
     return [
         _check_python(),
         _check_extras(),
-        _check_cores(),
-        _check_memory(),
+        *_check_machine(),
         *map(_check_engine, ENGINE_PACKAGES),
         *map(_check_robot, names_of("robots")),
         _check_rclpy(),
         _check_embedded(),
         *filter(None, map(_check_runtime, names_of("runtimes"))),
-        _check_state(),
-        _check_disk(directory),
+        *_check_disk(directory),
     ]

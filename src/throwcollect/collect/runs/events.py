@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from throwcollect.collect.runtimes.runtime import NodeState, RunEvent
+from throwcollect.collect.runtimes.run_record import NodeState
 from throwcollect.files import open_log
 from throwcollect.wording import format_count
 
@@ -20,7 +20,7 @@ NodeEvent = Literal["started", "ready", "lost", "restarting", "given up", "froze
 _ALARMING = ("lost", "given up", "frozen")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Event:
     """An event of a run, or of one of its nodes.
 
@@ -33,7 +33,7 @@ class Event:
         exit_code: Exit code of a run that has ended.
     """
 
-    time: str
+    time: str = field(default_factory=lambda: datetime.now(timezone.utc).isoformat(timespec="milliseconds"))
     run: str
     event: str
     node: str | None = None
@@ -56,34 +56,23 @@ class Event:
         return f"{self.node or self.run} {self.event}" + (f": {text}" if text else "")
 
 
-class EventLog:
-    """Appends the events of one run to a file in its directory of logs, which is made if need be."""
+def append_events(logs: Path, events: Sequence[Event]) -> None:
+    """Append events to the file in a directory of logs, which is made if need be."""
+    if events:
+        documents = ({key: value for key, value in asdict(event).items() if value is not None} for event in events)
+        with open(open_log(logs / EVENTS), "a", encoding="utf-8") as file:
+            file.write("".join(f"{json.dumps(document)}\n" for document in documents))
 
-    def __init__(self, logs: Path, run: str) -> None:
-        self._path = logs / EVENTS
-        self._run = run
 
-    def run_event(self, event: RunEvent, **details: Any) -> None:
-        """Append an event of the run, with fields of `Event` as details."""
-        self._append([Event(_now(), self._run, event, **details)])
-
-    def node_events(self, before: Sequence[NodeState], after: Sequence[NodeState]) -> None:
-        """Append an event for each difference between two lists of states of the nodes."""
-        now = _now()
-        known = {state.name: state for state in before}
-        happened = [
-            (state.name, *change) for state in after for change in _find_changes(known.pop(state.name, None), state)
-        ]
-        happened += [(name, "removed", None, None) for name in known]
-        self._append(Event(now, self._run, event, name, handle, reason) for name, event, handle, reason in happened)
-
-    def _append(self, events: Iterable[Event]) -> None:
-        lines = [
-            json.dumps({key: value for key, value in asdict(event).items() if value is not None}) for event in events
-        ]
-        if lines:
-            with open(open_log(self._path), "a", encoding="utf-8") as file:
-                file.write("\n".join([*lines, ""]))
+def compare_states(run: str, before: Sequence[NodeState], after: Sequence[NodeState]) -> list[Event]:
+    """Make an event of a run for each difference between two lists of states of its nodes."""
+    known = {state.name: state for state in before}
+    events = [
+        Event(run=run, event=event, node=state.name, handle=handle, reason=reason)
+        for state in after
+        for event, handle, reason in _find_changes(known.pop(state.name, None), state)
+    ]
+    return events + [Event(run=run, event="removed", node=name) for name in known]
 
 
 def parse(line: str) -> Event | None:
@@ -108,7 +97,3 @@ def _find_changes(old: NodeState | None, new: NodeState) -> Iterator[tuple[NodeE
     # Router and coordinator count as running as soon as they have a handle, so that they have no event `ready`.
     if new.status == "running" and new.handle == old.handle and old.status in ("starting", "frozen"):
         yield "ready" if old.status == "starting" else "continued", None, None
-
-
-def _now() -> str:
-    return datetime.now(timezone.utc).isoformat(timespec="milliseconds")

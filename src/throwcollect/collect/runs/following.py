@@ -5,18 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.runs.events import EVENTS, Event, parse
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Summary
 from throwcollect.collect.runs.run_selection import describe_death
 from throwcollect.collect.runtimes.node_logs import NodeLogs, Tail
+from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
 from throwcollect.wording import suggest
 
-_POLL_S = 0.05
 _READ_S = 0.2
 
 
@@ -42,32 +40,26 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
     Yields:
         An update; the last one shows a run that has ended or died, unless `keep_on` returned false.
     """
-    run.record.middleware.joining.settle()
-    from throwcollect.collect.runtimes.run_listener import RunListener
-
-    events = Tail(_locate_events(run))
+    events = Tail(run.record.logs / EVENTS)
     events.skip()
-    reports: list[Progress] = []
-    with RunListener(reports.append) as listener:
-        yield RunUpdate(run)
-        while run.status == "running" and keep_on():
-            reports.clear()
-            listener.spin(run.connection, _POLL_S)
-            # The launcher writes events before the record, so the last record is read before the last events.
-            run = run.now()
-            happened = tuple(event for event, _ in _read_new_events(events, run))
-            yield RunUpdate(run, reports[-1] if reports else None, happened)
+    yield RunUpdate(run)
+    while run.status == "running" and keep_on():
+        time.sleep(_READ_S)
+        known = run.record.progress
+        # The launcher writes events before the record, so the last record is read before the last events.
+        run = run.now()
+        happened = tuple(event for event, _ in _read_new_events(events, run))
+        yield RunUpdate(run, run.record.progress if run.record.progress != known else None, happened)
 
 
-def wait(run: Run) -> Summary:
+def wait(run: Run) -> Info:
     """Wait until a run has ended.
 
     Returns:
         The summary of the dataset; its outcomes show whether trials are lost.
     """
-    while run.status == "running":
-        time.sleep(_READ_S)
-        run = run.now()
+    for update in follow(run):
+        run = update.run
     if run.status == "died":
         raise describe_death(run)
     if run.record.summary is None:
@@ -85,13 +77,13 @@ def read_logs(
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.
     """
-    files = NodeLogs(Path(run.record.logs)).files()
+    files = NodeLogs(run.record.logs).files()
     known = {*files, *(state.name for state in run.record.nodes)}
     if unknown := [node for node in nodes if node not in known]:
         raise ConfigError(f"run {run.id}: no node {unknown[0]!r} has printed anything{suggest(unknown[0], files)}")
     tails: dict[str, Tail] = {}
     for now, last in _read_repeatedly(run, follow=follow, keep_on=keep_on):
-        files = NodeLogs(Path(now.record.logs)).files()
+        files = NodeLogs(now.record.logs).files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
             if not nodes or name in nodes:
@@ -107,7 +99,7 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
     Yields:
         An event, and the line of JSON in which it is written.
     """
-    tail = Tail(_locate_events(run))
+    tail = Tail(run.record.logs / EVENTS)
     for now, _ in _read_repeatedly(run, follow=True, keep_on=keep_on):
         yield from _read_new_events(tail, now)
 
@@ -115,15 +107,11 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
 def _read_new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
     """The events of a run that were written since the last call, and the line of each."""
     # A run that is begun in the background moves its events and logs to another directory once its plan is made.
-    tail.path = _locate_events(run)
+    tail.path = run.record.logs / EVENTS
     for line in tail.lines():
         # If the run resumes a dataset, the file has the events of earlier runs, too.
         if (event := parse(line)) is not None and event.run == run.id:
             yield event, line
-
-
-def _locate_events(run: Run) -> Path:
-    return Path(run.record.logs) / EVENTS
 
 
 def _read_repeatedly(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import base64
-import binascii
-import json
 import os
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from throwcollect.build import build_digest
 from throwcollect.collect.coordinator.progress import Progress
@@ -23,10 +21,10 @@ from throwcollect.collect.runtimes.nodes import (
     CONFIGURATION,
     LAUNCHER,
     ROBOT_FILES,
-    simulation_name_of,
-    simulation_nodes,
+    list_simulations,
+    name_simulation_on,
 )
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
@@ -40,7 +38,7 @@ from throwcollect.ros.router_endpoint import split_address
 from throwcollect.run_key import RunKey
 from throwcollect.wording import format_count
 
-_START = "tc2."
+_START = "tc3."
 """Beginning of every token; the number is the version of the format."""
 _ANSWER_S = 15.0
 """Time in which the router, and then the launcher, has to answer."""
@@ -58,56 +56,51 @@ class JoinToken:
     Attributes:
         endpoint: Endpoint at which other machines reach the router.
         secret: Secret of the key of the run, in hexadecimal.
-        build: Digest over the code that computes the run's throws with this engine, robot, tool and task; see
-            `throwcollect.build`.
+        parts: Engine, robot, tool, task and policy of the run, as arguments of `build_digest`.
+        build: Digest over the code that computes the run's throws with these; see `throwcollect.build`.
     """
 
     run: str
     endpoint: str
     secret: str
     domain_id: int
-    engine: str
+    parts: tuple[str, ...]
     build: str
-    robot: str = "talos"
-    tool: str = "spoon"
-    task: str = "throw"
-    policy: str = ""
 
     @classmethod
     def of(cls, run: str, endpoint: str, key: RunKey, config: Config) -> JoinToken:
         """Make the token of a run with this configuration."""
         policy = config.task.policy.use if config.task.policy else ""
-        names = config.sim.engine, build_of(config), config.robot.name, config.tool.name, config.task.name, policy
-        return cls(run, endpoint, key.secret.hex(), config.run.domain_id, *names)
+        parts = config.sim.engine, config.robot.name, config.tool.name, config.task.name, policy
+        return cls(run, endpoint, key.secret.hex(), config.run.domain_id, parts, build_of(config))
 
     def encode(self) -> str:
         """The token as one word."""
-        text = json.dumps(asdict(self), separators=(",", ":"))
-        return _START + base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
+        return _START + base64.urlsafe_b64encode(_JSON.dump_json(self)).decode().rstrip("=")
 
     @classmethod
     def decode(cls, word: str) -> JoinToken:
         """Read a token."""
-        data = word.strip().removeprefix(_START)
+        start, _, data = word.strip().partition(".")
         try:
-            if data == word.strip():
-                raise ValueError(word)
             # `encode` leaves out the padding, but `b64decode` demands it.
             text = base64.b64decode(data + "=" * (-len(data) % 4), altchars=b"-_", validate=True)
             token = _JSON.validate_json(text)
             bytes.fromhex(token.secret)
             split_address(token.endpoint)
-        except (ValueError, binascii.Error, ValidationError) as error:
+            if f"{start}." != _START:
+                raise ValueError(start)
+        # Errors of base64 and pydantic are ValueErrors, too.
+        except ValueError as error:
             raise ConfigError("this is no token of a run, or only a part of one", expected=f"{_START}...") from error
         return token
 
     def check_build(self) -> None:
         """Check that this machine would compute the same throws as the run's own machine."""
-        if self.build != build_digest(self.engine, self.robot, self.tool, self.task, self.policy):
+        if self.build != build_digest(*self.parts):
             raise ConfigError(
-                f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
-                f"package of the robot {self.robot}, the tool {self.tool} or the task {self.task}, and would collect "
-                "other bytes",
+                f"run {self.run}: this machine has other sources, or another build or package of one of "
+                f"{', '.join(filter(None, self.parts))}, and would collect other bytes",
                 hint="install the same versions on both machines, or the image on both; throwcollect doctor shows the "
                 "build of each",
             )
@@ -139,8 +132,8 @@ def join_run(
         unpack_robot(files, scratch)
         config = load(scratch / "config.yaml")
         reporter.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
-        context = RunContext(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
-        _simulate(LocalNodes(context, config, elsewhere=token.endpoint), connection, config, reporter, interruptions)
+        record = RunRecord(token.run, scratch, scratch / "logs", simulations, Middleware(), key)
+        _simulate(LocalNodes(record, config, elsewhere=token.endpoint), connection, config, reporter, interruptions)
 
 
 def _simulate(
@@ -149,13 +142,19 @@ def _simulate(
     """Keep the simulations alive until the run is over."""
     from throwcollect.collect.runtimes.run_listener import RunListener
 
-    reports = _Reports(reporter)
+    heard_at, finished = time.monotonic(), False
+
+    def update(progress: Progress) -> None:
+        nonlocal heard_at, finished
+        heard_at, finished = time.monotonic(), progress.steps[0] >= progress.steps[1]
+        reporter.update(progress)
+
     # Names of nodes have to be unique, and several processes of one machine may join.
-    name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
-    roster = simulation_nodes([f"{name}_{index}" for index in range(host.context.simulations)], host.data)
-    with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
+    name = name_simulation_on(f"{socket.gethostname()}_{os.getpid()}")
+    roster = list_simulations([f"{name}_{index}" for index in range(host.record.simulations)], host.data)
+    with Supervisor(host, config.run, roster) as supervisor, RunListener(update) as listener:
         supervisor.start()
-        while not reports.over and not interruptions():
+        while not interruptions() and time.monotonic() <= heard_at + (_OVER_S if finished else _SILENT_S):
             listener.spin(connection, _POLL_S)
             # The first value is the end of the main node, which is on another machine.
             _, news = supervisor.poll()
@@ -163,30 +162,11 @@ def _simulate(
                 reporter.warn(line)
     if interruptions():
         reporter.say("left; the run goes on without the simulations of this machine")
-    elif reports.finished:
+    elif finished:
         reporter.say("the run is over")
     else:
-        raise WorkerError(
-            f"no report of the run has arrived for {_SILENT_S:g} s", hint="join it again if it still goes on"
-        )
-
-
-class _Reports:
-    """Passes reports of the coordinator on, and concludes from them whether the run is over."""
-
-    def __init__(self, reporter: Reporter) -> None:
-        self._onlooker = reporter
-        self._last_at = time.monotonic()
-        self.finished = False
-
-    def update(self, progress: Progress) -> None:
-        self._last_at = time.monotonic()
-        self.finished = progress.steps[0] >= progress.steps[1]
-        self._onlooker.update(progress)
-
-    @property
-    def over(self) -> bool:
-        return time.monotonic() > self._last_at + (_OVER_S if self.finished else _SILENT_S)
+        message = f"no report of the run has arrived for {_SILENT_S:g} s"
+        raise WorkerError(message, hint="join it again if it still goes on")
 
 
 def _read_configuration(connection: Connection, token: JoinToken) -> tuple[str, str]:

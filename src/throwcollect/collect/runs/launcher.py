@@ -6,25 +6,26 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
-from pathlib import Path
 from typing import Any
 
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.coordinator.reporter import Reporter
-from throwcollect.collect.runs.events import EventLog
+from throwcollect.collect.runs.events import Event, append_events, compare_states
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunFailure, Summary
-from throwcollect.collect.runtimes.runtime import Host, NodeState, RunContext, RunEvent, get_runtime
+from throwcollect.collect.runtimes.nodes import NodeHost
+from throwcollect.collect.runtimes.run_record import NodeState, RunFailure, RunRecord
+from throwcollect.collect.runtimes.runtime import Host, RunEvent, get_runtime
 from throwcollect.config.schema import Config
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.summary import explain_loss
+from throwcollect.dataset.summary import Info, explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError
 from throwcollect.wording import command
 
 _WRITE_PROGRESS_S = 1.0
+_ENDS: dict[int, RunEvent] = {0: "finished", LossError.exit_code: "finished", Interrupted.exit_code: "stopped"}
 
 
-def launch(run: Run, interruptions: Callable[[], int], *, config: Config, reporter: Reporter) -> Summary | None:
+def launch(run: Run, interruptions: Callable[[], int], *, config: Config, reporter: Reporter) -> Info | None:
     """Launch a prepared run until its last trial has ended.
 
     A run that collects no dataset goes on until the user stops it. This function writes the end of the run into its
@@ -35,54 +36,57 @@ def launch(run: Run, interruptions: Callable[[], int], *, config: Config, report
         The summary of the dataset, whose outcomes show whether trials are lost; None if the run collects none.
     """
 
-    def host(context: RunContext) -> Host:
-        run.record.middleware.joining.settle()
-        return get_runtime(run.record.runtime).host(context, config, warn=reporter.warn)
+    def make_host(record: RunRecord) -> Host | NodeHost:
+        return get_runtime(record.runtime).host(record, config, warn=reporter.warn)
 
-    return launch_host(run, host, reporter=reporter, interruptions=interruptions, is_open=config.run.open)
+    return launch_host(run, make_host, reporter=reporter, interruptions=interruptions)
 
 
 def launch_host(
     run: Run,
-    make_host: Callable[[RunContext], Host],
+    make_host: Callable[[RunRecord], Host | NodeHost],
     *,
     reporter: Reporter,
     interruptions: Callable[[], int],
-    is_open: bool = False,
-) -> Summary | None:
-    """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
-
-    With `is_open`, joining the run takes no key.
-    """
+) -> Info | None:
+    """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`."""
     session = _Session(run, reporter, interruptions)
-    context = run.context
-    # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always has an end.
-    code, summary = 1, None
-    failure: RunFailure | None = RunFailure("internal error")
-    host: Host | None = None
+    record = run.record
+    # If another error than a `ThrowcollectError` is raised, the record gets this one, so it always has an end.
+    error: ThrowcollectError | None = ThrowcollectError("internal error")
+    summary: Info | None = None
+    host: Host | NodeHost | None = None
     try:
-        host = make_host(context)
-        with hold_lock(context.directory, alone=False):
+        record.middleware.joining.settle()
+        host = make_host(record)
+        with hold_lock(record.directory, alone=False):
             run.update(launcher=os.getpid())
-            info = host.collect(session)
-            summary = None if info is None else Summary(**vars(info), open=is_open)
-        lost = None if summary is None else explain_loss(summary.outcomes, hint=context.resume_command)
-        code, failure = (0, None) if lost is None else (lost.exit_code, RunFailure.of(lost))
+            summary = _collect(host, session)
+        error = None if summary is None else explain_loss(summary.outcomes, hint=record.resume_command)
         return summary
-    except ThrowcollectError as error:
-        code, failure = error.exit_code, RunFailure.of(error)
+    except ThrowcollectError as raised:
+        error = raised
         raise
     except KeyboardInterrupt:
         # In a Python program, Ctrl-C raises this wherever the program is.
-        code, failure = Interrupted.exit_code, RunFailure("interrupted")
+        error = Interrupted("interrupted")
         raise
     finally:
         left = host is not None and not host.cleared
         if left:
             reporter.warn(f"containers of this run may be left: {command('down', '--run', run.id)} ends them")
         # The end is written into the record before the lock is released; otherwise the run would look dead in between.
-        session.end(code, failure, summary, left=left)
+        session.end(error, summary, left=left)
         run.close()
+
+
+def _collect(host: Host | NodeHost, session: _Session) -> Info | None:
+    if not isinstance(host, NodeHost):
+        return host.collect(session)
+    # This imports ROS, so it has to wait until the backend is chosen.
+    from throwcollect.collect.runtimes.node_collection import NodeCollection
+
+    return NodeCollection(host, session).run_to_the_end()
 
 
 class _Session:
@@ -93,8 +97,7 @@ class _Session:
         self.say = reporter.say
         self.warn = reporter.warn
         self._run = run
-        self._onlooker = reporter
-        self._events = EventLog(Path(run.record.logs), run.id)
+        self._reporter = reporter
         self._states: list[NodeState] = []
         self._progress: Progress | None = None
         self._written_at = 0.0
@@ -103,51 +106,44 @@ class _Session:
     def update(self, progress: Progress) -> None:
         # The progress is written together with the next change of the nodes.
         self._progress = progress
-        self._onlooker.update(progress)
+        self._reporter.update(progress)
 
     def event(self, event: RunEvent, **details: Any) -> None:
-        self._write(lambda: self._events.run_event(event, **details))
+        self._write([Event(run=self._run.id, event=event, **details)])
         if event == "stopping":
-            self._write(lambda: self._run.update(stopping=True))
+            self._write(stopping=True)
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
-        if states != self._states:
-            before, self._states = self._states, list(states)
-            self._write(lambda: self._events.node_events(before, states))
+        before, self._states = self._states, list(states)
         progress = self._run.record.progress
         if time.monotonic() >= self._written_at + _WRITE_PROGRESS_S:
             self._written_at = time.monotonic()
             progress = self._progress or progress
-        self._write(
-            lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, progress=progress)
-        )
+        changes = {"nodes": tuple(states), "endpoint": endpoint, "simulations": simulations, "progress": progress}
+        self._write(compare_states(self._run.id, before, states), **changes)
 
-    def end(self, code: int, failure: RunFailure | None, summary: Summary | None, *, left: bool) -> None:
+    def end(self, error: ThrowcollectError | None, summary: Info | None, *, left: bool) -> None:
         """Write the end of the run; `left` is whether its containers may still exist."""
-        event: RunEvent = "failed"
-        if code in (0, LossError.exit_code):
-            event = "finished"
-        elif code == Interrupted.exit_code:
-            event = "stopped"
-        self.event(event, reason=failure and str(failure.error(code)), exit_code=code)
+        code, reason = (0, None) if error is None else (error.exit_code, str(error))
+        self.event(_ENDS.get(code, "failed"), reason=reason, exit_code=code)
         self._write(
-            lambda: self._run.update(
-                nodes=tuple(self._states) if left else (),
-                endpoint=None,
-                progress=self._progress or self._run.record.progress,
-                ended=datetime.now(timezone.utc),
-                exit_code=code,
-                failure=failure,
-                summary=summary,
-                left=left,
-            )
+            nodes=tuple(self._states) if left else (),
+            endpoint=None,
+            progress=self._progress or self._run.record.progress,
+            ended=datetime.now(timezone.utc),
+            exit_code=code,
+            failure=None if error is None else RunFailure.of(error),
+            summary=summary,
+            left=left,
         )
 
-    def _write(self, write: Callable[[], None]) -> None:
+    def _write(self, events: Sequence[Event] = (), **changes: Any) -> None:
+        """Append events, and change fields of the record."""
         try:
-            write()
+            append_events(self._run.record.logs, events)
+            self._run.update(**changes)
         except (OSError, ConfigError) as error:
             if not self._failed:
                 self._failed = True
                 reason = error.message if isinstance(error, ConfigError) else str(error)
-                self._onlooker.warn(f"the record and the events of this run are no longer written: {reason}")
+                self._reporter.warn(f"the record and the events of this run are no longer written: {reason}")

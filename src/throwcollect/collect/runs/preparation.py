@@ -15,9 +15,9 @@ from throwcollect.collect.coordinator.reporter import SILENT, Reporter
 from throwcollect.collect.runs.launcher import launch
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.collect.runs.run_selection import refuse_busy
-from throwcollect.collect.runtimes.runtime import RuntimeChoice, choose, get_runtime
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import choose, get_runtime
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import reading_config
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from throwcollect.plan.plan import Plan
-
-MANY_TRIALS = 1000
-"""A plan of this many trials takes seconds, so it is announced before it is made."""
 
 
 def prepare(
@@ -60,7 +57,12 @@ def prepare(
     with load_locating_errors(file, overrides) as read:
         directory = _name_directory(read.name) if output is None else Path(output)
         refuse_busy(directory, own=run)
-        draw = partial(_make_plan, read, file.parent, processes, reporter)
+
+        def draw() -> Plan:
+            from throwcollect.collect.coordinator.prepare import prepare as prepare_plan
+
+            return prepare_plan(read, directory, sweep_directory=file.parent, processes=processes, reporter=reporter)
+
         return prepare_run(read, directory, draw, reporter=reporter, run=run)
 
 
@@ -71,21 +73,12 @@ def _name_directory(name: str) -> Path:
     return directory.with_name(f"{name}-{datetime.now():%Y%m%d-%H%M%S}") if taken else directory
 
 
-def _make_plan(config: Config, sweep_directory: Path, processes: int, reporter: Reporter, directory: Path) -> Plan:
-    from throwcollect.collect.coordinator.prepare import prepare as prepare_plan
-
-    if (config.trials or 0) >= MANY_TRIALS and config.until is None:
-        reporter.say(f"plan: checking {config.trials} trials against limits and collisions, 0.3 to 3 ms for each")
-    return prepare_plan(config, directory, sweep_directory=sweep_directory, processes=processes, reporter=reporter)
-
-
 def resume(
     directory: str | os.PathLike[str],
     *,
     config: str | os.PathLike[str] | None = None,
     overrides: Sequence[str] = (),
     processes: int = 1,
-    simulate: bool = True,
     reporter: Reporter = SILENT,
     run: Run | None = None,
 ) -> Run | None:
@@ -96,31 +89,25 @@ def resume(
         config: The configuration's file; None takes the configuration that lies in the directory.
         overrides: Keys to change, as for `prepare`.
         processes: Number of processes that may check the trials of a larger plan, as for `prepare`.
-        simulate: Whether missing trials are run; if not, the dataset is finished at once with the episodes that are
-            whole, and all other trials are lost.
         reporter: Receives the progress.
         run: The run, if it has a record already; None makes a new one.
 
     Returns:
-        The run; None if every trial has ended, so that nothing is left to do, or if nothing should be simulated.
+        The run; None if every trial has ended, so that nothing is left to do.
     """
     directory = Path(directory)
     file = None if config is None else Path(config)
-    choices: list[RuntimeChoice] = []
+    choices: list[tuple[str, Middleware]] = []
     with reading_config(directory, file, overrides) as read:
         # This import takes long, and errors in the configuration need none of it.
-        from throwcollect.collect.coordinator.resume import finish_without_simulating, has_all_trials
+        from throwcollect.collect.coordinator.resume import has_all_trials
         from throwcollect.collect.coordinator.resume import resume as resume_plan
 
-        sweep_directory = directory if file is None else file.parent
-        if not simulate:
-            finish_without_simulating(read, directory, sweep_directory=sweep_directory, reporter=reporter)
-            return None
         end_left(directory, reporter, own=run)
         plan = resume_plan(
             read,
             directory,
-            sweep_directory=sweep_directory,
+            sweep_directory=directory if file is None else file.parent,
             processes=processes,
             # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
             before_writing=lambda: choices.append(choose(read, say=reporter.say, warn=reporter.warn)),
@@ -151,27 +138,27 @@ def end_left(directory: Path, reporter: Reporter, *, own: Run | None = None) -> 
 def prepare_run(
     config: Config,
     directory: Path,
-    plan: Plan | Callable[[Path], Plan],
+    plan: Plan | Callable[[], Plan],
     *,
     reporter: Reporter,
     run: Run | None = None,
-    choice: RuntimeChoice | None = None,
+    choice: tuple[str, Middleware] | None = None,
 ) -> Run:
     """Prepare a run into a directory; if that fails, all files that this function made are removed.
 
     Args:
         config: The configuration.
         directory: Directory of the dataset.
-        plan: The plan of the dataset in the directory, or a function that makes a new one in a directory.
+        plan: The plan of the dataset in the directory, or a function that makes a new one there.
         reporter: Receives the progress.
         run: The run, if it has a record already; None makes a new one.
-        choice: The runtime; None if it is not chosen yet.
+        choice: Name of the runtime and the middleware of its nodes; None if they are not chosen yet.
     """
     with ExitStack() as held, ExitStack() as undo:
         if run is None:
             run = Records().new(config.name)
             undo.callback(run.forget)
-            record = RunRecord.begin(run.id, config.name, directory, logs=directory)
+            record = run.begin(config.name, directory)
         else:
             record = run.record
         # The plan may take minutes, so a port that is taken is reported before it is made.
@@ -182,7 +169,7 @@ def prepare_run(
             from throwcollect.collect.runtimes.local import begin_imports
 
             begin_imports(*find_modules("engines", config.sim.engine), foreseen=config.model_dump_json())
-        made = plan(directory) if callable(plan) else plan
+        made = plan() if callable(plan) else plan
         # These imports would take long, but making the plan has made them already.
         from throwcollect.collect.coordinator.prepare import describe_plan
         from throwcollect.dataset.creation import remove_plan
@@ -193,20 +180,9 @@ def prepare_run(
             undo.callback(remove_plan, directory, made=is_new)
         # A runtime may take minutes to get an image, so it is chosen after all other checks.
         choice = choice or choose(config, say=reporter.say, warn=reporter.warn)
-        record = replace(
-            record,
-            runtime=choice.name,
-            directory=os.path.realpath(directory),
-            logs=str(directory.absolute() / "logs"),
-            launcher=os.getpid(),
-            domain_id=config.run.domain_id,
-            simulations=choice.runtime.simulations(config),
-            middleware=choice.middleware,
-        )
-        # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
-        choice.runtime.host(record.context(run.key), config, warn=reporter.warn).close()
-        run.write(record)
-        _warn_if_others_may_join(config, choice.middleware, reporter)
+        place, logs = Path(os.path.realpath(directory)), directory.absolute() / "logs"
+        run.write(add_runtime(replace(record, directory=place, logs=logs), config, *choice, reporter=reporter))
+        _warn_if_others_may_join(config, choice[1], reporter)
         reporter.say(f"plan: {describe_plan(made)}; dataset: {directory}")
         if config.sensors:
             from throwcollect.collect.coordinator.sensor_cost import measure_sensors
@@ -217,6 +193,21 @@ def prepare_run(
                     reporter.say(cost.words)
         launching = partial(launch, config=config, reporter=reporter)
         return run.prepared(config, directory, launching, held=held.pop_all(), undo=undo.pop_all())
+
+
+def add_runtime(
+    record: RunRecord, config: Config, name: str, middleware: Middleware, *, reporter: Reporter
+) -> RunRecord:
+    """Complete a record by the runtime of its run, and check that this can host the run."""
+    runtime = get_runtime(name)
+    simulations = config.run.simulations if runtime.can_be_scaled else 1
+    domain, launcher = config.run.domain_id, os.getpid()
+    record = replace(
+        record, runtime=name, middleware=middleware, simulations=simulations, domain_id=domain, launcher=launcher
+    )
+    # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
+    runtime.host(record, config, warn=reporter.warn).close()
+    return record
 
 
 def _warn_if_others_may_join(config: Config, middleware: Middleware, reporter: Reporter) -> None:

@@ -16,12 +16,9 @@ import fcntl
 import os
 import secrets
 import time
-from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
-
-from pydantic_core import to_json
 
 from throwcollect.collect.runs.run import Run
 from throwcollect.errors import ConfigError, ConflictError
@@ -74,8 +71,8 @@ class Records:
                 undo.pop_all()
             return made
 
-    def inherit(self, run: str, lock: int) -> Run:
-        """Open the run that the parent process has handed over, with the descriptor of its locked file."""
+    def open(self, run: str, *, lock: int = -1) -> Run:
+        """A run, whose record may be damaged; `lock` is the descriptor of the locked file of one that is taken over."""
         return Run(self._runs, run, lock=lock)
 
     def take(self, run: str) -> Run | None:
@@ -111,15 +108,16 @@ class Records:
 
     def all(self) -> list[Run]:
         """All runs whose records can be read, the latest last."""
-        return self._read(self.ids())
+        runs = []
+        for run in self.ids():
+            with suppress(ConfigError):
+                runs.append(self.get(run))
+        return sorted(runs, key=lambda run: run.record.started)
 
     def into(self, directory: Path) -> list[Run]:
         """Runs that collect, or have collected, into a directory; the latest last."""
-        name = os.path.realpath(directory)
-        # There may be thousands of records, so only those that contain the directory's name are parsed.
-        written = to_json(name)
-        runs = self._read(run for run in self.ids() if written in self._read_bytes(run))
-        return [run for run in runs if run.record.directory == name]
+        name = Path(os.path.realpath(directory))
+        return [run for run in self.all() if run.record.directory == name]
 
     def read_change_ns(self, run: str) -> int | None:
         """Time of the last change of a run's record, in ns of the file system's clock; None without a record."""
@@ -127,19 +125,6 @@ class Records:
             return (self._runs / f"{run}.json").stat().st_mtime_ns
         except OSError:
             return None
-
-    def _read(self, ids: Iterable[str]) -> list[Run]:
-        runs = []
-        for run in ids:
-            with suppress(ConfigError):
-                runs.append(self.get(run))
-        return sorted(runs, key=lambda run: run.record.started)
-
-    def _read_bytes(self, run: str) -> bytes:
-        try:
-            return (self._runs / f"{run}.json").read_bytes()
-        except OSError:
-            return b""
 
     def _forget_old(self) -> None:
         before = datetime.now(timezone.utc) - _REMEMBERED

@@ -12,25 +12,27 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import IO, Any, Literal, cast
 
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.collect.runs.run_record import RunRecord, Summary
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext, find_runtime
+from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
+from throwcollect.collect.runtimes.runtime import find_runtime
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError, ConflictError, Interrupted, NotFoundError, WorkerError
+from throwcollect.dataset.summary import Info
+from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import beside, open_log, write_all
-from throwcollect.own_process import count_interruptions, make_command
+from throwcollect.own_process import count_interruptions, make_command, stop_signals
 from throwcollect.ros.connection import Connection
+from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import format_endpoint, reach_from_elsewhere, split_address
 from throwcollect.run_key import RunKey
 from throwcollect.state_directory import is_locked, unusable
 from throwcollect.wording import command
 
-Launch = Callable[["Run", Callable[[], int]], Summary | None]
+Launch = Callable[["Run", Callable[[], int]], Info | None]
 """Launches a run in this process; the function that it gets counts how often the user has asked to stop."""
 _ADAPTER = TypeAdapter(RunRecord)
 _POLL_S = 0.05
@@ -87,11 +89,6 @@ class Run:
         return is_locked(self._lock_path)
 
     @property
-    def context(self) -> RunContext:
-        """The directories, key and middleware of the run, for its host."""
-        return self.record.context(self.key)
-
-    @property
     def connection(self) -> Connection | None:
         """The way into the ROS graph of the run; None while it has no router."""
         record = self.record
@@ -144,7 +141,7 @@ class Run:
             self._undo.close()
             self.close()
 
-    def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
+    def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Info:
         """Launch a prepared run in this process, and return when it has ended; see `launcher.launch`.
 
         `runs.stop` sends SIGTERM to the launcher of a run, which is this process. So that it does not end the program,
@@ -154,20 +151,20 @@ class Run:
         Returns:
             The summary of the dataset; its outcomes show whether trials are lost.
         """
-        launch = self._hand_over()
+        launch = self._take_launch()
         with count_interruptions(_find_fatal_signals()) as terminations:
             summary = launch(self, lambda: interruptions() + terminations())
         # Runs without a dataset have no summary. Only `background` prepares those, and it does not use the result.
-        return cast(Summary, summary)
+        return cast(Info, summary)
 
     def start(self, *, interruptions: Callable[[], int] = lambda: 0) -> Run:
         """Launch a prepared run in a process of its own, which outlives this one; return when its nodes are started.
 
         If the user asks to stop, which `interruptions` counts, this method asks the launcher to stop, and waits for it.
         """
-        self._hand_over()
+        self._take_launch()
         try:
-            process = self.start_process(Path(self.record.logs), stdin=subprocess.DEVNULL)
+            process = self.hand_over(self.record)
         except OSError as error:
             raise WorkerError(f"the launcher cannot be started: {error}") from error
         finally:
@@ -186,10 +183,13 @@ class Run:
             if (failure := run.record.error) is not None:
                 raise failure
             return run
-        if forwarded:
-            raise Interrupted("interrupted before any node was started")
-        evidence = NodeLogs(Path(run.record.logs)).tail(LAUNCHER)
+        evidence = NodeLogs(run.record.logs).tail(LAUNCHER)
         raise WorkerError(f"run {run.id}: its launcher died", evidence=evidence or None)
+
+    def begin(self, name: str, directory: Path, **facts: Any) -> RunRecord:
+        """Make the record of a run that this process launches; `facts` are further fields of it."""
+        shown = Path(os.path.realpath(directory))
+        return RunRecord(self.id, shown, self.files / "logs", 0, Middleware(), self.key, name=name, **facts)
 
     def prepared(self, config: Config, directory: Path, launch: Launch, *, held: ExitStack, undo: ExitStack) -> Run:
         """Make the run ready to be launched.
@@ -205,7 +205,7 @@ class Run:
         self._config, self._launch, self._held, self._undo = config, launch, held, undo
         return self
 
-    def _hand_over(self) -> Launch:
+    def _take_launch(self) -> Launch:
         """Hand the prepared run over to its launcher, which writes its end and keeps its files."""
         if self._launch is None or self.lock < 0:
             raise ConflictError(f"run {self.id}: was launched already", expected="a run that is prepared, not launched")
@@ -228,17 +228,34 @@ class Run:
         if changed != self.record:
             self.write(changed)
 
-    def start_process(self, logs: Path, *, stdin: int) -> subprocess.Popen[bytes]:
-        """Start a process that takes this run over, see `background.carry_out`, and prints into the launcher's log.
+    def hand_over(self, record: RunRecord, order: bytes = b"") -> subprocess.Popen[bytes]:
+        """Start a process that takes this run over, write the record with its id, and send it the order.
 
-        The process has a session of its own, so that it outlives the terminal. It inherits the lock, which this process
-        has to close then: otherwise the run would seem to outlive its launcher.
+        The process calls `background.carry_out`, prints into the launcher's log, and has a session of its own, so that
+        it outlives the terminal. It inherits the lock, which this process releases: otherwise the run would seem to
+        outlive its launcher.
         """
         words = [*make_command(), "begin", self.id, "--lock", str(self.lock)]
-        with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
-            return subprocess.Popen(
-                words, stdin=stdin, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[self.lock]
-            )
+        # The process needs a second until it can handle signals; a request to stop stays blocked until then.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
+        try:
+            with open(open_log(NodeLogs(record.logs).path(LAUNCHER)), "ab") as log:
+                process = subprocess.Popen(
+                    words, stdin=subprocess.PIPE, stdout=log, stderr=log, start_new_session=True, pass_fds=[self.lock]
+                )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        try:
+            # The process waits for the order before it changes the record, so the record has to be written first.
+            self.write(replace(record, launcher=process.pid))
+            with cast(IO[bytes], process.stdin) as pipe:
+                pipe.write(order)
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+        self.close()
+        return process
 
     def close(self) -> None:
         """Release the lock of the run; the record stays."""

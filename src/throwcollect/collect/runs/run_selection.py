@@ -7,7 +7,7 @@ from pathlib import Path
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.files import StrPath
@@ -16,8 +16,7 @@ from throwcollect.wording import command, suggest
 
 def find(named: StrPath) -> Run:
     """Find a run of this machine by its id, a unique beginning of its id, or the directory of its dataset."""
-    records = Records()
-    return records.get(id_of(records, named))
+    return Records().open(_find_id(Records(), named))
 
 
 def find_run_to_change(named: str | None, *, died: bool = False) -> Run:
@@ -42,7 +41,7 @@ def find_run_to_watch(named: str | None) -> Run:
     return find_run_to_change(named)
 
 
-def id_of(records: Records, named: StrPath) -> str:
+def _find_id(records: Records, named: StrPath) -> str:
     """Find the id of the run that a user names by its id, a unique beginning of its id, or its dataset's directory."""
     directory, named = Path(named), os.fspath(named)
     # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
@@ -76,34 +75,13 @@ def refuse_busy(directory: Path, *, own: Run | None = None) -> list[Run]:
 
 def describe_death(run: Run) -> WorkerError:
     """The error that the launcher of a run died before the run ended."""
-    hint = f"{command('down', '--run', run.id)} cleans up"
-    if has_complete_dataset(run):
-        return WorkerError(
-            f"run {run.id}: its launcher died, but the dataset is complete: {run.context.directory}", hint=hint
-        )
-    what = f"run {run.id}: its launcher died"
+    what, hint = f"run {run.id}: its launcher died", f"{command('down', '--run', run.id)} cleans up"
     # A runtime is chosen after the plan is made, so a run with neither has simulated no trial.
-    is_planned = run.record.runtime != "" or config_path(run.context.directory).is_file()
-    if run.record.kind == "collection" and is_planned:
-        what = f"{what}; finished throws are in {run.context.directory}"
-        if again := run.context.resume_command:
-            hint = f"{again} goes on where it ended; {hint}"
+    is_planned = run.record.runtime != "" or config_path(run.record.directory).is_file()
+    if is_planned and (again := run.record.resume_command):
+        what = f"{what}; finished throws are in {run.record.directory}"
+        hint = f"{again} goes on where it ended; {hint}"
     return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
-
-
-def has_complete_dataset(run: Run) -> bool:
-    """Whether nothing is left to collect into the directory of a run.
-
-    A later run may have continued the dataset. So the dataset itself is examined, unless this run has completed it.
-    """
-    if run.record.kind != "collection" or run.status == "running":
-        return False
-    if run.record.exit_code == 0:
-        return True
-    # This imports the libraries that read tables, which takes a while and is rarely needed.
-    from throwcollect.collect.coordinator.resume import is_complete
-
-    return is_complete(run.context.directory)
 
 
 def require_living(run: Run) -> RunRecord:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 from throwcollect.collect.coordinator.reporter import SILENT, Reporter
@@ -68,48 +66,28 @@ def collect_slice(
         reporter.say(f"{directory}: slice {slice} is finished, nothing is left to do")
         return False
     again = command("up", "--slice", slice, "--output", directory)
-    scratch = _find_scratch(config)
     earlier = find_attempts(directory, slice)
-    attempt = make_attempt(directory, slice, scratch=scratch)
+    attempt = make_attempt(directory, slice)
     create(attempt, plan)
     take_recordings(earlier, attempt)
-    # A scratch directory lies on the disk of this machine, which may be lost, so then the earlier attempts are kept.
-    if scratch is None:
-        remove_stopped(earlier)
-    reporter.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
-    with ExitStack() as unpublished:
-        if scratch is not None:
-            unpublished.callback(_keep_recordings, attempt, earlier, directory, slice)
-        with prepare_run(config, attempt, plan, reporter=reporter) as run:
-            try:
-                summary = run.collect(interruptions=interruptions)
-            except Interrupted as error:
-                mark_stopped(attempt)
-                raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
-        if (lost := explain_loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
-            raise lost
-        publish(attempt, directory, slice)
-        unpublished.pop_all()
-    return True
-
-
-def _keep_recordings(attempt: Path, earlier: Sequence[Path], directory: Path, slice: Slice) -> None:
-    """Move the recordings of an attempt that is over from the scratch directory into the directory of the dataset.
-
-    The next attempt may run on another machine, which does not see the scratch directory of this one.
-    """
-    kept = make_attempt(directory, slice)
-    take_recordings([attempt], kept)
-    mark_stopped(kept)
     remove_stopped(earlier)
-    shutil.rmtree(attempt, ignore_errors=True)
+    reporter.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
+    with prepare_run(config, attempt, plan, reporter=reporter) as run:
+        try:
+            summary = run.collect(interruptions=interruptions)
+        except Interrupted as error:
+            mark_stopped(attempt)
+            raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
+    if (lost := explain_loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
+        raise lost
+    publish(attempt, directory, slice)
+    return True
 
 
 def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
     """Read the configuration of a dataset that is to be collected in slices, with overrides as `collect_slice` has."""
     config = read_changed_config(directory, overrides)
     check_sliceable(config)
-    check_closed(config)
     return config
 
 
@@ -131,27 +109,13 @@ def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Confi
         return config
 
 
-def _find_scratch(config: Config) -> Path | None:
-    """The directory on this machine's own disk that `cluster.scratch` names; None if it names none."""
-    if (named := config.cluster.scratch) is None:
-        return None
-    path = Path(os.path.expandvars(named))
-    if not path.is_absolute() or "$" in str(path):
-        raise ConfigError([Problem(f"{named} is {path} here, not an absolute path", key="cluster.scratch")])
-    return path
-
-
 def check_sliceable(config: Config) -> None:
     """Check that a configuration can be collected in slices."""
     if config.until is not None:
         raise ConfigError(
             [Problem("a dataset whose end depends on its results cannot be collected in slices", key="until")],
             expected="a fixed number of trials",
-            hint="throwcollect submit --mode live collects it in one run on several nodes",
+            hint="throwcollect up --listen and throwcollect join-run collect it on several nodes",
         )
-
-
-def check_closed(config: Config) -> None:
-    """Check that others cannot join a run on a cluster, whose nodes many users share."""
     if config.run.open:
         raise ConfigError([Problem("should be false, as many users share the nodes of a cluster", key="run.open")])

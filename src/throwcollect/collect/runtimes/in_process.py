@@ -12,8 +12,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from throwcollect.collect.runtimes.nodes import COORDINATOR, simulation_name
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext, Runtime, Session, make_interruption_error
+from throwcollect.collect.runtimes.nodes import COORDINATOR, name_simulation
+from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
+from throwcollect.collect.runtimes.runtime import Runtime, Session
 from throwcollect.errors import Interrupted, LossError, ThrowcollectError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 _REPORT_EVERY_S = 0.2
 _IDLE_S = 0.05
-_SIMULATION = simulation_name(0)
+_SIMULATION = name_simulation(0)
 
 
 class InProcessRuntime(Runtime):
@@ -36,9 +37,9 @@ class InProcessRuntime(Runtime):
         """See `Runtime.describe`."""
         return "this process, with one simulation"
 
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> InProcess:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> InProcess:
         """Make the host of a run in this process."""
-        return InProcess(context, config)
+        return InProcess(record, config)
 
 
 class InProcess:
@@ -46,8 +47,8 @@ class InProcess:
 
     cleared = True
 
-    def __init__(self, context: RunContext, config: Config) -> None:
-        self._context = context
+    def __init__(self, record: RunRecord, config: Config) -> None:
+        self._record = record
         self._config = config
         self._reported_at = 0.0
 
@@ -61,7 +62,7 @@ class InProcess:
         from throwcollect.dataset.inspect import info
         from throwcollect.sim.simulator import Simulator
 
-        directory = self._context.directory
+        directory = self._record.directory
         session.event("started", simulations=1)
         with TrialCollection.open(directory, say=session.say) as collection:
             collection.warn = session.warn
@@ -71,13 +72,13 @@ class InProcess:
             finally:
                 simulator.close()
             if not collection.complete:
-                raise make_interruption_error(self._context)
+                raise self._record.interruption
 
             def wait() -> None:
                 """Wait for a moment for the process that simulates some trials again."""
                 if session.interruptions() > 1:
                     message = f"interrupted; the throws are in {directory}, the dataset is not finished"
-                    raise Interrupted(message, hint=self._context.resume_command)
+                    raise Interrupted(message, hint=self._record.resume_command)
                 time.sleep(_IDLE_S)
 
             # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.

@@ -27,11 +27,12 @@ from throwcollect.collect.runtimes.nodes import (
     NodeExit,
     NodeHost,
     NodeSpec,
+    choose_protocol,
     describe_end,
-    node_environment,
-    protocol_of,
+    make_environment,
 )
-from throwcollect.collect.runtimes.runtime import RunContext, Runtime, Session
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import Runtime
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
 from throwcollect.own_process import die_with_parent, make_command
@@ -42,7 +43,6 @@ from throwcollect.side_by_side import launching
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
-    from throwcollect.dataset.summary import Info
 
 _KILLED_S = 5.0
 """Time that a process has to end after SIGKILL."""
@@ -55,9 +55,9 @@ class LocalRuntime(Runtime):
         """See `Runtime.describe`."""
         return "local processes"
 
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
         """Make the host of a run; see `Runtime.host`."""
-        return LocalNodes(context, config)
+        return LocalNodes(record, config)
 
 
 class LocalNodes(NodeHost):
@@ -72,30 +72,23 @@ class LocalNodes(NodeHost):
 
     cleared = True
 
-    def __init__(self, context: RunContext, config: Config, *, elsewhere: str | None = None) -> None:
-        self.context = context
+    def __init__(self, record: RunRecord, config: Config, *, elsewhere: str | None = None) -> None:
+        self.record = record
         self.config = config
-        self.data = str(context.directory)
-        self.logs = NodeLogs(context.logs)
+        self.data = str(record.directory)
+        self.logs = NodeLogs(record.logs)
         self._reserved: socket.socket | None = None
         if elsewhere is not None:
             self.listen = self._endpoint = elsewhere
         else:
             self._reserved = reserve_port(config.run)
             host, port = self._reserved.getsockname()[:2]
-            protocol = protocol_of(config.run, context.middleware)
+            protocol = choose_protocol(config.run, record.middleware)
             self.listen = format_endpoint(protocol, host, port)
             self._endpoint = format_endpoint(protocol, reach_from_here(host), port)
-        connection = Connection(self._endpoint, context.key, config.run.domain_id, context.middleware)
-        self._environment = {**os.environ, **node_environment(connection)}
+        connection = Connection(self._endpoint, record.key, config.run.domain_id, record.middleware)
+        self._environment = {**os.environ, **make_environment(connection)}
         self._processes: dict[str, BaseProcess] = {}
-
-    def collect(self, session: Session) -> Info | None:
-        """See `runtime.Host.collect`."""
-        # This imports ROS, so it has to wait until the backend is chosen.
-        from throwcollect.collect.runtimes.node_collection import NodeCollection
-
-        return NodeCollection(self, session).run_to_the_end()
 
     @property
     def endpoint(self) -> str:

@@ -13,6 +13,7 @@ from throwcollect import ros
 from throwcollect.collect.coordinator.progress import Progress
 from throwcollect.collect.runtimes.nodes import (
     CONFIGURATION,
+    CONTAINER,
     COORDINATOR,
     LAUNCHER,
     ROBOT_FILES,
@@ -23,11 +24,11 @@ from throwcollect.collect.runtimes.nodes import (
     NodeRole,
     NodeSpec,
     is_simulation,
-    simulation_name,
-    simulation_nodes,
+    list_simulations,
+    name_simulation,
 )
 from throwcollect.collect.runtimes.run_listener import RunListener
-from throwcollect.collect.runtimes.runtime import Session, make_interruption_error
+from throwcollect.collect.runtimes.runtime import Session
 from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.dataset.carried_robot import config_text, pack_robot
 from throwcollect.dataset.summary import Info
@@ -46,11 +47,13 @@ Something is wrong after the first of these times plus the second one for each s
 
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     """List the nodes of a run: a router, simulations, and a coordinator if the run collects a dataset."""
-    rest_s = SERVER_REST_S if host.context.middleware.is_fast_dds else 0.0
+    if host.record.kind == "container":
+        return [NodeSpec(CONTAINER, (), NodeRole.MAIN)]
+    rest_s = SERVER_REST_S if host.record.middleware.is_fast_dds else 0.0
     return [
         NodeSpec(ROUTER, ("router", "--listen", host.listen), NodeRole.VITAL, rest_s=rest_s),
-        *simulation_nodes([*map(simulation_name, range(simulations))], host.data, recordings=host.context.recordings),
-        *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.context.collects else []),
+        *list_simulations([*map(name_simulation, range(simulations))], host.data, recordings=host.record.recordings),
+        *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.record.collects else []),
     ]
 
 
@@ -69,36 +72,38 @@ def offer_scaling(node: ros.Node, simulations: int, on_wanted: Callable[[int], N
 
 
 class NodeCollection:
-    """Drives one run with nodes, a collection or a session; closes the host at the end."""
+    """Drives one run with nodes; closes the host at the end."""
 
     def __init__(self, host: NodeHost, session: Session) -> None:
         self._host = host
         self._session = session
-        self._simulations = self._wanted = host.context.simulations
+        self._simulations = self._wanted = host.record.simulations
         self._apart_since = math.inf
         self._started_again = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
-        self._listener = RunListener(self._report, name=LAUNCHER, reports=host.context.collects, on_connect=self._offer)
+        self._listener = RunListener(self._report, name=LAUNCHER, reports=host.record.collects, on_connect=self._offer)
 
     def run_to_the_end(self) -> Info | None:
-        """See `runtime.Host.collect`."""
+        """Collect until every trial has ended; a run without a dataset goes on until it is stopped."""
         with self._supervisor, self._listener:
             self._host.open()
             self._session.event("started", simulations=self._simulations)
             self._supervisor.start()
             end = self._follow()
-            if not self._host.context.collects:
-                return None
             self._check(end)
+            if not self._host.record.collects:
+                return None
             # The simulations end while this process reads the dataset.
             self._supervisor.dismiss()
-            return self._host.info()
+            from throwcollect.dataset.inspect import info
+
+            return info(self._host.record.directory)
 
     def _follow(self) -> NodeExit | None:
         """Look after the nodes until the run ends or is interrupted.
 
         Returns:
-            How the coordinator ended; None if it had to be ended by force, or there is none.
+            How the main node ended; None if it had to be ended by force, or there is none.
         """
         end = None
         while end is None and not self._session.interruptions():
@@ -113,7 +118,7 @@ class NodeCollection:
             self._session.nodes(self._supervisor.states(), endpoint=self._host.endpoint, simulations=self._simulations)
         if end is None:
             self._session.event("stopping")
-            if not self._host.context.collects:
+            if not self._host.record.collects:
                 return None
             self._session.say("interrupted: finishing the running trials; once more ends at once")
             end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
@@ -122,15 +127,15 @@ class NodeCollection:
         return end
 
     def _check(self, end: NodeExit | None) -> None:
-        context = self._host.context
+        record = self._host.record
         # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
-        finished = end is not None and end.code in (0, LossError.exit_code)
-        if self._session.interruptions() and not finished:
-            raise make_interruption_error(context)
+        finished = end is not None and (end.code == 0 or (record.collects and end.code == LossError.exit_code))
+        if record.collects and self._session.interruptions() and not finished:
+            raise record.interruption
         if end is not None and not finished:
             kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
-            hint = context.resume_command if kind is WorkerError else None
-            raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
+            hint = record.resume_command if kind is WorkerError else None
+            raise kind(f"the {end.name} stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
     def _listen(self) -> None:
         self._listener.spin(self._host.connection, _POLL_S)
@@ -160,7 +165,7 @@ class NodeCollection:
         else:
             raise WorkerError(
                 f"simulations have been ready for {patience_s:g} s, twice, but the coordinator does not see them",
-                evidence=f"they use {self._host.context.middleware.rmw}, and the router at {self._host.endpoint}",
+                evidence=f"they use {self._host.record.middleware.rmw}, and the router at {self._host.endpoint}",
                 hint="throwcollect logs router shows what it printed; a firewall may keep nodes apart",
             )
 

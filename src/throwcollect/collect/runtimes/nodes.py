@@ -12,7 +12,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from throwcollect.collect.runtimes.node_logs import NodeLogs
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.run import RunConfig
 from throwcollect.own_process import SERIAL_LIBRARIES
 from throwcollect.ros.connection import Connection
@@ -21,10 +21,11 @@ from throwcollect.ros.middleware import Middleware
 if TYPE_CHECKING:
     # Modules that need only the names of nodes should not wait for these imports.
     from throwcollect.config.schema import Config
-    from throwcollect.dataset.summary import Info
 
 ROUTER = "router"
 COORDINATOR = "coordinator"
+CONTAINER = "container"
+"""Name of the only node of a run that is a container of the catalogue."""
 LAUNCHER = "launcher"
 """Name of the launcher's node; the launcher never runs in a container."""
 SIMULATIONS = "simulations"
@@ -38,12 +39,12 @@ ROBOT_FILES = "robot_files"
 _SIMULATION = "sim_"
 
 
-def simulation_name(index: int) -> str:
+def name_simulation(index: int) -> str:
     """Name of a simulation's node, counted from 0."""
     return f"{_SIMULATION}{index}"
 
 
-def simulation_name_of(host: str) -> str:
+def name_simulation_on(host: str) -> str:
     """Name of the only simulation on a host, as in a container."""
     return _SIMULATION + re.sub(r"[^a-z0-9_]", "_", host.lower())
 
@@ -78,7 +79,7 @@ class NodeSpec:
     rest_s: float = 0.0
 
 
-def simulation_nodes(names: Sequence[str], data: str, *, recordings: str | None = None) -> list[NodeSpec]:
+def list_simulations(names: Sequence[str], data: str, *, recordings: str | None = None) -> list[NodeSpec]:
     """Simulations of these names, for the configuration in the directory `data`; each records for itself, if at all."""
     cores = sorted(os.sched_getaffinity(0))
     # Where simulations fill all cores, letting them move between cores was measured to cost a tenth of the speed.
@@ -137,7 +138,7 @@ class NodeHost(ABC):
     data: str
     listen: str
     cleared: bool
-    context: RunContext
+    record: RunRecord
     config: Config
     logs: NodeLogs
 
@@ -146,17 +147,11 @@ class NodeHost(ABC):
         """The connection with which this process joins the run; None while it cannot reach the router."""
         if (endpoint := self.endpoint) is None:
             return None
-        return Connection(endpoint, self.context.key, self.config.run.domain_id, self.context.middleware)
+        return Connection(endpoint, self.record.key, self.config.run.domain_id, self.record.middleware)
 
     def open(self) -> None:
         """Make everything that the nodes need, such as a network, and skip what earlier runs have logged."""
         self.logs.skip_earlier()
-
-    def info(self) -> Info:
-        """Read the summary of the finished dataset."""
-        from throwcollect.dataset.inspect import info
-
-        return info(self.context.directory)
 
     @property
     @abstractmethod
@@ -196,13 +191,13 @@ class NodeHost(ABC):
         """See `runtime.Host.close`."""
 
 
-def protocol_of(run: RunConfig, middleware: Middleware) -> str:
+def choose_protocol(run: RunConfig, middleware: Middleware) -> str:
     """Protocol of a run's router: TLS, for which others have no key, unless the run is open or on Fast DDS."""
     if run.open:
         return "tcp"
     return "udp" if middleware.is_fast_dds else "tls"
 
 
-def node_environment(connection: Connection) -> Mapping[str, str]:
+def make_environment(connection: Connection) -> Mapping[str, str]:
     """Environment variables of a node that joins a run over this connection."""
     return {**connection.environment(), **SERIAL_LIBRARIES}

@@ -10,19 +10,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-from throwcollect.errors import ConfigError, Interrupted, Problem, WorkerError
+from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import ENGINE_PACKAGES, MissingExtraError, explain_missing, require_engine
 from throwcollect.members import load_member, names_of
 from throwcollect.ros.middleware import Middleware, choose_middleware
-from throwcollect.run_key import RunKey
-from throwcollect.wording import command, suggest
+from throwcollect.wording import suggest
 
 if TYPE_CHECKING:
-    # Records of runs import this module, and should not wait for these imports.
     from throwcollect.collect.coordinator.progress import Progress
+    from throwcollect.collect.runtimes.nodes import NodeHost
+    from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
     from throwcollect.config.schema import Config
     from throwcollect.dataset.summary import Info
 
@@ -30,61 +29,6 @@ AUTOMATIC = ("docker", "local")
 """The runtimes that ``auto`` tries, in this order."""
 
 RunEvent = Literal["started", "scaled", "stopping", "finished", "stopped", "failed"]
-Status = Literal["starting", "running", "frozen", "restarting", "lost"]
-
-
-@dataclass(frozen=True)
-class NodeState:
-    """The state of one node.
-
-    Attributes:
-        status: ``starting`` until a simulation is ready, ``running``, ``frozen``, ``restarting`` (the node ended and
-            waits for its next start), or ``lost`` for good.
-        restarts: Number of times that the node was started again.
-        handle: Process or container id; None if the node does not run.
-        last_end: How the node ended last, in words; None if it never did.
-    """
-
-    name: str
-    status: Status
-    restarts: int
-    handle: str | None
-    last_end: str | None
-
-
-@dataclass(frozen=True)
-class RunContext:
-    """The directories of a run on this machine, and how its nodes communicate.
-
-    Attributes:
-        run: Id of the run.
-        directory: Directory of the dataset.
-        logs: Directory of the logs.
-        simulations: Number of simulations at the start.
-        key: The key that the router asks for.
-        collects: Whether the run collects a dataset; if not, its simulations serve clients until it is stopped.
-        recordings: Directory into which clients of these simulations record; None if they cannot.
-    """
-
-    run: str
-    directory: Path
-    logs: Path
-    simulations: int
-    middleware: Middleware
-    key: RunKey
-    collects: bool = True
-    recordings: str | None = None
-
-    @property
-    def resume_command(self) -> str | None:
-        """The command that goes on with the dataset once the run is over; None if it collects none."""
-        return command("resume", self.directory) if self.collects else None
-
-
-def make_interruption_error(context: RunContext) -> Interrupted:
-    """The error that the user stopped a collection before every trial had ended."""
-    message = f"interrupted; finished throws are in {context.directory}, the dataset is not complete"
-    return Interrupted(message, hint=context.resume_command)
 
 
 @dataclass(frozen=True)
@@ -122,7 +66,7 @@ class Session(Protocol):
 
 
 class Host(Protocol):
-    """Simulates the trials of one run.
+    """Simulates the trials of one run without nodes; see `nodes.NodeHost` for hosts with nodes.
 
     Attributes:
         cleared: Whether, after `close`, nothing of the run exists any more but its dataset.
@@ -130,11 +74,8 @@ class Host(Protocol):
 
     cleared: bool
 
-    def collect(self, session: Session) -> Info | None:
-        """Collect until every trial has ended, finish the dataset, and close; a session goes on until an interruption.
-
-        Returns:
-            The summary of the dataset; None for a run that collects none.
+    def collect(self, session: Session) -> Info:
+        """Collect until every trial has ended, finish the dataset, and close; return the summary of the dataset.
 
         Raises:
             WorkerError: If nodes cannot be started or kept alive.
@@ -164,7 +105,7 @@ class Runtime(ABC):
         """The runtime in words, as in ``runtime: local processes``."""
 
     @abstractmethod
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> Host | NodeHost:
         """Make the host of a run, which starts nothing yet; `warn` gets a line about each long wait.
 
         Raises:
@@ -197,10 +138,6 @@ class Runtime(ABC):
     def check(self) -> Check | None:
         """Examine the runtime for `doctor`; None if there is nothing to report."""
         return None
-
-    def simulations(self, config: Config) -> int:
-        """Number of simulations with which a run begins."""
-        return config.run.simulations if self.can_be_scaled else 1
 
     def remove(self, run: str) -> list[str]:
         """Remove everything that the runtime holds of a run, but no directory with a dataset.
@@ -242,32 +179,26 @@ def find_runtime(name: str) -> Runtime | None:
         return None
 
 
-@dataclass(frozen=True)
-class RuntimeChoice:
-    """The runtime of a run, by its name and as an object, and the middleware that carries the messages of its nodes."""
-
-    name: str
-    runtime: Runtime
-    middleware: Middleware
-
-
-def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], None]) -> RuntimeChoice:
+def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], None]) -> tuple[str, Middleware]:
     """Choose the runtime that a configuration asks for, and make sure that it can be used.
 
     With ``auto``, nodes are containers if an engine for them is available. rclpy is used where it is installed. `say`
     gets a line for each step that takes long, such as pulling an image, and then the choice. `warn` gets a line for
     everything that may be wrong, such as an image that was made from other sources.
+
+    Returns:
+        Name of the runtime, and the middleware that carries the messages of its nodes.
     """
     launcher = choose_middleware(config.run.ros)
 
-    def prepare(name: str, note: str) -> RuntimeChoice:
+    def prepare(name: str, note: str) -> tuple[str, Middleware]:
         runtime = get_runtime(name)
         # A runtime imports the packages that only it needs when it is used.
         with explain_missing():
             middleware = runtime.prepare(config, launcher, say=say, warn=warn)
         rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
         say(f"runtime: {runtime.describe(config)}{rclpy}{note}")
-        return RuntimeChoice(name, runtime, middleware)
+        return name, middleware
 
     # Simulations of other machines can join a run only if its nodes are processes.
     wanted = config.run.runtime if config.run.listen is None else "local"

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 
 from throwcollect.collect.runtimes.nodes import NodeExit, NodeHost, NodeRole, NodeSpec
-from throwcollect.collect.runtimes.runtime import NodeState, Status
+from throwcollect.collect.runtimes.run_record import NodeState, Status
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import Interrupted, UnreachableError, WorkerError
 from throwcollect.side_by_side import count_cores

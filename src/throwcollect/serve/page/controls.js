@@ -12,7 +12,7 @@ const KINDS = {
   session: "simulations for clients, without a dataset",
   container: "a container, which may join a run",
 };
-const WORDS = { planning: "is being planned", starting: "is starting", running: "runs", ended: "has ended", died: "died" };
+const WORDS = { starting: "is starting", running: "runs", ended: "has ended", died: "died" };
 
 /**
  * Read changed keys, one a line.
@@ -228,8 +228,7 @@ class InstanceCard {
     setText(this.name, instance.id);
     setText(this.status, `${isLiving && instance.stopping ? "is stopping" : WORDS[instance.status]}${instance.message ? `: ${instance.message}` : ""}`);
     this.status.dataset.status = instance.status;
-    if (instance.planning) this.#putPlanning(instance.planning);
-    else this.#putProgress(instance.progress);
+    this.#putProgress(instance.progress);
     const troubled = instance.nodes.filter(({ status }) => !["running", "starting"].includes(status));
     const joined = instance.joins ? `joined ${instance.joins}` : "";
     const all = instance.nodes.length ? `${instance.nodes.length} ${instance.nodes.length === 1 ? "node" : "nodes"}` : "";
@@ -247,24 +246,13 @@ class InstanceCard {
     this.records.put(instance);
   }
 
-  #putPlanning({ checked, trials }) {
-    for (const element of [this.bar, this.counts]) element.hidden = false;
-    this.outcomes.hidden = true;
-    this.#putSteps(checked, trials);
-    setText(this.counts, `${checked} of ${trials} trials checked`);
-  }
-
-  #putSteps(done, all) {
-    this.bar.max = Math.max(all, 1);
-    this.bar.value = done;
-    this.bar.setAttribute("aria-label", `${done} of ${all}`);
-  }
-
   #putProgress(progress) {
     for (const element of [this.bar, this.counts, this.outcomes]) element.hidden = progress === null;
     if (progress === null) return;
     const [done, all] = steps(progress);
-    this.#putSteps(done, all);
+    this.bar.max = Math.max(all, 1);
+    this.bar.value = done;
+    this.bar.setAttribute("aria-label", `${done} of ${all}`);
     const speed = lives(this.instance) ? `, ${progress.throws_per_s.toFixed(1)} ${progress.noun}s/s` : "";
     setText(this.counts, `${done} of ${count(all, progress.noun)}${speed}`);
     const outcomes = JSON.stringify(progress.outcomes);

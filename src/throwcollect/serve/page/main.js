@@ -405,7 +405,6 @@ function inWords(values) {
 
 function emptiness(instance, problem) {
   if (!instance) return "Nothing runs. Start a component, or look at a run that has ended.";
-  if (instance.status === "planning") return `${instance.id} is being planned …`;
   if (instance.status === "starting") return `${instance.id} is starting …`;
   if (instance.kind === "container") return `${instance.id} is a container, and has no simulations.`;
   if (lives(instance)) return `${instance.id} has no simulation that is ready yet.`;

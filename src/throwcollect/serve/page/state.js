@@ -28,14 +28,13 @@
  * @property {string} name
  * @property {"collection" | "session" | "container"} kind
  * @property {string | null} joins id of the run that a container has joined
- * @property {"planning" | "starting" | "running" | "ended" | "died"} status
+ * @property {"starting" | "running" | "ended" | "died"} status
  * @property {string} started
  * @property {string | null} ended
  * @property {boolean} stopping whether it has been asked to stop
  * @property {string} message the error with which it ended; empty if there was none
  * @property {number} simulations
  * @property {{name: string, status: string, restarts: number, last_end: string | null}[]} nodes
- * @property {{checked: number, trials: number} | null} planning how far its plan is, while it is made
  * @property {Progress | null} progress
  * @property {string | null} dataset
  * @property {object | null} summary what its dataset holds; null if it is not finished
@@ -47,10 +46,10 @@
 
 /**
  * @param {Instance} instance
- * @returns {boolean} whether it is planned, is starting or runs
+ * @returns {boolean} whether it is starting or runs
  */
 export function lives(instance) {
-  return ["planning", "starting", "running"].includes(instance.status);
+  return ["starting", "running"].includes(instance.status);
 }
 
 /**

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -11,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +21,6 @@ from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.cli.main import main
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.own_process import stop_signals
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.embedded import (
@@ -216,19 +213,8 @@ def test_a_wrong_argument_gives_one_clear_message_and_exit_code_2(
 
 
 def write_record(run: Run, directory: Path, endpoint: str, **fields: Any) -> None:
-    record = RunRecord(
-        run=run.id,
-        name="throws",
-        runtime="local",
-        directory=str(directory / "data"),
-        logs=str(directory),
-        domain_id=0,
-        started=datetime.now(timezone.utc),
-        launcher=os.getpid(),
-        simulations=1,
-        endpoint=endpoint,
-    )
-    run.write(replace(record, **fields))
+    record = run.begin("throws", directory / "data", runtime="local", endpoint=endpoint)
+    run.write(replace(record, **{"logs": directory, "simulations": 1, **fields}))
 
 
 def test_commands_join_a_run_by_its_name_or_directory(

@@ -21,9 +21,7 @@ def run(tmp_path: Path) -> Any:
     return SimpleNamespace(
         directory=tmp_path,
         trials=30,
-        simulations_per_task=1,
-        submission=SimpleNamespace(live=False),
-        config=SimpleNamespace(task=SimpleNamespace(success="landed", noun="throw")),
+        config=SimpleNamespace(task=SimpleNamespace(success="landed", noun="throw"), cluster=SimpleNamespace(cores=1)),
     )
 
 

@@ -66,7 +66,7 @@ def test_options_of_the_batch_script_follow_from_the_configuration(tmp_path: Pat
     assert {found[name] for name in ("partition", "account", "qos", "constraint")} == {"long", "robots", "low", "avx2"}
     assert (found["time"], found["mem"]) == ("4:00:00", "8G")
     assert "no-requeue" in found
-    assert "scontrol" not in script
+    assert "-lt 0 ]" in script
 
 
 def test_options_that_the_configuration_leaves_out_are_left_to_the_scheduler(tmp_path: Path) -> None:
@@ -92,18 +92,16 @@ def test_an_array_task_collects_its_slice(directory: Path, tmp_path: Path) -> No
     assert words[words.index("-n") + 1] == "4"
 
 
-@pytest.mark.parametrize("scratch", ["$SCRATCH/mine", "/local/$NAME"])
-def test_a_task_in_an_image_gets_its_directories_and_no_variables_of_the_host(tmp_path: Path, scratch: str) -> None:
+def test_a_task_in_an_image_gets_its_directories_and_no_variables_of_the_host(tmp_path: Path) -> None:
     (tmp_path / "plan.parquet").touch()
-    made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro", "/$NAME"], scratch=scratch)
-    done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', SCRATCH="/local", NAME="mine")
+    made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro", "/$NAME"])
+    done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', NAME="mine")
     words = done.stdout.splitlines()
     assert words[2:5] == ["apptainer", "--quiet", "exec"]
     assert "--cleanenv" in words
     binds = [word.removeprefix("--bind=") for word in words if word.startswith("--bind=")]
-    assert binds == [str(tmp_path), "/data:/inside:ro", "/$NAME", "/local/mine"]
+    assert binds == [str(tmp_path), "/data:/inside:ro", "/$NAME"]
     assert words[words.index("/images/t.sif") + 1] == "throwcollect"
-    assert words[-2:] == ["--set", "cluster.scratch=/local/mine"]
 
 
 def test_lines_and_modules_of_the_site_come_before_the_task(tmp_path: Path) -> None:
@@ -140,41 +138,6 @@ def test_an_interrupted_task_is_queued_again_up_to_ten_times(
     assert done.returncode == code
 
 
-def test_in_one_run_on_several_nodes_the_first_task_begins_and_the_others_join(directory: Path, tmp_path: Path) -> None:
-    (directory / "cluster").mkdir()
-    script = scripts(directory, cores=2).live(3)
-    found = options(script)
-    assert (found["nodes"], found["ntasks"], found["ntasks-per-node"]) == ("3", "3", "1")
-    program = 'while [ "$1" != bash ]; do shift; done; exec "$@"'
-    (tmp_path / "bin").mkdir()
-    node = tmp_path / "bin" / "throwcollect"
-    node.write_text('#!/bin/bash\nprintf "%s\\n" "$@"\n[ "$1" = up ] || cat\n')
-    node.chmod(0o755)
-    token = str(directory / "cluster" / "token")
-    first = run(script, tmp_path, srun=program, SLURM_PROCID="0").stdout.splitlines()
-    assert first[:3] == ["up", "--resume", str(directory)]
-    assert first[first.index("--listen") + 1] == "tcp/0.0.0.0:20077"
-    assert first[first.index("--token-file") + 1] == token
-    program = f"echo the token > {shlex.quote(token)}; {program}"
-    other = run(script, tmp_path, srun=program, SLURM_PROCID="1").stdout.splitlines()
-    assert other == ["join-run", "-", "-n", "2", "the token"]
-    assert not Path(token).exists()
-
-
-def test_the_other_tasks_do_not_wait_for_a_run_that_ends_at_once(directory: Path, tmp_path: Path) -> None:
-    (directory / "cluster").mkdir()
-    script = scripts(directory).live(2)
-    both = 'while [ "$1" != bash ]; do shift; done; (SLURM_PROCID=0; export SLURM_PROCID; "$@"); one=$?; exec "$@"'
-    (tmp_path / "bin").mkdir()
-    node = tmp_path / "bin" / "throwcollect"
-    # The shell that started it gets a signal too, and lives on.
-    node.write_text('#!/bin/bash\nkill -TERM $PPID; sleep 0.1; echo "$1"; exit 3\n')
-    node.chmod(0o755)
-    done = run(script, tmp_path, srun=both.replace("one=$?", "echo $?"), SLURM_PROCID="1")
-    assert done.stdout.splitlines() == ["up", "3"]
-    assert not list((directory / "cluster").iterdir())
-
-
 def test_the_joining_job_calls_join_with_the_directory(directory: Path, tmp_path: Path) -> None:
     done = run(scripts(directory).join(), tmp_path, srun='printf "%s\\n" "$@"')
     assert done.stdout.splitlines()[2:] == ["throwcollect", "join", str(directory)]
@@ -186,7 +149,6 @@ def test_the_joining_job_calls_join_with_the_directory(directory: Path, tmp_path
         ("time", "soon"),
         ("partition", "a b"),
         ("binds", ["relative:/inside"]),
-        ("scratch", "tmp"),
     ],
 )
 def test_cluster_values_that_a_script_cannot_hold_are_refused(key: str, value: object) -> None:

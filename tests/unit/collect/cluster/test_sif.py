@@ -23,8 +23,9 @@ def put_apptainer(directory: Path, lines: str) -> None:
     ("labels", "problem"),
     [
         ({}, None),
-        ({VERSION_LABEL: "unknown", SOURCES_LABEL: "unknown"}, None),
         ({VERSION_LABEL: __version__, SOURCES_LABEL: digest_sources()}, None),
+        ({VERSION_LABEL: "0.0.1"}, "holds throwcollect 0.0.1"),
+        ({VERSION_LABEL: __version__, SOURCES_LABEL: "0" * 64}, "was made from other sources"),
     ],
 )
 def test_a_sif_of_another_version_or_of_other_sources_is_rejected(

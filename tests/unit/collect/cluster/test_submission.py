@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
@@ -18,11 +17,10 @@ from throwcollect.collect.cluster.submission import (
 )
 
 SUBMISSION = Submission(
-    name="many",
     tasks=8,
     program=("throwcollect",),
     image=None,
-    jobs=(Job(array="12", join="13", slices=(0, 1, 5), submitted=datetime(2026, 1, 1, tzinfo=timezone.utc)),),
+    jobs=(Job(array="12", join="13", slices=(0, 1, 5)),),
 )
 
 
@@ -84,9 +82,3 @@ def test_the_end_of_a_task_comes_from_accounting_or_else_from_the_controller(
     }
     assert ended[3].saw_no_directory
     assert not ended[0].saw_no_directory
-
-
-def test_directories_in_the_queue_leave_out_jobs_of_others(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    ours = "throwcollect:/data/with blank|x"
-    answer(monkeypatch, tmp_path, squeue=f"12|{ours}\n11|{ours}\n13|(null)\n14|somebody else's")
-    assert slurm.find_directories() == ["/data/with blank|x"]

@@ -28,17 +28,21 @@ def test_two_processes_make_the_same_plan_as_one(monkeypatch: pytest.MonkeyPatch
     assert prepare.draw_plan(config, directory=Path(), processes=2) == alone
 
 
-def test_an_onlooker_follows_the_progress_of_a_plan_and_can_interrupt_it(tmp_path: Path) -> None:
+def test_a_reporter_gets_the_progress_of_a_plan_and_can_interrupt_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(prepare, "_REPORT_FIRST_S", 0.0)
+    monkeypatch.setattr(prepare, "_REPORT_EVERY_S", 0.0)
     config = Config.model_validate({**CONFIG, "trials": 250})
-    told: list[tuple[int, int]] = []
+    told: list[str] = []
 
     class Impatient(Reporter):
-        def update_plan(self, checked: int, trials: int) -> None:
-            told.append((checked, trials))
-            if checked == 200:
+        def say(self, line: str) -> None:
+            told.append(line)
+            if len(told) == 2:
                 raise Interrupted("enough")
 
     with pytest.raises(Interrupted, match="enough"):
         prepare.prepare(config, tmp_path / "data", sweep_directory=tmp_path, reporter=Impatient())
-    assert told == [(0, 250), (0, 250), (100, 250), (200, 250)]
+    assert told == [f"plan: {checked} of 250 trials checked" for checked in (100, 200)]
     assert not (tmp_path / "data").exists()

@@ -16,7 +16,7 @@ from throwcollect.collect.runs import background
 from throwcollect.collect.runs.background import begin_run, carry_out
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Origin
+from throwcollect.collect.runtimes.run_record import Origin
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerError
 from throwcollect.state_directory import STATE_VARIABLE
 
@@ -57,7 +57,7 @@ def processes(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[subprocess.Popen
         started.append(begin([sys.executable, "-ISc", PROCESS], **{**options, "stdout": subprocess.PIPE}))
         return started[-1]
 
-    monkeypatch.setattr(background.subprocess, "Popen", start)
+    monkeypatch.setattr(subprocess, "Popen", start)
     yield started
     for process in started:
         process.kill()
@@ -85,7 +85,7 @@ def test_a_run_begun_in_the_background_has_a_record_at_once(
     (process,) = processes
     assert run.status == "running"
     assert (run.record.launcher, run.record.origin, run.record.kind) == (process.pid, ORIGIN, "collection")
-    assert run.record.directory == str(tmp_path / "data")
+    assert run.record.directory == tmp_path / "data"
     assert not (tmp_path / "data").exists()
     order = end(process)
     made_from = background._ORDERS.validate_json(order)
@@ -141,9 +141,7 @@ def test_a_run_that_cannot_be_begun_leaves_no_record_and_no_process(
     with pytest.raises(ConfigError, match="the disk is full"):
         begin(config, tmp_path)
     assert processes[0].poll() is not None
-    monkeypatch.setattr(
-        background.subprocess, "Popen", lambda *_, **__: (_ for _ in ()).throw(OSError(12, "no memory"))
-    )
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: (_ for _ in ()).throw(OSError(12, "no memory")))
     with pytest.raises(WorkerError, match=r"run a cannot be begun: .*no memory"):
         begin(config, tmp_path)
     assert list((state / "runs").iterdir()) == []

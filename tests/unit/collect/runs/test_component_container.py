@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
-from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
@@ -16,10 +14,10 @@ from throwcollect.collect.runs.component_container import launch_container
 from throwcollect.collect.runs.control import down
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import Kind, Origin, RunRecord
 from throwcollect.collect.runtimes.docker import component, containers
 from throwcollect.collect.runtimes.docker.component import find_join_options
 from throwcollect.collect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
+from throwcollect.collect.runtimes.run_record import Kind, Origin, RunRecord
 from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.errors import WorkerError
 from throwcollect.ros.connection import Connection
@@ -43,9 +41,8 @@ def remember(name: str, kind: Kind, runtime: str, *, joins: str | None = None) -
     run = Records().new(name, run=name)
     directory = run.files / "data"
     directory.mkdir()
-    logs = str(run.files / "logs")
-    record = RunRecord(name, name, runtime, str(directory), logs, 0, datetime.now(timezone.utc), 1, 0, kind=kind)
-    run.write(replace(record, origin=Origin(name, joins=joins), endpoint="tls/127.0.0.1:7447"))
+    origin = Origin(name, joins=joins)
+    run.write(run.begin(name, directory, runtime=runtime, kind=kind, origin=origin, endpoint="tls/127.0.0.1:7447"))
     return run
 
 
@@ -90,7 +87,7 @@ def test_the_exit_code_of_a_container_that_has_ended_is_in_the_record(engine: En
     record = launch(engine, end)
     assert record.exit_code == WorkerError.exit_code
     assert record.failure is not None
-    assert record.failure.message == "the container of nodes has ended: exit code 7"
+    assert record.failure.message == "the container stopped: exit code 7"
     assert engine.names() == []
 
 
@@ -110,7 +107,7 @@ def test_down_removes_the_container_of_a_launcher_that_died(engine: Engine) -> N
     run = remember("ear-1", "container", "docker")
     engine.create("throwcollect-ear-1-container", {RUN_LABEL: "ear-1", NODE_LABEL: "container"})
     run.close()
-    assert down(Records().get("ear-1")) == ("ear-1", ["throwcollect-ear-1-container"])
+    assert down(Records().get("ear-1")) == ["throwcollect-ear-1-container"]
     assert engine.names() == []
 
 

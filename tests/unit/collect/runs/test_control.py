@@ -1,7 +1,6 @@
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
@@ -10,11 +9,13 @@ from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from throwcollect.collect.runs.control import scale
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.collect.runtimes.node_collection import MOST_SIMULATIONS, offer_scaling
 from throwcollect.collect.runtimes.nodes import LAUNCHER
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
+from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
+from throwcollect.run_key import RunKey
 from throwcollect.state_directory import STATE_VARIABLE
 
 
@@ -23,7 +24,7 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
 
 
-RECORD = RunRecord("a-0123", "a", "local", "/a", "/a/logs", 0, datetime.now(timezone.utc), 1, 2)
+RECORD = RunRecord("a-0123", Path("/a"), Path("/a/logs"), 2, Middleware(), RunKey(Path("/a/key")), launcher=1)
 
 
 def living(endpoint: str | None, runtime: str = "local") -> Run:

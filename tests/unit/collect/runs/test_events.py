@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.collect.runs.events import EVENTS, Event, EventLog, parse
+from throwcollect.collect.runs.events import EVENTS, Event, append_events, compare_states, parse
 from throwcollect.collect.runtimes.supervisor import NodeState
 
 STARTING = NodeState("sim_0", "starting", 0, "17", None)
@@ -38,15 +38,14 @@ def read(logs: Path) -> list[Event]:
 def test_changes_in_the_states_of_nodes_become_events(
     before: list[NodeState], after: list[NodeState], told: list[str], tmp_path: Path
 ) -> None:
-    log = EventLog(tmp_path / "logs", "small-1234")
-    log.run_event("started", simulations=2)
-    log.node_events(before, after)
+    append_events(tmp_path / "logs", [Event(run="small-1234", event="started", simulations=2)])
+    append_events(tmp_path / "logs", compare_states("small-1234", before, after))
     assert list(map(str, read(tmp_path / "logs"))) == ["small-1234 started: 2 simulations", *told]
 
 
 def test_an_event_is_one_line_of_json_without_empty_fields(tmp_path: Path) -> None:
-    log = EventLog(tmp_path, "small-1234")
-    log.run_event("failed", reason="the coordinator stopped\n  evidence: many\n  lines", exit_code=3)
+    reason = "the coordinator stopped\n  evidence: many\n  lines"
+    append_events(tmp_path, [Event(run="small-1234", event="failed", reason=reason, exit_code=3)])
     (line,) = (tmp_path / EVENTS).read_text().splitlines()
     document = json.loads(line)
     assert document.pop("time")[-6:] == "+00:00"

@@ -1,15 +1,14 @@
-import os
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
 
-from throwcollect.collect.runs.events import EventLog
+from throwcollect.collect.runs.events import Event, append_events
 from throwcollect.collect.runs.following import follow, read_logs
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_record import RunRecord
 from throwcollect.state_directory import STATE_VARIABLE
 
 
@@ -18,20 +17,19 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
     """A run whose plan is being made, and a function whose second call launches the run and third call ends it."""
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     first, later = tmp_path / "first", tmp_path / "data" / "logs"
-    now = datetime.now(timezone.utc)
     run = Records().new("small")
-    run.write(RunRecord(run.id, "small", "", str(tmp_path / "data"), str(first), 0, now, os.getpid(), 1))
+    run.write(replace(run.begin("small", tmp_path / "data"), logs=first))
     first.mkdir()
     (first / "launcher.log").write_text("plan: 3 trials\n")
-    EventLog(later, "of-an-earlier-run").run_event("started", simulations=1)
+    append_events(later, [Event(run="of-an-earlier-run", event="started", simulations=1)])
 
     def launch() -> None:
-        run.update(logs=str(later), runtime="local")
+        run.update(logs=later, runtime="local")
         (first / "launcher.log").rename(later / "launcher.log")
         (later / "sim_0.log").write_text("ready\n")
-        EventLog(later, run.id).run_event("started", simulations=1)
+        append_events(later, [Event(run=run.id, event="started", simulations=1)])
 
-    steps = iter([lambda: None, launch, lambda: run.update(ended=now, exit_code=0)])
+    steps = iter([lambda: None, launch, lambda: run.update(ended=datetime.now(timezone.utc), exit_code=0)])
 
     def go_on() -> bool:
         next(steps, lambda: None)()

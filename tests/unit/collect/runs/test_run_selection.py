@@ -13,7 +13,6 @@ from throwcollect.collect.coordinator.reporter import SILENT
 from throwcollect.collect.runs.control import down
 from throwcollect.collect.runs.preparation import end_left
 from throwcollect.collect.runs.records import Records
-from throwcollect.collect.runs.run_record import RunFailure, RunRecord
 from throwcollect.collect.runs.run_selection import (
     find_run_to_change,
     find_run_to_watch,
@@ -21,7 +20,8 @@ from throwcollect.collect.runs.run_selection import (
 )
 from throwcollect.collect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.collect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, NotFoundError, ThrowcollectError, WorkerError
+from throwcollect.collect.runtimes.run_record import RunFailure, RunRecord
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.state_directory import STATE_VARIABLE
 
 NOW = datetime.now(timezone.utc)
@@ -43,7 +43,7 @@ def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
     def make(name: str, status: str, *, age_h: int = 0, **fields: Any) -> RunRecord:
         monkeypatch.setattr("throwcollect.collect.runs.records.secrets.token_hex", lambda _: "0123")
         run = records.new(name)
-        begun = RunRecord.begin(run.id, name, tmp_path / name, logs=tmp_path / "logs", runtime="local")
+        begun = replace(run.begin(name, tmp_path / name, runtime="local"), logs=tmp_path / "logs")
         ended = NOW if status == "ended" else None
         run.write(replace(begun, **{"started": NOW - timedelta(hours=age_h), "launcher": 1, "ended": ended, **fields}))
         if status == "lives":
@@ -66,8 +66,8 @@ def test_a_run_is_found_by_its_id_or_the_beginning_of_it(named: str, records: Re
 def test_a_run_is_found_by_the_directory_of_its_dataset(
     records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    make("a", "ended", age_h=2, directory=str(tmp_path / "data"))
-    latest = make("b", "ended", age_h=1, directory=str(tmp_path / "data"))
+    make("a", "ended", age_h=2, directory=tmp_path / "data")
+    latest = make("b", "ended", age_h=1, directory=tmp_path / "data")
     monkeypatch.chdir(tmp_path)
     assert find_run_to_change("data").record == latest
     assert find_run_to_change(str(tmp_path / "data")).record == latest
@@ -188,7 +188,7 @@ def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
     make("a", "died", runtime="docker")
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     end_left(tmp_path / "a", SILENT)
-    assert down("a") == ("a-0123", [])
+    assert down(records.get("a-0123")) == []
 
 
 def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
@@ -200,11 +200,3 @@ def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
         os.utime(path, times=(0, 0))
     records.new("c").close()
     assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
-
-
-def test_containers_of_a_run_without_a_record_are_removed_by_its_id(records: Records, engine: Engine) -> None:
-    engine.create("throwcollect-b-4567-sim_0", {RUN_LABEL: "b-4567", NODE_LABEL: "sim_0"})
-    with pytest.raises(NotFoundError, match="no run 'b'"):
-        down("b")
-    assert down("b-4567") == ("b-4567", ["throwcollect-b-4567-sim_0"])
-    assert engine.names() == []

@@ -125,11 +125,6 @@ def test_a_second_interruption_does_not_wait_for_the_replay_of_throws(
         collect(yaml, "run.replay=1", reporter=Ended(), interruptions=lambda: asked[0])
 
 
-def test_a_plan_grows_until_enough_throws_have_landed(yaml: Path) -> None:
-    summary = collect(yaml, "until.landed=4", "trials=8")
-    assert summary.outcomes["landed"] >= 4
-
-
 def test_a_trial_that_fails_in_all_retries_is_lost_with_warnings(yaml: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     simulate = OneSimulator.run
 

@@ -1,7 +1,6 @@
 import os
 import signal
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -14,27 +13,15 @@ import pytest
 from throwcollect.collect.runtimes import local
 from throwcollect.collect.runtimes.local import LocalNodes
 from throwcollect.collect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import split_address
 from throwcollect.run_key import RunKey
 
-LAUNCHER = """
-import sys
-from pathlib import Path
-from tests.unit.collect.runtimes.test_local import local, node, nodes
 
-local.make_command = lambda: [sys.executable, "-c", "import time; time.sleep(60)"]
-host = nodes(Path(sys.argv[1]))
-host.start(node("sleeps"))
-print(host.handle("node"), flush=True)
-sys.stdin.read()
-"""
-
-
-def context(directory: Path) -> RunContext:
-    return RunContext("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
+def context(directory: Path) -> RunRecord:
+    return RunRecord("run", directory, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
 
 
 def nodes(directory: Path, **run: object) -> LocalNodes:
@@ -88,14 +75,6 @@ def test_a_node_has_a_core_a_session_and_a_log_of_its_own(runtime: LocalNodes) -
     assert os.getsid(process.pid) == process.pid
     streams = [os.readlink(f"/proc/{process.pid}/fd/{number}") for number in range(3)]
     assert streams == ["/dev/null", *[str(runtime.logs.path("node"))] * 2]
-
-
-def test_nodes_end_when_their_launcher_is_killed(tmp_path: Path) -> None:
-    with subprocess.Popen([sys.executable, "-c", LAUNCHER, str(tmp_path)], stdout=subprocess.PIPE) as launcher:
-        assert launcher.stdout is not None
-        process = psutil.Process(int(launcher.stdout.readline()))
-        launcher.kill()
-        process.wait(20)
 
 
 def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNodes) -> None:

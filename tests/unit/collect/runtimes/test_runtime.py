@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from throwcollect import extras, members
-from throwcollect.collect.runtimes.runtime import AUTOMATIC, Host, RunContext, Runtime, choose, get_runtime
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import AUTOMATIC, Host, Runtime, choose, get_runtime
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError
@@ -26,7 +27,7 @@ class Cluster(Runtime):
     def describe(self, config: Config) -> str:
         return "a cluster"
 
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> Host:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> Host:
         raise ConfigError("no cluster here")
 
 
@@ -51,22 +52,11 @@ def test_every_runtime_of_the_table_is_valid_in_a_configuration() -> None:
         assert Config.model_validate({"run": {"runtime": name}}).run.runtime == name
 
 
-@pytest.mark.parametrize("name", ["docker", "local", "inprocess"])
-def test_a_runtime_describes_itself_and_holds_nothing_of_an_unknown_run(
-    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
-    member = get_runtime(name)
-    assert member.describe(Config())
-    assert member.simulations(Config()) in (1, Config().run.simulations)
-    assert member.outlives_launcher == (name == "docker")
-
-
 def test_a_runtime_can_be_added_by_another_package(added: None, tmp_path: Path) -> None:
     assert type(get_runtime("cluster")).__name__ == "Cluster"
     config, said = Config(), list[str]()
     config = config.model_copy(update={"run": config.run.model_copy(update={"runtime": "cluster"})})
-    assert choose(config, say=said.append, warn=said.append).name == "cluster"
+    assert choose(config, say=said.append, warn=said.append)[0] == "cluster"
     assert said == ["runtime: a cluster"]
 
 

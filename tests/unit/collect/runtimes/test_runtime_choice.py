@@ -26,9 +26,9 @@ def choose() -> Callable[..., tuple[str, list[str]]]:
     def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
         said: list[str] = []
         config = Config(run=RunConfig(runtime=runtime), containers=ContainersConfig(image=image))
-        chosen = choose_runtime(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
-        assert chosen.middleware == Middleware()
-        return chosen.name, said
+        name, middleware = choose_runtime(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
+        assert middleware == Middleware()
+        return name, said
 
     return choose
 
@@ -110,8 +110,8 @@ def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels=labels))
     monkeypatch.setattr("throwcollect.collect.runtimes.runtime.choose_middleware", lambda _: launcher)
     said: list[str] = []
-    found = choose_runtime(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
-    assert found.middleware == expected
+    _, found = choose_runtime(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
+    assert found == expected
     assert ("on genuine rclpy" in said[0]) == (expected.backend == "rclpy")
 
 

@@ -10,7 +10,7 @@ from throwcollect.collect.runtimes import supervisor as module
 from throwcollect.collect.runtimes.node_collection import roster
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeHost, NodeSpec
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext
+from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
 from throwcollect.collect.runtimes.supervisor import Supervisor
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
@@ -61,7 +61,7 @@ class FakeRuntime(NodeHost):
 
     def __init__(self) -> None:
         self.config = Config()
-        self.context = RunContext("run", Path("/data"), Path("/logs"), 2, Middleware(), RunKey(Path("/key")))
+        self.record = RunRecord("run", Path("/data"), Path("/logs"), 2, Middleware(), RunKey(Path("/key")))
         self.commands: list[tuple[str, tuple[str, ...]]] = []
         self.signals: list[tuple[str, signal.Signals]] = []
         self.stopped: list[tuple[str, float]] = []
@@ -253,7 +253,7 @@ def test_a_run_fails_if_its_router_has_no_restarts_left(runtime: FakeRuntime, cl
 
 
 def test_a_lost_discovery_server_is_restarted_only_after_eleven_seconds(runtime: FakeRuntime, clock: Clock) -> None:
-    runtime.context = replace(runtime.context, middleware=Middleware("rclpy", "rmw_fastrtps_cpp"))
+    runtime.record = replace(runtime.record, middleware=Middleware("rclpy", "rmw_fastrtps_cpp"))
     supervisor = Supervisor(runtime, RunConfig(), roster(runtime, 2))
     supervisor.start()
     runtime.die(ROUTER)

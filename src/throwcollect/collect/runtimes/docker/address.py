@@ -50,10 +50,10 @@ def check_socket() -> None:
     """Raise the error of `docker_engine.connect` if the engine has no socket, without importing the client."""
     engine_address()
     if not has_socket():
-        raise no_answer(os.strerror(errno.ENOENT))
+        raise make_silence_error(os.strerror(errno.ENOENT))
 
 
-def no_answer(reason: str) -> WorkerError:
+def make_silence_error(reason: str) -> WorkerError:
     """The error that no engine answers; `reason` is the cause in a few words."""
     return WorkerError(
         f"no Docker engine answers at {engine_address()}: {reason}",

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from docker.client import DockerClient
 
 from throwcollect.collect.runtimes.docker.address import engine_address
-from throwcollect.collect.runtimes.docker.container_options import image
+from throwcollect.collect.runtimes.docker.container_options import choose_image
 from throwcollect.collect.runtimes.docker.docker_engine import BUILD_COMMAND, default_tag, engine_errors, find_image
 from throwcollect.config.run import ContainerSpec, NodeContainerConfig
 from throwcollect.config.schema import Config
@@ -31,11 +31,6 @@ _SHARED = ("/home", "/tmp", "/var/tmp")  # noqa: S108
 _HOME = re.compile("/root|/home/[^/]+")
 """Home directories. What begins with a dot in them belongs to programs, and is full of keys and passwords."""
 
-_DEVICE = re.compile(r"/dev/(dri(/.+)?|nvidia[^/]*|nvidia-caps(/.+)?|kfd|dxg)")
-"""Device files of graphics processors, with which a simulation may compute."""
-
-_DEVICES = "graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg"
-
 
 def check(client: DockerClient, config: Config) -> str:
     """Check the image, the mounts and the networks of a run.
@@ -44,7 +39,9 @@ def check(client: DockerClient, config: Config) -> str:
         Id of the image, which is a SHA-256 of its content.
     """
     kinds = ("router", "sim", "coordinator")
-    return _check(client, image(config), {f"containers.{kind}": getattr(config.containers, kind) for kind in kinds})
+    return _check(
+        client, choose_image(config), {f"containers.{kind}": getattr(config.containers, kind) for kind in kinds}
+    )
 
 
 def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:
@@ -78,9 +75,6 @@ def _find_problems(
         wrong = _refuse_mount(Path(source), root) or _refuse_target(target)
         if wrong is not None:
             yield Problem(wrong, f"{key}.{mounts}.{index}")
-    for index, device in enumerate(section.options.get("devices", [])):
-        if (wrong := _refuse_device(Path(device.partition(":")[0]))) is not None:
-            yield Problem(wrong, f"{key}.options.devices.{index}")
     for index, network in enumerate(section.networks):
         if network not in networks:
             wrong = f"the Docker engine has no network {network}; create it first"
@@ -100,47 +94,29 @@ def _refuse_mount(source: Path, root: str) -> str | None:
     if not source.exists():
         return f"{source} does not exist on this machine"
     real = source.resolve()
-    if real.is_socket():
-        return f"{source} is refused, as it is a socket; mounts are for data"
     kind, _, address = engine_address().partition("://")
     # The keys of all runs lie in the directory of the state.
-    more = [root, str(state_directory().resolve()), *([os.path.realpath(address)] if kind == "unix" else [])]
-    reason = refusal(str(real), more=more)
-    if reason is None and Path.home().resolve().is_relative_to(real):
-        reason = "is refused, as a home directory holds secrets; mounts are for data"
-    if reason is None:
+    system = [root, str(state_directory().resolve()), *([os.path.realpath(address)] if kind == "unix" else [])]
+    if (reason := find_secret(real, system)) is None:
         return None
-    return f"{source} {reason}" if real == source else f"{source}, which is {real}, {reason}"
+    shown = source if real == source else f"{source}, which is {real},"
+    return f"{shown} is refused, as {reason}; mounts are for data"
 
 
-def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
-    """Explain why a directory or file of the host must not be mounted; None if it may be.
+def find_secret(real: Path, system: Iterable[str] = ()) -> str | None:
+    """Explain why a directory or file must not be mounted, even for reading, as it may hold secrets; None if it may.
 
-    Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets. The
-    path is absolute and leads through no links; `more` are further directories of the system, such as those of the
-    engine.
+    The path leads through no links; `system` are further directories of the system, such as those of the engine.
     """
+    path = str(real)
+    if real.is_socket():
+        return "it is a socket"
     if path in _SHARED:
-        return f"is refused, as all users of the machine share {path}; mounts are for data"
-    for place in (*_SYSTEM, *more):
+        return f"all users of the machine share {path}"
+    for place in (*_SYSTEM, *system):
         if os.path.commonpath([path, place]) in (path, place):
-            return f"is refused, as {place} belongs to the system; mounts are for data"
-    if _HOME.fullmatch(path):
-        return "is refused, as a home directory holds secrets; mounts are for data"
-    hidden = next((part for part in PurePosixPath(path).parts if part.startswith(".")), None)
-    return None if hidden is None else f"is refused, as {hidden} may hold secrets of programs; mounts are for data"
-
-
-def is_allowed_device(path: str) -> bool:
-    """Whether a device file, or a directory of them, may be handed over to a container; the path has no links."""
-    return _DEVICE.fullmatch(path) is not None
-
-
-def _refuse_device(device: Path) -> str | None:
-    """Why a container must not get a device, or its target if it is a link; None if it may."""
-    if not device.exists():
-        return f"{device} does not exist on this machine"
-    files = [device, *device.rglob("*")] if device.is_dir() else [device]
-    if all(is_allowed_device(str(file.resolve())) and not file.is_block_device() for file in files):
-        return None
-    return f"{device} is refused, as it leads to other devices; containers get {_DEVICES}"
+            return f"{place} belongs to the system"
+    if _HOME.fullmatch(path) or Path.home().resolve().is_relative_to(real):
+        return "a home directory holds secrets"
+    hidden = next((part for part in real.parts if part.startswith(".")), None)
+    return None if hidden is None else f"{hidden} may hold secrets of programs"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,24 +15,20 @@ from throwcollect.collect.runtimes.docker.container_options import (
     JOINED_LABEL,
     KEY,
     ROUTER_PORT,
-    container_options,
-    key_mount,
-    network_of,
+    make_container_options,
+    make_key_mount,
+    name_network,
 )
-from throwcollect.collect.runtimes.docker.containers import ANSWER_S, Containers
+from throwcollect.collect.runtimes.docker.containers import ANSWER_S, ContainerHost
 from throwcollect.collect.runtimes.docker.docker_engine import connect
-from throwcollect.collect.runtimes.docker.docker_nodes import describe_container_end
-from throwcollect.collect.runtimes.node_logs import NodeLogs
-from throwcollect.collect.runtimes.nodes import ROUTER
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext, Session
-from throwcollect.config.run import ContainerSpec
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.collect.runtimes.nodes import CONTAINER, ROUTER, NodeExit, NodeSpec
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.config.run import ContainerSpec, NodeContainerConfig, RunConfig
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
-from throwcollect.wording import command
 
-CONTAINER = "container"
-"""Name of the only node of such a run."""
 _POLL_S = 0.1
 _OVER_S = 3.0
 """When a run ends, a container that joined it loses the router up to this time before the record shows the end."""
@@ -63,7 +59,7 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
         )
     endpoint, network = connection.endpoint, None
     if runtime == "docker":
-        endpoint, network = f"{endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}", network_of(run)
+        endpoint, network = f"{endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}", name_network(run)
     elif spec.section.ports or spec.section.networks:
         raise ConfigError(
             f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",
@@ -72,22 +68,24 @@ def find_join_options(run: str, runtime: str, connection: Connection, spec: Cont
         )
     inside = Connection(endpoint, KEY, connection.domain_id, connection.middleware)
     environment = {**inside.environment(), RMW_VARIABLE: connection.middleware.rmw}
-    return JoinOptions(run, environment, key_mount(connection.key), network)
+    return JoinOptions(run, environment, make_key_mount(connection.key), network)
 
 
-class ComponentContainer:
-    """Runs one container until it ends or the user asks to stop; a `runtime.Host`.
+class ComponentContainer(ContainerHost):
+    """Runs one container, once, until it ends or the run that it has joined ends.
 
     Args:
-        context: The run that consists of this container.
+        record: The run that consists of this container.
         joining: The options for the run that the container joins; None if it joins none.
         is_running: Returns whether the run with an id is running; it is called again and again.
         warn: Gets a line when the engine is silent for long.
     """
 
+    listen, data, endpoint = "", "", None
+
     def __init__(
         self,
-        context: RunContext,
+        record: RunRecord,
         component: str,
         spec: ContainerSpec,
         joining: JoinOptions | None,
@@ -95,55 +93,40 @@ class ComponentContainer:
         is_running: Callable[[str], bool],
         warn: Callable[[str], None],
     ) -> None:
-        self.cleared = False
+        super().__init__(record, Config(run=RunConfig(restarts=0)), connect(timeout_s=ANSWER_S), warn)
+        check_container(self._client, spec, component)
         self._spec = spec
         self._joining = joining
         self._is_running = is_running
-        self._context = context
-        self._logs = NodeLogs(context.logs)
-        client = connect(timeout_s=ANSWER_S)
-        check_container(client, self._spec, component)
-        self._containers = Containers(client, context.run, self._logs, warn)
 
-    def collect(self, session: Session) -> None:
-        """Run the container until it ends, the user asks to stop, or the run that it has joined ends; then close."""
-        try:
-            self._containers.open()
-            session.event("started")
-            # Up to version 1.43 of the engine's API, a container is made in one network, and joins others afterwards.
-            self._containers.start(CONTAINER, self._make_options(), networks=self._networks[1:])
-            while not session.interruptions():
-                session.nodes([self._get_state()], endpoint=None, simulations=0)
-                if self._has_ended(session):
-                    return
-                time.sleep(_POLL_S)
-            session.event("stopping")
-        finally:
-            self.close()
+    def find_section(self, name: str) -> NodeContainerConfig:
+        """See `ContainerHost.find_section`."""
+        return self._spec.section
 
-    def close(self) -> None:
-        """End the container, and remove it, unless the engine is silent or refuses."""
-        self.cleared = self._containers.close()
+    def frozen(self) -> frozenset[str]:
+        """None: nothing waits for the container, so it may be paused."""
+        return frozenset()
 
-    @property
-    def _networks(self) -> list[str]:
-        """Networks that the container joins; none means that of this machine, or the engine's default."""
-        own = [self._joining.network] if self._joining is not None and self._joining.network is not None else []
-        # The engine publishes ports only from a network with a way out, which the network of a run may not have.
-        out = ["bridge"] if own and self._spec.section.ports and not self._spec.section.networks else []
-        return [*out, *self._spec.section.networks, *own]
+    def exits(self) -> list[NodeExit]:
+        """The container, once it or the run that it has joined has ended."""
+        ends = super().exits()
+        # The end of the joined run may have made the container fail; the record of that run shows it a bit later.
+        deadline = time.monotonic() + _OVER_S
+        while ends and ends[0].code != 0 and self._joining and not self._is_left() and time.monotonic() < deadline:
+            time.sleep(_POLL_S)
+        return [NodeExit(CONTAINER, 0, "the run that it has joined has ended", "")] if self._is_left() else ends
 
-    @property
-    def _is_left_behind(self) -> bool:
+    def _is_left(self) -> bool:
         """Whether the run that the container has joined has ended."""
         return self._joining is not None and not self._is_running(self._joining.run)
 
-    def _make_options(self) -> dict[str, Any]:
+    def make_options(self, node: NodeSpec) -> tuple[dict[str, Any], Sequence[str]]:
+        """See `ContainerHost.make_options`."""
         joining, spec = self._joining, self._spec
-        options = container_options(
-            self._context,
+        options = make_container_options(
+            self.record,
             spec.image,
-            CONTAINER,
+            node.name,
             spec.section,
             environment={} if joining is None else joining.environment,
             mounts=[] if joining is None else [joining.key],
@@ -152,45 +135,15 @@ class ComponentContainer:
             options["command"] = list(spec.command)
         if joining is not None:
             options["labels"] |= {JOINED_LABEL: joining.run}
+        own = [joining.network] if joining is not None and joining.network is not None else []
+        # The engine publishes ports only from a network with a way out, which the network of a run may not have.
+        out = ["bridge"] if own and spec.section.ports and not spec.section.networks else []
+        networks = [*out, *spec.section.networks, *own]
         if joining is not None and joining.network is None:
             options["network_mode"] = "host"
             del options["ports"]
-        elif self._networks:
-            first = self._networks[0]
-            options["network"] = first
-            options["networking_config"] = {first: EndpointConfig(API_VERSION)}
-        return options
-
-    def _get_state(self) -> NodeState:
-        container = self._containers.by_node[CONTAINER]
-        if container.id is None:
-            return NodeState(CONTAINER, "starting", 0, None, None)
-        return NodeState(CONTAINER, "frozen" if container.paused else "running", 0, container.id[:12], None)
-
-    def _has_ended(self, session: Session) -> bool:
-        """Whether the container has ended well, or the run that it has joined has ended."""
-        containers = self._containers
-        containers.warn_if_silent()
-        if containers.given_up:
-            raise WorkerError(
-                f"the Docker engine has not answered for {containers.silent_s:.0f} s",
-                hint=f"once it answers, {command('down', '--run', self._context.run)} ends the container",
-            )
-        if (failure := containers.by_node[CONTAINER].failure) is not None:
-            raise WorkerError(f"the container of {self._spec.image} cannot be started: {failure}")
-        state = containers.by_node[CONTAINER].state
-        if state is not None and state.ended:
-            # The end of the joined run may have made the container fail; the record of that run shows it a bit later.
-            deadline = time.monotonic() + _OVER_S
-            while state.code != 0 and self._joining and not self._is_left_behind and time.monotonic() < deadline:
-                time.sleep(_POLL_S)
-            if state.code == 0 or self._is_left_behind:
-                return True
-            reason = describe_container_end(state, self._spec.section.memory)
-            raise WorkerError(
-                f"the container of {self._spec.image} has ended: {reason}", evidence=self._logs.tail(CONTAINER) or None
-            )
-        if self._joining is not None and self._is_left_behind:
-            session.say(f"run {self._joining.run} has ended, so the container that had joined it ends, too")
-            return True
-        return False
+        elif networks:
+            # Up to version 1.43 of the engine's API, a container is made in one network, and joins others afterwards.
+            options["network"] = networks[0]
+            options["networking_config"] = {networks[0]: EndpointConfig(API_VERSION)}
+        return options, networks[1:]

@@ -15,11 +15,11 @@ from throwcollect.collect.runtimes.nodes import (
     COORDINATOR,
     ROUTER,
     NodeSpec,
+    choose_protocol,
     is_simulation,
-    node_environment,
-    protocol_of,
+    make_environment,
 )
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.run import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE
@@ -51,22 +51,22 @@ _TMPFS = "rw,noexec,nosuid,size=64m"
 _LOG_SIZE = {"max-size": "10m", "max-file": "2"}
 
 
-def network_of(run: str) -> str:
+def name_network(run: str) -> str:
     """Name of the network of a run."""
     return f"throwcollect-{run}"
 
 
-def container_of(run: str, node: str) -> str:
+def name_container(run: str, node: str) -> str:
     """Name of the container of a node."""
     return f"throwcollect-{run}-{node}"
 
 
-def labels(context: RunContext) -> dict[str, str]:
+def make_labels(record: RunRecord) -> dict[str, str]:
     """Labels of everything that is made for a run."""
-    return {RUN_LABEL: context.run, DIRECTORY_LABEL: str(context.directory.resolve()), VERSION_LABEL: __version__}
+    return {RUN_LABEL: record.run, DIRECTORY_LABEL: str(record.directory.resolve()), VERSION_LABEL: __version__}
 
 
-def key_mount(key: RunKey) -> str:
+def make_key_mount(key: RunKey) -> str:
     """The mount of the directory of a key, whose files only their owner can read.
 
     On hosts with SELinux, `z` gives it the label with which all containers may read it.
@@ -74,17 +74,17 @@ def key_mount(key: RunKey) -> str:
     return f"{key.directory}:{KEY.directory}:ro,z"
 
 
-def router_endpoint(config: Config, middleware: Middleware) -> str:
+def make_router_endpoint(config: Config, middleware: Middleware) -> str:
     """Zenoh endpoint of the router; by this name, the router listens only at its address in the run's network."""
-    return f"{protocol_of(config.run, middleware)}/{ROUTER}:{ROUTER_PORT}"
+    return f"{choose_protocol(config.run, middleware)}/{ROUTER}:{ROUTER_PORT}"
 
 
-def image(config: Config) -> str:
+def choose_image(config: Config) -> str:
     """Image of all nodes."""
     return config.containers.image or default_tag()
 
 
-def section_of(config: Config, name: str) -> NodeContainerConfig:
+def find_section(config: Config, name: str) -> NodeContainerConfig:
     """The section of the configuration for a node's container."""
     return config.containers.sim if is_simulation(name) else getattr(config.containers, name)
 
@@ -95,29 +95,29 @@ def publishes_port(config: Config) -> bool:
     return bool(config.run.router_port or any(section.ports for section in sections))
 
 
-def node_options(
-    node: NodeSpec, *, context: RunContext, config: Config, image_id: str, address: str | None = None
+def make_node_options(
+    node: NodeSpec, *, record: RunRecord, config: Config, image_id: str, address: str | None = None
 ) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
     The configuration may bind the node to another core. The id of the image goes into the dataset's provenance; the
     address is that in the run's network, None for any.
     """
-    section, network = section_of(config, node.name), network_of(context.run)
-    directory = str(context.directory.resolve())
-    endpoint = router_endpoint(config, context.middleware)
+    section, network = find_section(config, node.name), name_network(record.run)
+    directory = str(record.directory.resolve())
+    endpoint = make_router_endpoint(config, record.middleware)
     own = {
-        **node_environment(Connection(endpoint, KEY, config.run.domain_id, context.middleware)),
+        **make_environment(Connection(endpoint, KEY, config.run.domain_id, record.middleware)),
         # Otherwise nodes would write a random id and /data into the provenance, which mean nothing outside.
         HOST_VARIABLE: socket.gethostname(),
         IMAGE_VARIABLE: image_id,
         DIRECTORY_VARIABLE: directory,
         "THROWCOLLECT_NODE": node.name,
     }
-    mounts = [key_mount(context.key)]
+    mounts = [make_key_mount(record.key)]
     if node.name != ROUTER:
         mounts.append(f"{directory}:{DATA}:{'rw' if node.name == COORDINATOR else 'ro'},z")
-    options = container_options(context, image(config), node.name, section, environment=own, mounts=mounts)
+    options = make_container_options(record, choose_image(config), node.name, section, environment=own, mounts=mounts)
     if node.name == ROUTER and config.run.router_port:
         options["ports"][f"{ROUTER_PORT}/tcp"] = (LOOPBACK, config.run.router_port)
     return {
@@ -129,8 +129,8 @@ def node_options(
     }
 
 
-def container_options(
-    context: RunContext,
+def make_container_options(
+    record: RunRecord,
     image: str,
     node: str,
     section: NodeContainerConfig,
@@ -158,8 +158,8 @@ def container_options(
         "stop_signal": "SIGTERM",
         "log_config": LogConfig(type=LogConfig.types.JSON, config=_LOG_SIZE),
         **options,
-        "name": container_of(context.run, node),
-        "labels": {**options.get("labels", {}), **labels(context), NODE_LABEL: node},
+        "name": name_container(record.run, node),
+        "labels": {**options.get("labels", {}), **make_labels(record), NODE_LABEL: node},
         # Nothing but /tmp can be written in the container.
         "environment": {"HOME": _TMP, **chosen, **environment},
         "tmpfs": _join_tmpfs({_TMP: _TMPFS}, options.get("tmpfs", {})),

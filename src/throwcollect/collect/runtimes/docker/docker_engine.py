@@ -15,7 +15,7 @@ from docker.errors import APIError, DockerException, ImageNotFound
 from docker.models.images import Image
 from urllib3.exceptions import HTTPError
 
-from throwcollect.collect.runtimes.docker.address import engine_address, no_answer
+from throwcollect.collect.runtimes.docker.address import engine_address, make_silence_error
 from throwcollect.errors import WorkerError
 from throwcollect.version import __version__
 
@@ -45,7 +45,7 @@ def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
         client = DockerClient.from_env(timeout=timeout_s, environment={**os.environ, "DOCKER_HOST": address})
         machine = socket.gethostname() if address.startswith("unix:") else str(client.info()["Name"])
     except ENGINE_ERRORS as error:
-        raise no_answer(describe_error(error)) from error
+        raise make_silence_error(describe_error(error)) from error
     if machine != socket.gethostname():
         raise WorkerError(
             f"the Docker engine at {address} is on another machine, {machine}, without directories of this one",

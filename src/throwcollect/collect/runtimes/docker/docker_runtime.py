@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from throwcollect.collect.runtimes.docker.address import check_socket, engine_address, has_socket
 from throwcollect.collect.runtimes.image_sources import SOURCES_LABEL, are_others
-from throwcollect.collect.runtimes.runtime import Check, RunContext, Runtime
+from throwcollect.collect.runtimes.run_record import RunRecord
+from throwcollect.collect.runtimes.runtime import Check, Runtime
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
@@ -32,15 +33,15 @@ class DockerRuntime(Runtime):
 
     def describe(self, config: Config) -> str:
         """See `Runtime.describe`."""
-        from throwcollect.collect.runtimes.docker.container_options import image
+        from throwcollect.collect.runtimes.docker.container_options import choose_image
 
-        return f"Docker containers of {image(config)}"
+        return f"Docker containers of {choose_image(config)}"
 
-    def host(self, context: RunContext, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
+    def host(self, record: RunRecord, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
         """Make the host of a run; see `Runtime.host`."""
         from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
 
-        return DockerNodes(context, config, warn=warn)
+        return DockerNodes(record, config, warn=warn)
 
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
@@ -49,9 +50,9 @@ class DockerRuntime(Runtime):
         if is_installed("docker"):
             check_socket()
         from throwcollect.collect.runtimes.docker import docker_engine as docker
-        from throwcollect.collect.runtimes.docker.container_options import image
+        from throwcollect.collect.runtimes.docker.container_options import choose_image
 
-        name, patience_s = image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
+        name, patience_s = choose_image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
         with closing(docker.connect(timeout_s=patience_s)) as client:
             labels = docker.ensure(client, name, say=say).labels
             if are_others(labels.get(SOURCES_LABEL)):

@@ -7,22 +7,22 @@ import pytest
 
 import throwcollect
 from rclzenoh.session_config import client_override
-from throwcollect.collect.runtimes.docker.container_options import image, node_options, publishes_port
+from throwcollect.collect.runtimes.docker.container_options import choose_image, make_node_options, publishes_port
 from throwcollect.collect.runtimes.docker.docker_engine import default_tag
 from throwcollect.collect.runtimes.nodes import NodeRole, NodeSpec
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 
-PLACE = RunContext("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
+PLACE = RunRecord("throws-1a2b", Path("/home/me/data set"), Path("/logs"), 1, Middleware(), RunKey(Path("/state/key")))
 
 
 def options(name: str, *, core: int | None = None, run: Any = None, **containers: Any) -> dict[str, Any]:
     config = Config.model_validate({"run": run or {}, "containers": containers}, strict=True)
     node = NodeSpec(name, ("command", "--option"), NodeRole.EXPENDABLE, core)
-    return node_options(node, context=PLACE, config=config, image_id="sha256:12ab")
+    return make_node_options(node, record=PLACE, config=config, image_id="sha256:12ab")
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])
@@ -138,5 +138,5 @@ def test_further_options_are_passed_on_but_never_replace_the_protections() -> No
 
 
 def test_the_image_is_that_of_this_version_unless_the_configuration_names_another() -> None:
-    assert image(Config()) == default_tag()
-    assert image(Config.model_validate({"containers": {"image": "lab/throws:2"}})) == "lab/throws:2"
+    assert choose_image(Config()) == default_tag()
+    assert choose_image(Config.model_validate({"containers": {"image": "lab/throws:2"}})) == "lab/throws:2"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,10 @@ from tests.unit.collect.runtimes.docker.engine import Engine, engine_at
 
 from throwcollect.collect.runtimes.docker import containers
 from throwcollect.collect.runtimes.docker import docker_nodes as module
-from throwcollect.collect.runtimes.docker.containers import ContainerState
+from throwcollect.collect.runtimes.docker.containers import Container
 from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.collect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
-from throwcollect.collect.runtimes.runtime import RunContext
+from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.schema import Config
 from throwcollect.errors import WorkerError
 from throwcollect.ros.middleware import Middleware
@@ -53,7 +54,7 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
         key.create()
         made.append(
             DockerNodes(
-                RunContext("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
+                RunRecord("run-1a2b", directory, tmp_path / "logs", 1, Middleware(), key),
                 CONFIG,
                 warn=warnings.append,
             )
@@ -99,9 +100,7 @@ def test_giving_up_a_silent_engine_names_left_containers_and_how_to_go_on(
     runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
     until(lambda: runtime.handle("sim_0"), runtime=runtime)
     engine.withheld = "."
-    with pytest.raises(
-        WorkerError, match=rf"has not answered for [12] s; finished throws are safe in {tmp_path}/my data"
-    ) as caught:
+    with pytest.raises(WorkerError, match=r"has not answered for [12] s") as caught:
         until(lambda: False, runtime=runtime)
     assert caught.value.evidence == "no answer in time\ncontainers that may run on: throwcollect-run-1a2b-sim_0"
     resume = f"throwcollect resume '{tmp_path}/my data'"
@@ -151,14 +150,15 @@ def test_the_output_of_a_container_is_in_the_log_once_and_before_its_end_is_know
 @pytest.mark.parametrize(
     ("state", "memory", "words"),
     [
-        (ContainerState("exited", 0), None, "exit code 0"),
-        (ContainerState("exited", 137), "512m", "ended by SIGKILL"),
-        (ContainerState("exited", 137, out_of_memory=True), "512m", "ran out of memory (limit 512m)"),
-        (ContainerState("removed"), None, "its container was removed"),
+        (("exited", 0), None, "exit code 0"),
+        (("exited", 137), "512m", "ended by SIGKILL"),
+        (("exited", 137, True), "512m", "ran out of memory (limit 512m)"),
+        (("removed",), None, "its container was removed"),
     ],
 )
 def test_the_end_of_a_container_is_described_by_its_signal_or_exit_code(
-    state: ContainerState, memory: str | None, words: str
+    state: tuple[Any, ...], memory: str | None, words: str
 ) -> None:
-    assert state.ended
-    assert module.describe_container_end(state, memory) == words
+    container = Container("sim_0", Future(), *state)
+    assert container.ended
+    assert container.describe_end(memory) == words

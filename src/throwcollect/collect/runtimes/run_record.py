@@ -1,4 +1,4 @@
-"""The record of one run: its facts, as they are written to a file."""
+"""The record of one run: its facts, as they are written to a file, and as its host gets them."""
 
 from __future__ import annotations
 
@@ -8,28 +8,39 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Literal
 
-from pydantic import JsonValue
+from pydantic import ConfigDict, JsonValue
 
 from throwcollect.collect.coordinator.progress import Progress
-from throwcollect.collect.runtimes.runtime import NodeState, RunContext
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
+from throwcollect.wording import command
 
-VERSION: Literal[1] = 1
-"""Version of the layout of records."""
 Kind = Literal["collection", "session", "container"]
 """A run collects a dataset, or offers simulations to clients, or is a container of the catalogue."""
+Status = Literal["starting", "running", "frozen", "restarting", "lost"]
 _EMBEDDED = Middleware()
 _KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
 
 
 @dataclass(frozen=True)
-class Summary(Info):
-    """Summary of a run's dataset; `open` is whether joining it took no key."""
+class NodeState:
+    """The state of one node.
 
-    open: bool = False
+    Attributes:
+        status: ``starting`` until a simulation is ready, ``running``, ``frozen``, ``restarting`` (the node ended and
+            waits for its next start), or ``lost`` for good.
+        restarts: Number of times that the node was started again.
+        handle: Process or container id; None if the node does not run.
+        last_end: How the node ended last, in words; None if it never did.
+    """
+
+    name: str
+    status: Status
+    restarts: int
+    handle: str | None
+    last_end: str | None
 
 
 @dataclass(frozen=True)
@@ -72,24 +83,20 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Planning:
-    """How far the plan of a run is: how many of its trials have been checked."""
-
-    checked: int
-    trials: int
-
-
-@dataclass(frozen=True)
 class RunRecord:
     """The record of a run; its launcher changes it, other processes read it.
 
     Attributes:
+        run: Id of the run.
+        directory: Directory of the dataset.
+        logs: Directory of the logs.
+        simulations: Number of simulations that the run is to have.
+        middleware: The middleware that carries the messages of the nodes.
+        key: The key that the router asks for.
+        kind: What the run does.
         name: Name of the collection.
         runtime: Name of the runtime; empty until one is chosen.
-        directory: Absolute path of the dataset.
-        logs: Absolute path of the directory with the logs.
         launcher: Process id of the launcher.
-        simulations: Number of simulations that the run is to have.
         endpoint: Zenoh endpoint at which this machine reaches the router; None while there is no router.
         nodes: The nodes; empty once the run has ended.
         progress: Last report of the coordinator; None before the first one.
@@ -98,23 +105,26 @@ class RunRecord:
         left: Whether containers of the run may still exist, because its launcher did not remove them.
         failure: The error with which the run ended; None if there was none.
         summary: Summary of the dataset; None if the dataset is not finished.
-        middleware: The middleware that carries the messages of the nodes.
         origin: The request of a client; None if a command or a program began the run.
         stopping: Whether the run was asked to stop; it still finishes the trials that run.
-        planning: How far the plan is while a large one is made in the background; else None.
         recordings: Directory into which clients of a session record; None if they cannot.
-        version: Version of this layout.
     """
 
+    # Otherwise the record of another version could be read, with defaults in the place of its fields.
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
     run: str
-    name: str
-    runtime: str
-    directory: str
-    logs: str
-    domain_id: int
-    started: datetime
-    launcher: int
+    directory: Path
+    logs: Path
     simulations: int
+    middleware: Middleware
+    key: RunKey
+    kind: Kind = "collection"
+    name: str = ""
+    runtime: str = ""
+    domain_id: int = 0
+    started: datetime = field(default_factory=lambda: datetime.now(timezone.utc))
+    launcher: int = field(default_factory=os.getpid)
     endpoint: str | None = None
     nodes: tuple[NodeState, ...] = ()
     progress: Progress | None = None
@@ -122,44 +132,26 @@ class RunRecord:
     exit_code: int | None = None
     left: bool = False
     failure: RunFailure | None = None
-    summary: Summary | None = None
-    middleware: Middleware = _EMBEDDED
-    kind: Kind = "collection"
+    summary: Info | None = None
     origin: Origin | None = None
     stopping: bool = False
-    planning: Planning | None = None
     recordings: str | None = None
-    version: Literal[1] = VERSION
 
-    @classmethod
-    def begin(
-        cls,
-        run: str,
-        name: str,
-        directory: Path,
-        *,
-        logs: Path,
-        runtime: str = "",
-        kind: Kind = "collection",
-        origin: Origin | None = None,
-    ) -> RunRecord:
-        """Make the record of a run for which no runtime is chosen and which this process launches."""
-        now = datetime.now(timezone.utc)
-        context = os.path.realpath(directory)
-        return cls(run, name, runtime, context, str(logs), 0, now, os.getpid(), 0, kind=kind, origin=origin)
+    @property
+    def collects(self) -> bool:
+        """Whether the run collects a dataset; if not, it goes on until it is stopped."""
+        return self.kind == "collection"
 
-    def context(self, key: RunKey) -> RunContext:
-        """The context of the run, which has this key."""
-        return RunContext(
-            run=self.run,
-            directory=Path(self.directory),
-            logs=Path(self.logs),
-            simulations=self.simulations,
-            middleware=self.middleware,
-            key=key,
-            collects=self.kind == "collection",
-            recordings=self.recordings,
-        )
+    @property
+    def resume_command(self) -> str | None:
+        """The command that goes on with the dataset once the run is over; None if it collects none."""
+        return command("resume", self.directory) if self.collects else None
+
+    @property
+    def interruption(self) -> Interrupted:
+        """The error that the user stopped the collection before every trial had ended."""
+        message = f"interrupted; finished throws are in {self.directory}, the dataset is not complete"
+        return Interrupted(message, hint=self.resume_command)
 
     @property
     def error(self) -> ThrowcollectError | None:
