@@ -44,11 +44,9 @@ class AdvertisedService:
             raise ConfigError(f"service_response: no request {answer.id} to {answer.name} waits for an answer")
         future, response = self._pending[answer.id]
         # With `result: false`, the values may be a string with the reason, instead of fields.
+        # ROS cannot report to a node that a service has failed, so such a request is answered with defaults.
         if isinstance(answer.values, Mapping) or answer.result:
             fill(response, {} if answer.values is None else answer.values)
-        else:
-            # ROS cannot report to a node that a service has failed, and without an answer the node would wait for ever.
-            self._client.report("warning", f"{answer.name}: a failed request is answered with defaults", answer.id)
         # The request is removed last: if values of a wrong type raise an error above, the client can answer again.
         del self._pending[answer.id]
         future.set_result(response)

@@ -70,7 +70,7 @@ def encode(fields: object, compression: str = "none") -> Frame:
 
 def json_text(fields: object) -> str:
     """Write JSON in one line, in ASCII, because ROS# treats every byte of a frame as a character."""
-    text = orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    text = orjson.dumps(fields, _encode_bytes, orjson.OPT_SERIALIZE_NUMPY).decode()
     # orjson cannot escape characters beyond ASCII; `json` does, in the form that JSON demands.
     return text if text.isascii() else _NOT_ASCII.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
@@ -83,10 +83,14 @@ def fragments(text: str, size: int, number: str) -> Iterator[str]:
         yield json_text({"op": "fragment", "id": number, "data": part, "num": index, "total": total})
 
 
+def _encode_bytes(value: Any) -> str:
+    if not isinstance(value, bytes):
+        raise TypeError
+    return base64.b64encode(value).decode()
+
+
 def _encode_for_json(values: NDArray[Any], kind: str) -> Any:
-    if kind == "uint8":
-        return base64.b64encode(values.tobytes()).decode()
-    return np.ascontiguousarray(values)
+    return values.tobytes() if kind == "uint8" else np.ascontiguousarray(values)
 
 
 def _encode_for_cbor(values: NDArray[Any], kind: str) -> Any:

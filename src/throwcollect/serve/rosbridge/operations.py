@@ -23,12 +23,9 @@ _T = TypeVar("_T")
 Compression = Literal["none", "cbor", "cbor-raw"]
 """``none`` is JSON. If the subscriptions of a client to a topic differ, the one that comes last here is used."""
 COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
-Level = Literal["none", "error", "warning", "info"]
-"""Status messages that a client wants; each level includes those before it."""
-LEVELS: tuple[Level, ...] = get_args(Level)
 RequestId = str | int | None
 """The id that a client has given an operation; None if it has given none."""
-MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service", "fragment", "set_level", "status"))
+MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service", "fragment", "status"))
 """Operations that clients may use that may only look; a call is decided on by its service."""
 Natural = Annotated[int, Field(ge=0, lt=1 << 53)]
 """A number from 0 on that JavaScript can represent."""
@@ -142,10 +139,9 @@ class Fragment(Operation):
 
 
 class Status(Operation):
-    """A status message of the client, or which status messages it wants."""
+    """A status message of the client."""
 
-    op: Literal["status", "set_level"]
-    level: Level = "error"
+    op: Literal["status"]
     msg: str = ""
 
 

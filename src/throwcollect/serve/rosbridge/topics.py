@@ -11,14 +11,9 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.bridge import Sample
-from throwcollect.serve.rosbridge.client import Client, open_topic
-from throwcollect.serve.rosbridge.operations import (
-    COMPRESSIONS,
-    Publish,
-    RequestId,
-    Subscribe,
-    Withdraw,
-)
+from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.guarded import open_topic
+from throwcollect.serve.rosbridge.operations import COMPRESSIONS, Publish, RequestId, Subscribe, Withdraw
 
 _DEPTH = 100
 _HEADER = "std_msgs/Header"
@@ -120,7 +115,7 @@ class SubscribedTopic:
         try:
             frame = sample.frame(self._given, self._compression)
         except ValueError as error:
-            self._client.report("error", f"{self._given}: a message cannot be read: {error}")
+            self._client.report(f"{self._given}: a message cannot be read: {error}")
             return
         self._client.send(frame, self._fragment_size)
 
@@ -184,8 +179,6 @@ class Publishers:
         if topic in self._publishers:
             _, publisher = self._publishers.pop(topic)
             self._client.bridge.node.destroy_publisher(publisher)
-        else:
-            self._client.report("warning", f"unadvertise: {topic} is not advertised", asked.id)
 
     def publish(self, asked: Publish) -> None:
         """Publish a message; a topic that the client has not announced, but others have, is announced first."""
@@ -198,10 +191,7 @@ class Publishers:
             # The stamp is the present time, unless the client has one.
             message.header.stamp = self._client.bridge.node.get_clock().now().to_msg()
         fill(message, {} if asked.msg is None else asked.msg)
-        try:
-            publisher.publish(message)
-        except ValueError as error:
-            raise ConfigError(f"publish: {error}") from error
+        publisher.publish(message)
 
     def close(self) -> None:
         """Withdraw all topics."""

@@ -54,8 +54,6 @@ def test_rosapi_lists_topics_with_types_and_without_hidden_ones(party: Party, gr
     assert party.call("/rosapi/topic_type", topic="states") == {"type": "sensor_msgs/msg/JointState"}
     assert party.call("/rosapi/topic_type", topic="/none") == {"type": ""}
     assert party.call("/rosapi/topics_for_type", type="sensor_msgs/JointState") == {"topics": ["/states"]}
-    assert party.call("/rosapi/publishers", topic="/states") == {"publishers": ["/other"]}
-    assert party.call("/rosapi/subscribers", topic="/orders") == {"subscribers": ["/other"]}
 
 
 def test_rosapi_lists_services_with_types_and_nodes(party: Party, graph: Node) -> None:
@@ -65,10 +63,6 @@ def test_rosapi_lists_services_with_types_and_nodes(party: Party, graph: Node) -
     assert party.call("/rosapi/services_for_type", type="std_srvs/SetBool") == {"services": ["/lamp"]}
     assert party.call("/rosapi/service_type", service="/lamp") == {"type": "std_srvs/srv/SetBool"}
     assert party.call("/rosapi/service_type", service="/none") == {"type": ""}
-    assert party.call("/rosapi/service_providers", service="lamp") == {"providers": ["/other"]}
-    assert party.call("/rosapi/service_providers", service="std_srvs/srv/SetBool") == {"providers": ["/other"]}
-    assert party.call("/rosapi/service_providers", service="std_srvs/Trigger") == {"providers": []}
-    assert party.call("/rosapi/service_node", service="/none") == {"node": ""}
 
 
 def test_rosapi_lists_nodes_with_their_topics_and_services(party: Party, graph: Node) -> None:
