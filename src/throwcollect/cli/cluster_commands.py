@@ -9,7 +9,7 @@ from typing import Literal
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import display, show, tell
+from throwcollect.cli.printing import Display, show, tell
 from throwcollect.wording import command
 
 
@@ -37,7 +37,7 @@ def submit(
     from throwcollect.collect.cluster.submit import submit as submit_dataset
 
     changes = overrides(settings, trials=trials)
-    reporter = display(quiet=json, bar=False)
+    reporter = Display(quiet=json)
     live = mode == "live"
     done = submit_dataset(config, output, tasks, overrides=changes, live=live, dry=dry_run, reporter=reporter)
     if done.job is None:

@@ -22,7 +22,7 @@ from throwcollect.cli.options import (
     TrialsOption,
     overrides,
 )
-from throwcollect.cli.printing import display, show, tell
+from throwcollect.cli.printing import Display, show, tell
 from throwcollect.cli.streams import ensure_written
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
@@ -142,7 +142,7 @@ def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
     from throwcollect.dataset.inspect import info
 
     with reading_config(directory, overrides=changes) as config:
-        shown = display(quiet=json, bar=False)
+        shown = Display(quiet=json)
         finish_without_simulating(config, directory, sweep_directory=directory, reporter=shown)
     again = command("resume", directory)
     print_collected(info(directory), directory, as_json=json, hint=f"{again} runs them again")
@@ -151,7 +151,7 @@ def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
 def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
     from throwcollect.collect.cluster.submit import submit_missing
 
-    submitted = submit_missing(directory, overrides=changes, reporter=display(quiet=json, bar=False))
+    submitted = submit_missing(directory, overrides=changes, reporter=Display(quiet=json))
     job = submitted.job if submitted is not None else None
     numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
     show({"directory": directory.absolute(), **numbers}, json=json)
@@ -181,7 +181,7 @@ def cover(
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
     directory = output or Path("datasets", load(config, changes).name)
-    with display(quiet=json) as shown, count_interruptions() as interruptions:
+    with Display(quiet=json) as shown, count_interruptions() as interruptions:
         found = cover_cells(
             config,
             directory,
@@ -201,7 +201,7 @@ def begin(run: str, lock: LockOption) -> None:
     from throwcollect.collect.runs.background import carry_out
 
     order = sys.stdin.buffer.read()
-    with display(quiet=True) as shown, count_interruptions() as interruptions:
+    with Display(quiet=True) as shown, count_interruptions() as interruptions:
         carry_out(run, lock, order, reporter=shown, interruptions=interruptions)
 
 
@@ -211,7 +211,7 @@ def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool
     from throwcollect.plan.slice import Slice
 
     slice = Slice.parse(text)
-    with display(quiet=json) as shown, count_interruptions() as interruptions:
+    with Display(quiet=json) as shown, count_interruptions() as interruptions:
         collect_slice(directory, slice, overrides=changes, reporter=shown, interruptions=interruptions)
     place = slice_directory(directory, slice)
     show({"slice": str(slice), "directory": place}, f"{place}: finished", json=json, indent=None)
@@ -228,7 +228,7 @@ def join_run(token: str, *, simulations: int | None = None) -> None:
 
     # Interruptions are counted only afterwards, because a signal that is only counted would not end the wait for input.
     word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
-    with display(quiet=False) as shown, count_interruptions() as interruptions:
+    with Display(quiet=False) as shown, count_interruptions() as interruptions:
         join(word, simulations or count_cores(), reporter=shown, interruptions=interruptions)
 
 
@@ -255,7 +255,7 @@ def _collect(
 
     `prepare_run` returns None if the dataset in the directory, with which the run was to go on, is finished already.
     """
-    shown = display(quiet=json, bar=not detach)
+    shown = Display(quiet=json)
     with ExitStack() as held:
         if (run := prepare_run(reporter=shown)) is not None:
             held.enter_context(run)
