@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, PositiveInt, model_validator
+from pydantic import Field, PositiveInt, model_validator
 
 from throwcollect.collect.runs.run_record import Kind
 from throwcollect.config.document import Document
@@ -24,15 +23,6 @@ NAME = rf"[a-z0-9][a-z0-9_-]{{0,{LONGEST_NAME - 1}}}"
 """Names of components and ids of instances, which become names of files and containers, and parts of URLs."""
 ENTRY = r"(?!\.)[A-Za-z0-9_.-]{1,80}"
 """Names of runs and models that clients may ask for; none of them is a path to another directory."""
-
-
-def _check_name(text: str) -> str:
-    if not re.fullmatch(NAME, text):
-        raise ValueError(f"should be at most 63 of a-z, 0-9, - and _, got '{text}'")
-    return text
-
-
-Name = Annotated[str, AfterValidator(_check_name)]
 
 
 class ComponentSection(NodeContainerConfig):
@@ -71,7 +61,7 @@ class ComponentSection(NodeContainerConfig):
 class CatalogueFile(Section):
     """A catalogue of components."""
 
-    components: dict[Name, ComponentSection] = Field(min_length=1)
+    components: dict[Annotated[str, Field(pattern=f"^{NAME}$")], ComponentSection] = Field(min_length=1)
     """Components by their names."""
 
 

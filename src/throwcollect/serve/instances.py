@@ -117,15 +117,6 @@ class Instances:
             with _ONE_AT_A_TIME:
                 _stop_once(run)
 
-    def stop_all(self) -> list[str]:
-        """Ask all living runs that clients have begun to finish their running trials and end; returns their ids."""
-        living = [run.id for run in Records().all() if run.record.origin is not None and run.status == "running"]
-        for run in living:
-            # A run may have ended since its record was read.
-            with suppress(ConflictError):
-                self.stop(run)
-        return living
-
     def scale(self, instance: str, simulations: int) -> Run:
         """Ask an instance for another number of simulations."""
         run = self.get(instance)

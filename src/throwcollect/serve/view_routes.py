@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.live import slow_down
+from throwcollect.serve.live import restore_speed, slow_down
 from throwcollect.serve.robot_files import (
     MeshFile,
     SceneFacts,
@@ -96,12 +96,12 @@ async def _keep_slow(socket: WebSocket, instances: Instances, instance: str, sim
         await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
         return
     run = await asyncio.to_thread(instances.get, instance)
-    hold = await asyncio.to_thread(slow_down, run, simulation)
+    lock = await asyncio.to_thread(slow_down, run, simulation)
     try:
         await socket.accept()
         await keep_sending(socket, wait_for_end(run))
     finally:
-        await asyncio.to_thread(hold.restore_speed)
+        await asyncio.to_thread(restore_speed, run, simulation, lock)
 
 
 async def _send_throws(socket: WebSocket, throws: AsyncIterator[bytes]) -> None:

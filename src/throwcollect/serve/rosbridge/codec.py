@@ -1,4 +1,4 @@
-"""Frames of the protocol: JSON in text frames, CBOR in binary ones, and messages in either.
+"""Frames of the protocol: JSON, and for clients that ask for it, CBOR.
 
 Numbers are written as rosbridge_suite writes them. In JSON, octets are Base64, and NaN and infinities are null. In
 CBOR, octets are bytes and other arrays of numbers are typed arrays (RFC 8746), little endian.
@@ -30,32 +30,20 @@ _OF_A_PART = 64
 Frame = str | bytes
 """A text frame or a binary one."""
 
-_TAGS = {64: "u1", 69: "<u2", 70: "<u4", 71: "<u8", 72: "i1", 77: "<i2", 78: "<i4", 79: "<i8", 85: "<f4", 86: "<f8"}
-_TAG_OF = {np.dtype(kind): tag for tag, kind in _TAGS.items()}
+_TAGS = {"u1": 64, "<u2": 69, "<u4": 70, "<u8": 71, "i1": 72, "<i2": 77, "<i4": 78, "<i8": 79, "<f4": 85, "<f8": 86}
+_TAG_OF = {np.dtype(kind): tag for kind, tag in _TAGS.items()}
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
 
 
 def read_frame(frame: Frame) -> Mapping[str, Any]:
-    """Read the fields of a frame of a client, which is JSON, or CBOR in a binary frame."""
+    """Read the fields of a frame of a client, which is JSON; ROS# sends it in binary frames."""
     try:
-        # The first byte decides: no CBOR map begins with a byte that can begin a JSON object.
-        if isinstance(frame, str) or frame[:1].isspace() or frame[:1] == b"{":
-            fields = orjson.loads(frame)
-        else:
-            fields = cbor2.loads(frame, tag_hook=_read_array)
-    except (ValueError, EOFError, cbor2.CBORDecodeError, RecursionError) as error:
-        raise ConfigError(f"a frame is neither JSON nor CBOR: {error}") from error
+        fields = orjson.loads(frame)
+    except ValueError as error:
+        raise ConfigError(f"a frame is no JSON: {error}") from error
     if not isinstance(fields, Mapping):
         raise ConfigError(f"a frame should be an object with an op, got {fields!r:.80}")
     return fields
-
-
-def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
-    """Turn the tag of a typed array into the array; other tags stay as they are."""
-    kind = _TAGS.get(tag.tag)
-    if kind is None or not isinstance(tag.value, bytes) or len(tag.value) % np.dtype(kind).itemsize:
-        return tag
-    return np.frombuffer(tag.value, kind)
 
 
 def plain_values(message: Any, compression: str = "none") -> Any:

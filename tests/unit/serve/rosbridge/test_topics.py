@@ -9,7 +9,6 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-import cbor2
 import numpy as np
 import pytest
 from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wait_for_listener
@@ -152,18 +151,16 @@ def listen_by(node: Node, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
     return heard
 
 
-def test_published_json_and_cbor_get_defaults_for_missing_fields(party: Party, node: Node) -> None:
+def test_a_published_message_gets_defaults_for_missing_fields(party: Party, node: Node) -> None:
     heard = listen_by(node, Image, "/image")
     wait_for(lambda: "/image" in party.call("rosapi/topics")["topics"])
     party.ask(op="advertise", topic="image", type="sensor_msgs/Image")
     party.ask(op="publish", topic="image", msg={"data": "AQID", "header": {"stamp": {"secs": 7, "nsecs": 8}}})
-    array = cbor2.CBORTag(64, b"\4\5")
-    for content in (b"\1\2", array):
-        party.client.receive(cbor2.dumps({"op": "publish", "topic": "/image", "msg": {"data": content, "width": 3}}))
-    wait_for(lambda: len(heard) == 3)
-    first, second, third = heard
+    party.ask(op="publish", topic="/image", msg={"data": [1, 2], "width": 3})
+    wait_for(lambda: len(heard) == 2)
+    first, second = heard
     assert (bytes(first.data), first.header.stamp.sec, first.header.stamp.nanosec, first.width) == (b"\1\2\3", 7, 8, 0)
-    assert (bytes(second.data), bytes(third.data), second.width) == (b"\1\2", b"\4\5", 3)
+    assert (bytes(second.data), second.width) == (b"\1\2", 3)
     assert second.header.stamp.sec == pytest.approx(time.time(), abs=60)
 
 
