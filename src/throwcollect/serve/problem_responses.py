@@ -66,12 +66,12 @@ def problem(status: int, title: str, headers: dict[str, str] | None = None, **fa
 def answer(error: ThrowcollectError) -> ProblemResponse:
     """Make the answer that describes one of our own errors."""
     status = next((status for kind, status in _STATUS if isinstance(error, kind)), 500)
-    problems = None
-    if isinstance(error, ConfigError):
-        problems = [{"message": each.message, "key": each.key, "line": each.line} for each in error.problems]
-    return problem(
-        status, error.message, expected=error.expected, evidence=error.evidence, hint=error.hint, problems=problems
-    )
+    problems = getattr(error, "problems", None)
+    facts = {
+        "problems": problems and [{"message": each.message, "key": each.key, "line": each.line} for each in problems],
+        **{name: getattr(error, name) for name in ("expected", "evidence", "hint")},
+    }
+    return problem(status, error.message, **facts)
 
 
 async def answer_any(connection: HTTPConnection, error: Exception) -> ProblemResponse | None:
