@@ -25,20 +25,15 @@ _WATCH_S = 1.0
 
 
 async def call_node(client: Client, asked: CallService) -> Any:
-    """Call a service of a node, with arguments by name or in their order, and return the values of its response."""
-    service, arguments = absolute_name(asked.name), asked.args
+    """Call a service of a node, and return the values of its response."""
+    service = absolute_name(asked.name)
     types = dict(client.bridge.node.get_service_names_and_types()).get(service, [])
     if not types:
         raise ConfigError(f"no node offers a service {service}")
     named = full_name("srv", asked.type)
     type_name = named if named in types else types[0]
     request = find_interface("srv", type_name).Request()
-    if isinstance(arguments, list):
-        names = list(request.get_fields_and_field_types())
-        if len(arguments) > len(names):
-            raise ConfigError(f"{len(arguments)} arguments are too many", expected=f"at most {len(names)}")
-        arguments = dict(zip(names, arguments, strict=False))
-    fill(request, {} if arguments is None else arguments)
+    fill(request, {} if asked.args is None or asked.args == [] else asked.args)
     refuse_secrets(type_name, request)
     response = await call_service(client, service, type_name, request, asked.timeout)
     return plain_values(response, asked.compression)
@@ -149,5 +144,5 @@ class Goals:
         self._answer(goal.asked, "action_result", found.result, status=int(found.status), result=True)
 
     def _answer(self, asked: SendGoal, op: str, message: Any, **more: object) -> None:
-        values = plain_values(message, asked.compression)
-        self._client.answer({"op": op, "id": asked.id, "action": asked.name, "values": values, **more}, asked)
+        fields = {"op": op, "id": asked.id, "action": asked.name, **more}
+        self._client.answer({**fields, "values": plain_values(message, asked.compression)}, asked.compression)

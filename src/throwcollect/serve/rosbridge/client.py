@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping
 
 from throwcollect.serve.rosbridge.bridge import Bridge
-from throwcollect.serve.rosbridge.codec import Frame, encode, fragments
-from throwcollect.serve.rosbridge.operations import Form, RequestId
-
-_PLAIN = Form()
-_numbers = itertools.count()
+from throwcollect.serve.rosbridge.codec import Frame, encode
+from throwcollect.serve.rosbridge.operations import RequestId
 
 
 class Client:
@@ -26,20 +22,14 @@ class Client:
         self.is_closed = False
         self._send = send
 
-    def send(self, frame: Frame, fragment_size: int = 0) -> None:
-        """Send a frame, in parts if it is a string longer than ``fragment_size``, unless that is 0."""
-        if self.is_closed:
-            return
-        if isinstance(frame, str) and 0 < fragment_size < len(frame):
-            for part in fragments(frame, fragment_size, str(next(_numbers))):
-                self._send(part)
-        else:
+    def send(self, frame: Frame) -> None:
+        """Send a frame, unless the client has left."""
+        if not self.is_closed:
             self._send(frame)
 
-    def answer(self, fields: Mapping[str, object], form: Form = _PLAIN) -> None:
+    def answer(self, fields: Mapping[str, object], compression: str = "none") -> None:
         """Send an operation; fields that are None are left out."""
-        filled = {name: value for name, value in fields.items() if value is not None}
-        self.send(encode(filled, form.compression), form.fragment_size)
+        self.send(encode({name: value for name, value in fields.items() if value is not None}, compression))
 
     def report(self, text: str, number: RequestId = None) -> None:
         """Send a status message that the operation with this id has failed."""

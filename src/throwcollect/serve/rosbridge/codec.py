@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import cbor2
@@ -19,13 +19,9 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import plain
-from throwcollect.serve.rosbridge.operations import Fragment, RequestId
 
 LONGEST_FRAME = 10 * 2**20
-"""Largest number of bytes of a frame that a client may send, whole or in fragments."""
-_OF_A_PART = 64
-"""Each part counts as this many characters more than its text, because even an empty part takes memory."""
-
+"""Largest number of bytes of a frame that a client may send."""
 
 Frame = str | bytes
 """A text frame or a binary one."""
@@ -63,14 +59,6 @@ def json_text(fields: object) -> str:
     return text if text.isascii() else _NOT_ASCII.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
 
-def fragments(text: str, size: int, number: str) -> Iterator[str]:
-    """Split a text frame into fragments of at most ``size`` characters, which have the frame's ``number`` in common."""
-    total = -(-len(text) // size)
-    for index in range(total):
-        part = text[index * size : (index + 1) * size]
-        yield json_text({"op": "fragment", "id": number, "data": part, "num": index, "total": total})
-
-
 def _encode_bytes(value: Any) -> str:
     if not isinstance(value, bytes):
         raise TypeError
@@ -86,29 +74,3 @@ def _encode_for_cbor(values: NDArray[Any], kind: str) -> Any:
         return values.tobytes()
     little = values.astype(values.dtype.newbyteorder("<"), copy=False)
     return cbor2.CBORTag(_TAG_OF[little.dtype], little.tobytes())
-
-
-class Reassembly:
-    """Collects the parts of frames of one client."""
-
-    def __init__(self) -> None:
-        self._frames: dict[RequestId, dict[int, str]] = {}
-        self._size = 0
-
-    def add(self, part: Fragment) -> str | None:
-        """Take a part.
-
-        Returns:
-            The frame, if this was its last part.
-        """
-        parts = self._frames.setdefault(part.id, {})
-        if part.num not in parts:
-            parts[part.num] = part.data
-            self._size += len(part.data) + _OF_A_PART
-        is_whole = len(parts) >= part.total
-        if is_whole or self._size > LONGEST_FRAME:
-            del self._frames[part.id]
-            self._size -= sum(len(each) + _OF_A_PART for each in parts.values())
-            if not is_whole:
-                raise ConfigError(f"fragment: should have at most {LONGEST_FRAME} characters in all parts together")
-        return "".join(parts[number] for number in sorted(parts)) if is_whole else None

@@ -13,8 +13,8 @@ from throwcollect.serve.rosbridge.advertised import Advertised
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.calls import Goals, call_node
 from throwcollect.serve.rosbridge.client import Client
-from throwcollect.serve.rosbridge.codec import Frame, Reassembly, read_frame
-from throwcollect.serve.rosbridge.operations import MAY_READ, CallService, Fragment, read_operation
+from throwcollect.serve.rosbridge.codec import Frame, read_frame
+from throwcollect.serve.rosbridge.operations import MAY_READ, CallService, read_operation
 from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, make_services, read_arguments
 from throwcollect.serve.rosbridge.topics import Publishers, Subscriptions
 
@@ -38,7 +38,6 @@ class Requests(Client):
         super().__init__(bridge, send)
         self._read_only = read_only
         self._inbox: deque[Frame] = deque()
-        self._reassembly = Reassembly()
         self._services = make_services(self)
         topics, publishers, goals = Subscriptions(self), Publishers(self), Goals(self)
         services, actions = Advertised(self, "srv"), Advertised(self, "action")
@@ -60,7 +59,6 @@ class Requests(Client):
             "action_feedback": actions.take,
             "action_result": actions.take,
             "action_status": actions.take,
-            "fragment": self._add_fragment,
             "status": lambda asked: _logger.info("a client reports: %s", asked.msg),
         }
 
@@ -145,13 +143,8 @@ class Requests(Client):
         if inspect.isawaitable(values):
             values = await values
         fields = {"op": "service_response", "id": asked.id, "service": asked.name}
-        self.answer({**fields, "values": values, "result": True}, asked)
+        self.answer({**fields, "values": values, "result": True}, asked.compression)
 
     def _require_writing(self, what: str) -> None:
         if self._read_only:
             raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
-
-    def _add_fragment(self, part: Fragment) -> None:
-        frame = self._reassembly.add(part)
-        if frame is not None:
-            self._carry_on(self._carry_out(frame))

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel
 
 from rclzenoh.interfaces import message_definition
-from rclzenoh.interfaces.catalog import structure
 from rclzenoh.names import join
 from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.robots.urdf import PACKAGE
-from throwcollect.ros.graph_names import absolute_name, find_interface, full_name, is_hidden
-from throwcollect.ros.message_values import array_parts
+from throwcollect.ros.graph_names import absolute_name, full_name, is_hidden
 from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.guarded import is_guarded
@@ -94,9 +92,6 @@ class _Graph:
             "action_servers": lambda _: self._list_actions(),
             "nodes": lambda _: {"nodes": [join(namespace, name) for name, namespace in self._nodes()]},
             "node_details": lambda asked: self._describe_node(asked.node),
-            "message_details": lambda asked: _describe_type("msg", asked.type),
-            "service_request_details": lambda asked: _describe_type("srv", asked.type, "Request"),
-            "service_response_details": lambda asked: _describe_type("srv", asked.type, "Response"),
             "get_time": lambda _: self._get_time(),
             "get_ros_version": lambda _: {"version": 2, "distro": "jazzy"},
         }
@@ -167,46 +162,3 @@ def _give_file(asked: Arguments) -> Values:
         raise ConfigError(f"{asked.name}: not a file of a robot's description", expected=f"{PACKAGE}NAME/PATH")
     package, _, path = asked.name.removeprefix(PACKAGE).partition("/")
     return {"value": find_mesh(package, path).read_bytes()}
-
-
-Definition = Mapping[str, object]
-"""Fields of rosapi_msgs/msg/TypeDef."""
-
-
-def _describe_type(kind: Literal["msg", "srv"], name: str, part: str = "") -> Values:
-    """Describe a message, or a part of a service, named in full or as ``pkg/Type``, and what it consists of."""
-    found, full = find_interface(kind, name), full_name(kind, name)
-    return {"typedefs": _describe(f"{full}_{part}", getattr(found, part), []) if part else _describe(full, found, [])}
-
-
-def _describe(name: str, message_class: Any, seen: list[str]) -> list[Definition]:
-    seen.append(name)
-    message, kinds, lengths, examples = message_class(), [], [], []
-    types = message_class.get_fields_and_field_types()
-    for field, kind in types.items():
-        parts = array_parts(kind)
-        kinds.append(parts[0] if parts else kind)
-        # In rosapi, -1 stands for no array, and 0 for an array of any length.
-        lengths.append(-1 if parts is None else parts[2] or 0)
-        examples.append("[]" if parts else "{}" if "/" in kind else str(getattr(message, field)))
-    try:
-        constants = structure(name).constants
-    except ValueError:
-        # Only an installed ROS has this message.
-        constants = {}
-    package, _, short = name.replace("/", " ").split()
-    definition = {
-        "type": f"{package}/{short}",
-        "fieldnames": list(types),
-        "fieldtypes": kinds,
-        "fieldarraylen": lengths,
-        "examples": examples,
-        "constnames": list(constants),
-        "constvalues": [str(value) for value in constants.values()],
-    }
-    found: list[Definition] = [definition]
-    for kind in kinds:
-        inner = full_name("msg", kind)
-        if "/" in kind and inner not in seen:
-            found += _describe(inner, ros.get_message(inner), seen)
-    return found

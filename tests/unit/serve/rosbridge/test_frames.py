@@ -22,16 +22,8 @@ from rclzenoh.interfaces.catalog import _JAZZY, DEFINITIONS
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.bridge import Sample
-from throwcollect.serve.rosbridge.codec import (
-    LONGEST_FRAME,
-    Reassembly,
-    encode,
-    fragments,
-    json_text,
-    plain_values,
-    read_frame,
-)
-from throwcollect.serve.rosbridge.operations import Fragment, read_operation
+from throwcollect.serve.rosbridge.codec import encode, json_text, plain_values, read_frame
+from throwcollect.serve.rosbridge.operations import read_operation
 
 
 @cache
@@ -122,26 +114,3 @@ def test_any_frame_is_read_or_refused(frame: str | bytes) -> None:
         read_operation(read_frame(frame))
     except ConfigError:
         return
-
-
-def test_fragments_in_any_order_become_a_frame(party: Party) -> None:
-    frame = json_text({"op": "call_service", "id": "whole", "service": "/rosapi/get_ros_version"})
-    parts = list(fragments(frame, 7, "1"))
-    for each in [*parts[::-2], *parts[::2], parts[1]]:
-        party.client.receive(each)
-    for each in parts[1::2]:
-        party.client.receive(each)
-    assert party.next(id="whole")["values"]["version"] == 2
-
-
-def test_parts_of_a_frame_that_are_too_long_together_are_rejected() -> None:
-    whole, half = Reassembly(), "x" * (LONGEST_FRAME // 2)
-
-    def add(number: int, total: int, data: str, name: str = "a") -> str | None:
-        return whole.add(Fragment(op="fragment", id=name, num=number, total=total, data=data))
-
-    assert add(0, 2, half) is None
-    with pytest.raises(ConfigError, match=f"should have at most {LONGEST_FRAME} characters"):
-        add(0, 2, half, name="b")
-    assert add(1, 2, "y") == f"{half}y"
-    assert add(0, 1, "x" * (LONGEST_FRAME - 100)) is not None

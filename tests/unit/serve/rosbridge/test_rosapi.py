@@ -74,34 +74,6 @@ def test_rosapi_lists_nodes_with_their_topics_and_services(party: Party, graph: 
     assert party.call("/rosapi/node_details", node="/gone") == empty
 
 
-def test_rosapi_describes_a_type_with_all_nested_types(party: Party) -> None:
-    first, *others = party.call("/rosapi/message_details", type="sensor_msgs/JointState")["typedefs"]
-    assert first == {
-        "type": "sensor_msgs/JointState",
-        "fieldnames": ["header", "name", "position", "velocity", "effort"],
-        "fieldtypes": ["std_msgs/Header", "string", "double", "double", "double"],
-        "fieldarraylen": [-1, 0, 0, 0, 0],
-        "examples": ["{}", "[]", "[]", "[]", "[]"],
-        "constnames": [],
-        "constvalues": [],
-    }
-    assert [each["type"] for each in others] == ["std_msgs/Header", "builtin_interfaces/Time"]
-    (request,) = party.call("/rosapi/service_request_details", type="std_srvs/SetBool")["typedefs"]
-    assert (request["type"], request["fieldnames"], request["examples"]) == (
-        "std_srvs/SetBool_Request",
-        ["data"],
-        ["False"],
-    )
-    (response,) = party.call("/rosapi/service_response_details", type="std_srvs/srv/SetBool")["typedefs"]
-    assert response["fieldtypes"] == ["boolean", "string"]
-    (status,) = party.call("/rosapi/message_details", type="diagnostic_msgs/KeyValue")["typedefs"]
-    assert status["constnames"] == []
-    (field,) = party.call("/rosapi/message_details", type="sensor_msgs/PointField")["typedefs"]
-    assert dict(zip(field["constnames"], field["constvalues"], strict=True))["FLOAT64"] == "8"
-    odometry = party.call("/rosapi/message_details", type="geometry_msgs/PoseWithCovariance")["typedefs"]
-    assert odometry[0]["fieldarraylen"] == [-1, 36]
-
-
 def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
     names = party.call("/rosapi/get_param_names")["names"]
     assert {"/other:mass", "/other:names"} <= set(names)
