@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -76,16 +73,15 @@ def up(
     from throwcollect.collect.runs.preparation import prepare
     from throwcollect.collect.runs.preparation import resume as go_on
 
-    prepare_run: Callable[..., Run | None]
+    shown, cores = Display(quiet=json), count_cores()
     if resume is None:
-        config = config or DEFAULT_CONFIG
-        prepare_run = partial(prepare, config, overrides=changes, output=output, processes=count_cores())
+        run = prepare(config or DEFAULT_CONFIG, overrides=changes, output=output, processes=cores, reporter=shown)
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
     else:
         _refuse_submitted(resume)
-        prepare_run = partial(go_on, resume, config=config, overrides=changes, processes=count_cores())
-    _collect(prepare_run, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
+        run = go_on(resume, config=config, overrides=changes, processes=cores, reporter=shown)
+    _collect(run, shown, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
 
 
 def _refuse_submitted(directory: Path) -> None:
@@ -130,8 +126,9 @@ def resume(
         return
     from throwcollect.collect.runs.preparation import resume as go_on
 
-    prepare_run = partial(go_on, directory, overrides=changes, processes=count_cores())
-    _collect(prepare_run, directory=directory, detach=detach, json=json)
+    shown = Display(quiet=json)
+    run = go_on(directory, overrides=changes, processes=count_cores(), reporter=shown)
+    _collect(run, shown, directory=directory, detach=detach, json=json)
 
 
 def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
@@ -243,7 +240,8 @@ def join(directory: DatasetArgument, json: JsonOption = False) -> None:
 
 
 def _collect(
-    prepare_run: Callable[..., Run | None],
+    run: Run | None,
+    shown: Display,
     *,
     directory: Path | None,
     detach: bool,
@@ -253,19 +251,16 @@ def _collect(
 ) -> None:
     """Launch a run and print its summary or, if it is detached, its id.
 
-    `prepare_run` returns None if the dataset in the directory, with which the run was to go on, is finished already.
+    The run is None if the dataset in the directory, with which it was to go on, is finished already.
     """
-    shown = Display(quiet=json)
-    with ExitStack() as held:
-        if (run := prepare_run(reporter=shown)) is not None:
-            held.enter_context(run)
+    if run is not None:
+        with run:
             _announce(run, token_file, view=view)
-            if not detach:
-                with shown, count_interruptions() as interruptions:
-                    summary = run.collect(interruptions=interruptions)
-        if run is not None and detach:
-            _start(run, json=json)
-            return
+            if detach:
+                _start(run, json=json)
+                return
+            with shown, count_interruptions() as interruptions:
+                summary = run.collect(interruptions=interruptions)
     # Imported only now, because these imports take long, and would delay the start of the nodes.
     from throwcollect.cli.dataset.info import print_collected, print_summary
 

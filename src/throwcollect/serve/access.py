@@ -24,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
-from throwcollect.serve.problem_responses import problem
+from throwcollect.serve.problem_responses import make_problem
 
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
@@ -74,15 +74,11 @@ class Keys:
 
         A file that does not exist is made, with new tokens.
         """
-        try:
-            if not path.exists():
-                keys = cls()
-                write_secret(path, f"{keys.full}\n{keys.read_only}\n".encode())
-            tokens = path.read_text(errors="replace").split()
-            is_private = not path.stat().st_mode & 0o077
-        except OSError as error:
-            raise ConfigError(f"--token-file {path}: {error.strerror}") from error
-        if not is_private:
+        if not path.exists():
+            keys = cls()
+            write_secret(path, f"{keys.full}\n{keys.read_only}\n".encode())
+        tokens = path.read_text(errors="replace").split()
+        if path.stat().st_mode & 0o077:
             raise ConfigError(f"--token-file {path}: others can read it", hint=f"chmod 600 {path}")
         if len(set(tokens)) != 2 or not all(re.fullmatch(_FORM, each) for each in tokens):
             raise ConfigError(
@@ -146,7 +142,7 @@ class Access:
             status, title = refusal
             more = {"WWW-Authenticate": "Bearer"} if status == HTTPStatus.UNAUTHORIZED else None
             # For a socket, this refuses the handshake with a status and a body.
-            await problem(status, title, headers=more)(scope, receive, send)
+            await make_problem(status, title, headers=more)(scope, receive, send)
 
     def _judge(self, scope: Scope, headers: Headers) -> tuple[tuple[int, str] | None, Rights]:
         """Decide on a request.

@@ -20,7 +20,7 @@ from throwcollect.cli.ros.graph_session import (
     require_name,
 )
 from throwcollect.cli.streams import has_reader
-from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.files import write_secret
 from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, is_hidden
 from throwcollect.wording import command
@@ -197,11 +197,10 @@ def _indent(message: Any) -> str:
 def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
     """Print the value of a parameter as YAML."""
     with join_graph(run) as session:
-        owner = _find_node(session, node)
-        values = _ask(session, owner, "get_parameters", names=[name]).values
+        values = _ask(session, node, "get_parameters", names=[name]).values
         if not values:
-            require_name("parameter", name, _ask(session, owner, "list_parameters").result.names, of=owner)
-        print(_write_yaml(ros.parameter_value_to_python(values[0]) if values else None), end="")
+            raise ConfigError(f"{node} has no parameter {name}")
+        print(_write_yaml(ros.parameter_value_to_python(values[0])), end="")
 
 
 # A value may be a negative number, which would otherwise be taken for an option.
@@ -219,25 +218,17 @@ def set_parameter(
     except (TypeError, ConfigError):
         parameter = ros.Parameter(name, value=value)
     with join_graph(run) as session:
-        owner = _find_node(session, node)
-        (result,) = _ask(session, owner, "set_parameters", parameters=[parameter.to_parameter_msg()]).results
+        (result,) = _ask(session, node, "set_parameters", parameters=[parameter.to_parameter_msg()]).results
         if not result.successful:
-            raise ConfigError(f"setting {name} of {owner} failed: {result.reason}")
+            raise ConfigError(f"setting {name} of {node} failed: {result.reason}")
         print("Set parameter successful")
-
-
-def _find_node(session: GraphSession, name: str) -> str:
-    owner = absolute_name(name)
-    nodes = session.node.get_node_names_and_namespaces()
-    require_name("node", owner, [f"{namespace.removesuffix('/')}/{each}" for each, namespace in nodes])
-    return owner
 
 
 def _ask(session: GraphSession, node: str, service: str, **fields: Any) -> Any:
     kind: Any = ros.get_service(f"rcl_interfaces/srv/{service.title().replace('_', '')}")
-    client = session.node.create_client(kind, f"{node}/{service}")
+    client = session.node.create_client(kind, f"{absolute_name(node)}/{service}")
     if not client.wait_for_service(timeout_sec=_SERVICE_S):
-        raise WorkerError(f"{node} offers no {service}")
+        raise ConfigError(f"no node {node} offers {service}")
     return session.answer(client.call_async(kind.Request(**fields)), alive=client.service_is_ready, who=node)
 
 

@@ -126,13 +126,8 @@ def join_graph(run: str | None) -> Iterator[GraphSession]:
         raise Interrupted("") from None
 
 
-def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
-    """Refuse the name of a thing, such as a ``topic``, that does not exist, and propose those that are like it.
-
-    `of` is the node that would have it; empty if the graph would.
-    """
+def require_name(what: str, name: str, names: Iterable[str]) -> None:
+    """Refuse the name of a thing, such as a ``topic``, that the graph does not have, and propose similar names."""
     existing = sorted(set(names))
-    if name in existing:
-        return
-    owner = f" of {of}" if of else ""
-    raise ConfigError(f"no {what} {name}{owner}{suggest(name, existing)}")
+    if name not in existing:
+        raise ConfigError(f"no {what} {name}{suggest(name, existing)}")

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.codec import Frame, encode
-from throwcollect.serve.rosbridge.operations import RequestId
 
 
 class Client:
@@ -30,7 +29,3 @@ class Client:
     def answer(self, fields: Mapping[str, object], compression: str = "none") -> None:
         """Send an operation; fields that are None are left out."""
         self.send(encode({name: value for name, value in fields.items() if value is not None}, compression))
-
-    def report(self, text: str, number: RequestId = None) -> None:
-        """Send a status message that the operation with this id has failed."""
-        self.answer({"op": "status", "id": number, "level": "error", "msg": text})

@@ -132,7 +132,7 @@ class Requests(Client):
             case "send_action_goal":
                 self.answer({"op": "action_result", "action": fields.get("action"), "status": _UNKNOWN, **failure})
             case _:
-                self.report(sentence, number)
+                self.answer({"op": "status", "id": number, "level": "error", "msg": sentence})
 
     async def _call_service(self, asked: CallService) -> None:
         name = asked.name.lstrip("/")

@@ -107,12 +107,7 @@ class SubscribedTopic:
         self._pace.change(min(each.throttle_rate for each in asked) / 1000)
 
     def _send(self, sample: Sample) -> None:
-        try:
-            frame = sample.frame(self._given, self._compression)
-        except ValueError as error:
-            self._client.report(f"{self._given}: a message cannot be read: {error}")
-            return
-        self._client.send(frame)
+        self._client.send(sample.frame(self._given, self._compression))
 
 
 class Subscriptions:
