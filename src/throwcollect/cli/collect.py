@@ -74,6 +74,7 @@ def up(
     from throwcollect.collect.runs.preparation import resume as go_on
 
     shown, cores = Display(quiet=json), count_cores()
+    run: Run | None
     if resume is None:
         run = prepare(config or DEFAULT_CONFIG, overrides=changes, output=output, processes=cores, reporter=shown)
     elif output is not None:

@@ -128,6 +128,18 @@ AnyOperation = Subscribe | Withdraw | Publish | CallService | SendGoal | CancelG
 _OPERATIONS: TypeAdapter[AnyOperation] = TypeAdapter(Annotated[AnyOperation, Field(discriminator="op")])
 
 
+class Arguments(Operation):
+    """Arguments of the services that the bridge answers; each service has some of them."""
+
+    type: str = ""
+    topic: str = ""
+    service: str = ""
+    node: str = ""
+    name: str = ""
+    value: str = ""
+    default_value: str = ""
+
+
 def read_operation(fields: Mapping[str, Any]) -> AnyOperation:
     """Read an operation from its fields."""
     return read_fields(_OPERATIONS.validate_python, fields)

@@ -14,6 +14,7 @@ from throwcollect.ros.message_values import plain
 from throwcollect.serve.rosbridge.calls import call_service
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.guarded import refuse_leases
+from throwcollect.serve.rosbridge.operations import Arguments
 
 _TIMEOUT_S = 5.0
 _NOT_SET = 0
@@ -25,42 +26,41 @@ _TYPES = {
 }
 
 
-async def get_parameter(client: Client, given: str, default: str) -> str:
-    """Value of a parameter, or the default that the client gives, in JSON or as a string."""
-    value = await read_parameter(client, given)
+Values = dict[str, object]
+"""Fields of a response."""
+
+
+async def get_parameter(client: Client, asked: Arguments) -> Values:
+    """Answer with the value of a parameter, or the default that the client gives, in JSON or as a string."""
+    value = await _read(client, asked.name)
     if value is not None:
-        return orjson.dumps(plain(value)).decode()
-    if not default:
-        raise ConfigError(f"{given}: there is no such node, or it has no such parameter")
+        return {"value": orjson.dumps(plain(value)).decode()}
+    if not asked.default_value:
+        raise ConfigError(f"{asked.name}: there is no such node, or it has no such parameter")
     # ROS# sends a plain string, all others send JSON.
     try:
-        orjson.loads(default)
+        orjson.loads(asked.default_value)
     except ValueError:
-        return orjson.dumps(default).decode()
-    return default
+        return {"value": orjson.dumps(asked.default_value).decode()}
+    return {"value": asked.default_value}
 
 
-async def read_parameter(client: Client, given: str) -> Any:
-    """Value of a parameter, which is None if there is no such node or parameter."""
-    node, name = _split_name(given)
-    if not _offers(client, node, "get_parameters"):
-        return None
-    response = await _call(client, node, "get_parameters", names=[name])
-    values = [ros.parameter_value_to_python(each) for each in response.values if each.type != _NOT_SET]
-    return values[0] if values else None
+async def has_parameter(client: Client, asked: Arguments) -> Values:
+    """Answer whether there is a parameter."""
+    return {"exists": await _read(client, asked.name) is not None}
 
 
-async def set_parameter(client: Client, given: str, text: str) -> dict[str, object]:
+async def set_parameter(client: Client, asked: Arguments) -> Values:
     """Set a parameter to a value in JSON."""
-    node, name = _split_name(given)
+    node, name = _split_name(asked.name)
     try:
-        value = orjson.loads(text)
+        value = orjson.loads(asked.value)
         ros.Parameter(name, value=value)
     except (TypeError, ValueError) as error:
-        raise ConfigError(f"{given}: value should be that of a parameter in JSON: {error}") from error
+        raise ConfigError(f"{asked.name}: value should be that of a parameter in JSON: {error}") from error
     if not _offers(client, node, "set_parameters"):
         raise ConfigError(f"{node}: there is no such node, or it has no services for its parameters")
-    current = await read_parameter(client, given)
+    current = await _read(client, asked.name)
     first = next(iter(current), None) if isinstance(current, list | tuple) or hasattr(current, "tolist") else current
     # JavaScript writes 1.0 as 1, so numbers for a floating-point parameter are converted.
     if isinstance(first, float):
@@ -72,8 +72,8 @@ async def set_parameter(client: Client, given: str, text: str) -> dict[str, obje
     return {"successful": True, "reason": result.reason}
 
 
-async def list_parameters(client: Client) -> list[str]:
-    """Names of the parameters of all nodes that answer in time."""
+async def list_parameters(client: Client, _: Arguments) -> Values:
+    """Answer with the names of the parameters of all nodes that answer in time."""
     names, end = [], time.monotonic() + _TIMEOUT_S
     for service, types in client.bridge.node.get_service_names_and_types():
         if _TYPES["list_parameters"] in types and not is_hidden(service):
@@ -83,7 +83,17 @@ async def list_parameters(client: Client) -> list[str]:
             except ConfigError:
                 continue
             names += [f"{node}:{name}" for name in response.result.names]
-    return sorted(names)
+    return {"names": sorted(names)}
+
+
+async def _read(client: Client, given: str) -> Any:
+    """Value of a parameter, which is None if there is no such node or parameter."""
+    node, name = _split_name(given)
+    if not _offers(client, node, "get_parameters"):
+        return None
+    response = await _call(client, node, "get_parameters", names=[name])
+    values = [ros.parameter_value_to_python(each) for each in response.values if each.type != _NOT_SET]
+    return values[0] if values else None
 
 
 async def _call(client: Client, node: str, service: str, *, timeout_s: float = _TIMEOUT_S, **fields: Any) -> Any:

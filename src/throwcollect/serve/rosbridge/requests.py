@@ -14,8 +14,8 @@ from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.calls import Goals, call_node
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame, read_frame
-from throwcollect.serve.rosbridge.operations import MAY_READ, CallService, read_operation
-from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, make_services, read_arguments
+from throwcollect.serve.rosbridge.operations import MAY_READ, Arguments, CallService, read_fields, read_operation
+from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, make_services
 from throwcollect.serve.rosbridge.topics import Publishers, Subscriptions
 
 _logger = logging.getLogger(__name__)
@@ -139,7 +139,11 @@ class Requests(Client):
         service = self._services.get(name)
         if service is None or name == SET_PARAMETER:
             self._require_writing(asked.name)
-        values = call_node(self, asked) if service is None else service(read_arguments(asked))
+        if service is None:
+            values = call_node(self, asked)
+        else:
+            given = asked.args if isinstance(asked.args, Mapping) else {}
+            values = service(read_fields(Arguments.model_validate, given, f"{asked.name}: "))
         if inspect.isawaitable(values):
             values = await values
         fields = {"op": "service_response", "id": asked.id, "service": asked.name}

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
-
-from pydantic import BaseModel
 
 from rclzenoh.interfaces import message_definition
 from rclzenoh.names import join
@@ -16,11 +15,11 @@ from throwcollect.ros.graph_names import absolute_name, full_name, is_hidden
 from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.guarded import is_guarded
-from throwcollect.serve.rosbridge.operations import CallService, read_fields
-from throwcollect.serve.rosbridge.parameters import get_parameter, list_parameters, read_parameter, set_parameter
+from throwcollect.serve.rosbridge.operations import Arguments
+from throwcollect.serve.rosbridge.parameters import get_parameter, has_parameter, list_parameters, set_parameter
 from throwcollect.units import NS_PER_S
 
-Service = Callable[["Arguments"], Any]
+Service = Callable[[Arguments], Any]
 """Makes the fields of the response from the arguments, now or when it is awaited."""
 Values = Mapping[str, object]
 Found = Iterable[tuple[str, list[str]]]
@@ -29,45 +28,17 @@ SET_PARAMETER = "rosapi/set_param"
 """The only service here that changes something."""
 
 
-class Arguments(BaseModel):
-    """Arguments of the services that the bridge answers; each service has some of them."""
-
-    type: str = ""
-    topic: str = ""
-    service: str = ""
-    node: str = ""
-    name: str = ""
-    value: str = ""
-    default_value: str = ""
-
-
-def read_arguments(asked: CallService) -> Arguments:
-    """Arguments of a call of a service that the bridge answers."""
-    given = asked.args if isinstance(asked.args, Mapping) else {}
-    given = {name: value for name, value in given.items() if value is not None}
-    return read_fields(Arguments.model_validate, given, f"{asked.name}: ")
-
-
 def make_services(client: Client) -> Mapping[str, Service]:
     """Services that the bridge answers for a client, by their names without a slash at the beginning."""
-
-    async def get_value(asked: Arguments) -> Values:
-        return {"value": await get_parameter(client, asked.name, asked.default_value)}
-
-    async def has_value(asked: Arguments) -> Values:
-        return {"exists": await read_parameter(client, asked.name) is not None}
-
-    async def list_names(_: Arguments) -> Values:
-        return {"names": await list_parameters(client)}
-
-    parameters: Mapping[str, Service] = {
-        "rosapi/get_param": get_value,
-        "rosapi/has_param": has_value,
-        "rosapi/get_param_names": list_names,
-        SET_PARAMETER: lambda asked: set_parameter(client, asked.name, asked.value),
-    }
     graph = {f"rosapi/{name}": service for name, service in _Graph(client.bridge.node).services().items()}
-    return {**graph, **parameters, "file_server/get_file": _give_file}
+    return {
+        **graph,
+        "rosapi/get_param": partial(get_parameter, client),
+        "rosapi/has_param": partial(has_parameter, client),
+        "rosapi/get_param_names": partial(list_parameters, client),
+        SET_PARAMETER: partial(set_parameter, client),
+        "file_server/get_file": _give_file,
+    }
 
 
 class _Graph:
