@@ -104,7 +104,6 @@ class Bridge:
 
     Attributes:
         node: The node of the bridge.
-        advertised: The services by which one knows what clients offer; all clients of the bridge share this set.
         is_over: Whether the bridge has left the graph; clients then connect again.
     """
 
@@ -120,7 +119,6 @@ class Bridge:
         ros.let_callbacks_wait(self.node)
         self._executor = ros.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self.advertised: set[str] = set()
         self.is_over = False
         self._feeds: list[Feed] = []
         self._clients: dict[tuple[str, str], Any] = {}
@@ -190,15 +188,6 @@ class Bridge:
         if key not in self._clients:
             self._clients[key] = self.node.create_client(find_interface("srv", type_name), service)
         return self._clients[key]
-
-    def offers(self, service: str) -> bool:
-        """Whether a client of the bridge or a node offers a service, given by its absolute name."""
-        # All clients offer through the one node of the bridge, so the graph does not separate their offers.
-        return service in self.advertised or any(
-            service in dict(self.node.get_service_names_and_types_by_node(*other))
-            for other in self.node.get_node_names_and_namespaces()
-            if other[0] != self.node.get_name()
-        )
 
     def _run(self) -> None:
         self.later(_LOOK_S, self._look)
