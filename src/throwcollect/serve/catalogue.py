@@ -14,7 +14,7 @@ from throwcollect.config.document import Document
 from throwcollect.config.loader import load
 from throwcollect.config.run import ContainerSpec, Mount, NodeContainerConfig
 from throwcollect.config.section import ContradictionError, Section
-from throwcollect.errors import ConfigError, NotFoundError
+from throwcollect.errors import NotFoundError
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.wording import suggest
 
@@ -118,28 +118,20 @@ class Catalogue:
             return cls({config.name: Component(config.name, config.name, "collection", path.absolute(), 1)})
         sections = document.validate(CatalogueFile).components
         directory = path.absolute().parent
-        return cls({name: _read_component(name, section, document, directory) for name, section in sections.items()})
+        return cls({name: _read_component(name, section, directory) for name, section in sections.items()})
 
 
-def _read_component(name: str, section: ComponentSection, document: Document, directory: Path) -> Component:
-    """Make a component from its section, and read the file that the section names."""
+def _read_component(name: str, section: ComponentSection, directory: Path) -> Component:
+    """Make a component from its section, and check the file that the section names."""
     pretty_name = section.pretty_name or name
     if section.image is not None:
         urdf = None if section.urdf is None else directory / section.urdf
         if urdf is not None:
-            try:
-                read_urdf_text(urdf)
-            except ConfigError as error:
-                raise ConfigError([document.problem(("components", name, "urdf"), error.message)]) from error
+            read_urdf_text(urdf)
         node = NodeContainerConfig(**section.model_dump(include=set(NodeContainerConfig.model_fields)))
         source = ContainerSpec(section.image, None if section.command is None else tuple(section.command), node)
         return Component(name, pretty_name, "container", source, section.max_instances, urdf)
     config = directory / (section.config or section.session or "")
-    try:
-        load(config)
-    except ConfigError as error:
-        key = "config" if section.session is None else "session"
-        problem = document.problem(("components", name, key), "names a file with errors")
-        raise ConfigError([problem, *error.problems], hint=error.hint) from error
+    load(config)
     kind: Kind = "collection" if section.session is None else "session"
     return Component(name, pretty_name, kind, config, section.max_instances)
