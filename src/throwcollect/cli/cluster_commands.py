@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import display, show, tell
+from throwcollect.cli.printing import Display, show, tell
 from throwcollect.wording import command
 
 
@@ -35,7 +35,7 @@ def submit(
     from throwcollect.collect.cluster.submit import submit as submit_dataset
 
     changes = overrides(settings, trials=trials)
-    reporter = display(quiet=json, bar=False)
+    reporter = Display(quiet=json)
     script, job = submit_dataset(config, output, tasks, overrides=changes, dry=dry_run, reporter=reporter)
     directory = output.absolute()
     if job is None:

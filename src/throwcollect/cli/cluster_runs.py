@@ -10,7 +10,7 @@ from pathlib import Path
 import typer
 
 from throwcollect.cli.dataset.info import print_collected
-from throwcollect.cli.printing import display
+from throwcollect.cli.printing import Display
 from throwcollect.cli.streams import has_reader
 from throwcollect.collect.cluster.cluster_run import ClusterRun, ProgressOfSlices, follow
 from throwcollect.collect.runtimes.node_logs import Tail
@@ -24,7 +24,7 @@ def follow_to_the_end(directory: Path, *, as_json: bool) -> None:
     """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves the run alone."""
     run = ClusterRun.open(directory)
     progress = ProgressOfSlices(run)
-    with display(quiet=as_json) as shown, count_interruptions() as interruptions:
+    with Display(quiet=as_json) as shown, count_interruptions() as interruptions:
         for look in follow(run, keep_on=lambda: not interruptions()):
             shown.update(progress.at(look))
     if look.lives and not look.complete:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,7 +19,7 @@ from throwcollect.cli.options import (
     TrialsOption,
     overrides,
 )
-from throwcollect.cli.printing import display, show, tell
+from throwcollect.cli.printing import Display, show, tell
 from throwcollect.cli.streams import ensure_written
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
@@ -76,16 +73,16 @@ def up(
     from throwcollect.collect.runs.preparation import prepare
     from throwcollect.collect.runs.preparation import resume as go_on
 
-    prepare_run: Callable[..., Run | None]
+    shown, cores = Display(quiet=json), count_cores()
+    run: Run | None
     if resume is None:
-        config = config or DEFAULT_CONFIG
-        prepare_run = partial(prepare, config, overrides=changes, output=output, processes=count_cores())
+        run = prepare(config or DEFAULT_CONFIG, overrides=changes, output=output, processes=cores, reporter=shown)
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
     else:
         _refuse_submitted(resume)
-        prepare_run = partial(go_on, resume, config=config, overrides=changes, processes=count_cores())
-    _collect(prepare_run, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
+        run = go_on(resume, config=config, overrides=changes, processes=cores, reporter=shown)
+    _collect(run, shown, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
 
 
 def _refuse_submitted(directory: Path) -> None:
@@ -129,8 +126,9 @@ def resume(
         return
     from throwcollect.collect.runs.preparation import resume as go_on
 
-    prepare_run = partial(go_on, directory, overrides=changes, processes=count_cores())
-    _collect(prepare_run, directory=directory, detach=detach, json=json)
+    shown = Display(quiet=json)
+    run = go_on(directory, overrides=changes, processes=count_cores(), reporter=shown)
+    _collect(run, shown, directory=directory, detach=detach, json=json)
 
 
 def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
@@ -141,7 +139,7 @@ def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
     from throwcollect.dataset.inspect import info
 
     with reading_config(directory, overrides=changes) as config:
-        shown = display(quiet=json, bar=False)
+        shown = Display(quiet=json)
         finish_without_simulating(config, directory, sweep_directory=directory, reporter=shown)
     again = command("resume", directory)
     print_collected(info(directory), directory, as_json=json, hint=f"{again} runs them again")
@@ -150,7 +148,7 @@ def _finish(directory: Path, changes: list[str], *, json: bool) -> None:
 def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
     from throwcollect.collect.cluster.submit import submit_missing
 
-    job = submit_missing(directory, overrides=changes, reporter=display(quiet=json, bar=False))
+    job = submit_missing(directory, overrides=changes, reporter=Display(quiet=json))
     numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
     show({"directory": directory.absolute(), **numbers}, json=json)
     if job is None and not json:
@@ -179,7 +177,7 @@ def cover(
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
     directory = output or Path("datasets", load(config, changes).name)
-    with display(quiet=json) as shown, count_interruptions() as interruptions:
+    with Display(quiet=json) as shown, count_interruptions() as interruptions:
         found = cover_cells(
             config,
             directory,
@@ -199,7 +197,7 @@ def begin(run: str, lock: LockOption) -> None:
     from throwcollect.collect.runs.background import carry_out
 
     order = sys.stdin.buffer.read()
-    with display(quiet=True) as shown, count_interruptions() as interruptions:
+    with Display(quiet=True) as shown, count_interruptions() as interruptions:
         carry_out(run, lock, order, reporter=shown, interruptions=interruptions)
 
 
@@ -209,7 +207,7 @@ def _collect_slice(directory: Path, text: str, changes: list[str], *, json: bool
     from throwcollect.plan.slice import Slice
 
     slice = Slice.parse(text)
-    with display(quiet=json) as shown, count_interruptions() as interruptions:
+    with Display(quiet=json) as shown, count_interruptions() as interruptions:
         collect_slice(directory, slice, overrides=changes, reporter=shown, interruptions=interruptions)
     place = slice_directory(directory, slice)
     show({"slice": str(slice), "directory": place}, f"{place}: finished", json=json, indent=None)
@@ -226,7 +224,7 @@ def join_run(token: str, *, simulations: int | None = None) -> None:
 
     # Interruptions are counted only afterwards, because a signal that is only counted would not end the wait for input.
     word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
-    with display(quiet=False) as shown, count_interruptions() as interruptions:
+    with Display(quiet=False) as shown, count_interruptions() as interruptions:
         join(word, simulations or count_cores(), reporter=shown, interruptions=interruptions)
 
 
@@ -241,7 +239,8 @@ def join(directory: DatasetArgument, json: JsonOption = False) -> None:
 
 
 def _collect(
-    prepare_run: Callable[..., Run | None],
+    run: Run | None,
+    shown: Display,
     *,
     directory: Path | None,
     detach: bool,
@@ -251,19 +250,16 @@ def _collect(
 ) -> None:
     """Launch a run and print its summary or, if it is detached, its id.
 
-    `prepare_run` returns None if the dataset in the directory, with which the run was to go on, is finished already.
+    The run is None if the dataset in the directory, with which it was to go on, is finished already.
     """
-    shown = display(quiet=json, bar=not detach)
-    with ExitStack() as held:
-        if (run := prepare_run(reporter=shown)) is not None:
-            held.enter_context(run)
+    if run is not None:
+        with run:
             _announce(run, token_file, view=view)
-            if not detach:
-                with shown, count_interruptions() as interruptions:
-                    summary = run.collect(interruptions=interruptions)
-        if run is not None and detach:
-            _start(run, json=json)
-            return
+            if detach:
+                _start(run, json=json)
+                return
+            with shown, count_interruptions() as interruptions:
+                summary = run.collect(interruptions=interruptions)
     # Imported only now, because these imports take long, and would delay the start of the nodes.
     from throwcollect.cli.dataset.info import print_collected, print_summary
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
+import shutil
 import sys
 import time
 from collections.abc import Sequence
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
     from throwcollect.collect.coordinator.progress import Progress
 
 _LINE_EVERY_S = 2.0
-"""Least time between two lines of progress."""
+_REWRITE_S = 0.2
+"""Least times between two lines of progress, and between two states of the line in a terminal."""
+_CLEAR = "\r\x1b[K"
 
 tell = partial(typer.echo, err=True)
 """Print a remark to standard error, where it does not mix with the result."""
@@ -69,79 +72,42 @@ def align(rows: Sequence[Sequence[str]], *, numbers: bool = False) -> list[str]:
     return ["  ".join([row[0].ljust(widths[0]), *map(fill, row[1:], widths[1:])]).rstrip() for row in rows]
 
 
-def display(*, quiet: bool, bar: bool = True) -> _Lines | _Bar:
-    """Choose a display of the progress of a collection by where standard error goes.
+class Display(Reporter, AbstractContextManager["Display"]):
+    """Shows progress on standard error: in a terminal as one line that is written anew, else as one every two seconds.
 
-    A quiet one shows nothing but warnings; a run that is detached has no progress, and so no bar.
+    A quiet display shows nothing but warnings.
     """
-    if sys.stderr.isatty() and bar and not quiet:
-        return _Bar()
-    return _Lines(quiet=quiet)
 
-
-class _Lines(Reporter, AbstractContextManager["_Lines"]):
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
+        self._is_terminal = sys.stderr.isatty()
         self._next = 0.0
         self._shown: Progress | None = None
 
     def __exit__(self, *_: object) -> None:
-        pass
+        if self._is_terminal and self._shown is not None:
+            self.warn(self._shown.line)
 
     def update(self, progress: Progress) -> None:
+        """Take in a progress report of the coordinator."""
         now = time.monotonic()
         # The last trial is shown without delay, but only once: reports go on while the dataset is checked and finished.
         over = progress.ended >= progress.total
         repeated = self._shown is not None and self._shown.outcomes == progress.outcomes
-        if (over and repeated) or (not over and now < self._next):
+        if self._quiet or (over and repeated) or (not over and now < self._next):
             return
-        self._next, self._shown = now + _LINE_EVERY_S, progress
-        self.say(progress.line)
+        self._next, self._shown = now + (_REWRITE_S if self._is_terminal else _LINE_EVERY_S), progress
+        if self._is_terminal:
+            sys.stderr.write(f"{_CLEAR}{progress.line[: shutil.get_terminal_size().columns - 1]}")
+            sys.stderr.flush()
+        else:
+            self.warn(progress.line)
 
     def say(self, line: str) -> None:
+        """Take in a line of information."""
         if not self._quiet:
             self.warn(line)
 
     def warn(self, line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
-
-
-class _Bar(Reporter):
-    def __init__(self) -> None:
-        from rich import progress
-        from rich.console import Console
-        from rich.table import Column
-        from rich.text import Text
-
-        class Counts(progress.ProgressColumn):
-            """The outcomes in words, which are cut in a narrow terminal so that the numbers are not."""
-
-            def render(self, task: progress.Task) -> Text:
-                return Text(task.description, no_wrap=True, overflow="ellipsis")
-
-        self._progress = progress.Progress(
-            progress.MofNCompleteColumn(table_column=Column(no_wrap=True)),
-            Counts(),
-            progress.TextColumn("ETA"),
-            progress.TimeRemainingColumn(compact=True, table_column=Column(no_wrap=True)),
-            progress.BarColumn(bar_width=20, table_column=Column(no_wrap=True)),
-            console=Console(stderr=True),
-        )
-        self._task = self._progress.add_task("waiting for simulations", total=None)
-
-    def __enter__(self) -> _Bar:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def update(self, progress: Progress) -> None:
-        completed, total = progress.steps
-        self._progress.update(self._task, total=total, completed=completed, description=progress.counts)
-
-    def say(self, line: str) -> None:
-        self.warn(line)
-
-    def warn(self, line: str) -> None:
-        self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
+        """Take in a warning."""
+        print(f"{_CLEAR}{line}" if self._is_terminal else line, file=sys.stderr, flush=True)

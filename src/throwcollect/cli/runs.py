@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from throwcollect.cli.options import JsonOption, RunOption
-from throwcollect.cli.printing import align, display, show, tell
+from throwcollect.cli.printing import Display, align, show, tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.own_process import count_interruptions
@@ -72,7 +72,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     from throwcollect.collect.runs.run_selection import describe_death, find_run_to_watch
 
     found = find_run_to_watch(run)
-    with display(quiet=json) as shown, count_interruptions() as interruptions:
+    with Display(quiet=json) as shown, count_interruptions() as interruptions:
         for look in follow(found, keep_on=lambda: not interruptions()):
             found = look.run
             if look.progress is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import display, format_number, show, tell
+from throwcollect.cli.printing import Display, format_number, show, tell
 from throwcollect.cli.robot_commands import FlangeOption, read_robot, write_robot
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
@@ -115,7 +115,7 @@ def plan(
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
         if sensors is not None and not config.sensors:
             raise ConfigError(f"--sensors {sensors}: the configuration has no sensors")
-        reporter = display(quiet=json, bar=False)
+        reporter = Display(quiet=json)
         if output is None:
             found = draw_plan(config, directory=path.parent, processes=count_cores(), reporter=reporter)
         else:

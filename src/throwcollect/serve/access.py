@@ -13,9 +13,9 @@ import re
 import secrets
 import time
 from dataclasses import dataclass, field
-from enum import Enum
 from http import HTTPStatus
 from pathlib import Path
+from typing import Literal
 from urllib.parse import parse_qs, quote
 
 from starlette.datastructures import Headers
@@ -24,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
-from throwcollect.serve.problem_responses import problem
+from throwcollect.serve.problem_responses import make_problem
 
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
@@ -47,12 +47,8 @@ _HEADERS = (
 _AUDIT = logging.getLogger("throwcollect.serve")
 
 
-class Rights(Enum):
-    """What a client may do; the values are the names of the groups of clients in the log."""
-
-    CHANGE = "full"
-    LOOK = "read-only"
-    NONE = "unknown"
+Rights = Literal["full", "read-only", "unknown"]
+"""What a client may do, as the log names it: everything, looking, or nothing."""
 
 
 @dataclass
@@ -74,15 +70,11 @@ class Keys:
 
         A file that does not exist is made, with new tokens.
         """
-        try:
-            if not path.exists():
-                keys = cls()
-                write_file(path, f"{keys.full}\n{keys.read_only}\n".encode(), mode=0o600)
-            tokens = path.read_text(errors="replace").split()
-            is_private = not path.stat().st_mode & 0o077
-        except OSError as error:
-            raise ConfigError(f"--token-file {path}: {error.strerror}") from error
-        if not is_private:
+        if not path.exists():
+            keys = cls()
+            write_file(path, f"{keys.full}\n{keys.read_only}\n".encode(), mode=0o600)
+        tokens = path.read_text(errors="replace").split()
+        if path.stat().st_mode & 0o077:
             raise ConfigError(f"--token-file {path}: others can read it", hint=f"chmod 600 {path}")
         if len(set(tokens)) != 2 or not all(re.fullmatch(_FORM, each) for each in tokens):
             raise ConfigError(
@@ -97,9 +89,7 @@ class Keys:
         given = token.encode()
         full = hmac.compare_digest(given, self.full.encode())
         read_only = hmac.compare_digest(given, self.read_only.encode())
-        if full:
-            return Rights.CHANGE
-        return Rights.LOOK if read_only else Rights.NONE
+        return "full" if full else "read-only" if read_only else "unknown"
 
     def new_code(self) -> str:
         """Make a code for an address: it can be exchanged for the full token once, within ten minutes."""
@@ -137,7 +127,7 @@ class Access:
             return
         headers = Headers(scope=scope)
         refusal, rights = self._judge(scope, headers)
-        scope.setdefault("state", {})["may_change"] = rights is Rights.CHANGE
+        scope.setdefault("state", {})["may_change"] = rights == "full"
         host = headers.get("host", "")
         send = _add_headers(scope, send, rights, host if host in self._hosts else None)
         if refusal is None:
@@ -146,7 +136,7 @@ class Access:
             status, title = refusal
             more = {"WWW-Authenticate": "Bearer"} if status == HTTPStatus.UNAUTHORIZED else None
             # For a socket, this refuses the handshake with a status and a body.
-            await problem(status, title, headers=more)(scope, receive, send)
+            await make_problem(status, title, headers=more)(scope, receive, send)
 
     def _judge(self, scope: Scope, headers: Headers) -> tuple[tuple[int, str] | None, Rights]:
         """Decide on a request.
@@ -156,16 +146,16 @@ class Access:
         """
         # Host and Origin come first: a foreign page must not even learn whether a token is right.
         if headers.get("host", "") not in self._hosts:
-            return (421, "this server is not known by that name"), Rights.NONE
+            return (421, "this server is not known by that name"), "unknown"
         if "origin" in headers and headers["origin"] not in self._origins:
-            return (403, "pages of another origin may not connect"), Rights.NONE
+            return (403, "pages of another origin may not connect"), "unknown"
         # The page itself needs no token, because it holds no secret: it exchanges the code in the printed address.
         if scope["type"] == "http" and _is_public(scope["path"]):
-            return None, Rights.NONE
+            return None, "unknown"
         rights = self._keys.rights_of(_read_token(scope, headers))
-        if rights is Rights.NONE:
+        if rights == "unknown":
             return (401, "a token is missing, or it is not ours"), rights
-        if rights is Rights.LOOK and scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
+        if rights == "read-only" and scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
             return MAY_ONLY_LOOK, rights
         return None, rights
 
@@ -221,7 +211,7 @@ def _add_headers(scope: Scope, send: Send, rights: Rights, host: str | None) -> 
         if not is_noted:
             # The query is left out, because it may hold a token. The path is quoted, so that it cannot forge a line.
             path = quote(scope["path"], safe=_PLAIN)
-            _AUDIT.info("%s %s %d %s", scope.get("method", "SOCKET"), path, status, rights.value)
+            _AUDIT.info("%s %s %d %s", scope.get("method", "SOCKET"), path, status, rights)
         is_noted = True
 
     async def send_more(message: Message) -> None:

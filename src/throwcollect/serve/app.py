@@ -8,7 +8,6 @@ from typing import Annotated
 from fastapi import APIRouter, Body, FastAPI, HTTPException, WebSocket
 from fastapi.staticfiles import StaticFiles
 
-from throwcollect.errors import NotFoundError
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
@@ -89,14 +88,6 @@ def _make_general_routes(states: States, keys: Keys) -> APIRouter:
     async def components() -> list[ComponentState]:
         """All components."""
         return (await states.read()).components
-
-    @router.get("/components/{name}")
-    async def component(name: str) -> ComponentState:
-        """A component."""
-        for each in (await states.read()).components:
-            if each.name == name:
-                return each
-        raise NotFoundError(f"no component {name!r}")
 
     @router.websocket("/state")
     async def follow(socket: WebSocket) -> None:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, PositiveInt, model_validator
+from pydantic import Field, PositiveInt, model_validator
 
 from throwcollect.collect.runtimes.run_record import Kind
 from throwcollect.config.document import Document
 from throwcollect.config.loader import load
 from throwcollect.config.run import ContainerSpec, Mount, NodeContainerConfig
 from throwcollect.config.section import ContradictionError, Section
-from throwcollect.errors import ConfigError, NotFoundError
+from throwcollect.errors import NotFoundError
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.wording import suggest
 
@@ -24,15 +23,6 @@ NAME = rf"[a-z0-9][a-z0-9_-]{{0,{LONGEST_NAME - 1}}}"
 """Names of components and ids of instances, which become names of files and containers, and parts of URLs."""
 ENTRY = r"(?!\.)[A-Za-z0-9_.-]{1,80}"
 """Names of runs and models that clients may ask for; none of them is a path to another directory."""
-
-
-def _check_name(text: str) -> str:
-    if not re.fullmatch(NAME, text):
-        raise ValueError(f"should be at most 63 of a-z, 0-9, - and _, got '{text}'")
-    return text
-
-
-Name = Annotated[str, AfterValidator(_check_name)]
 
 
 class ComponentSection(NodeContainerConfig):
@@ -71,7 +61,7 @@ class ComponentSection(NodeContainerConfig):
 class CatalogueFile(Section):
     """A catalogue of components."""
 
-    components: dict[Name, ComponentSection] = Field(min_length=1)
+    components: dict[Annotated[str, Field(pattern=f"^{NAME}$")], ComponentSection] = Field(min_length=1)
     """Components by their names."""
 
 
@@ -128,28 +118,20 @@ class Catalogue:
             return cls({config.name: Component(config.name, config.name, "collection", path.absolute(), 1)})
         sections = document.validate(CatalogueFile).components
         directory = path.absolute().parent
-        return cls({name: _read_component(name, section, document, directory) for name, section in sections.items()})
+        return cls({name: _read_component(name, section, directory) for name, section in sections.items()})
 
 
-def _read_component(name: str, section: ComponentSection, document: Document, directory: Path) -> Component:
-    """Make a component from its section, and read the file that the section names."""
+def _read_component(name: str, section: ComponentSection, directory: Path) -> Component:
+    """Make a component from its section, and check the file that the section names."""
     pretty_name = section.pretty_name or name
     if section.image is not None:
         urdf = None if section.urdf is None else directory / section.urdf
         if urdf is not None:
-            try:
-                read_urdf_text(urdf)
-            except ConfigError as error:
-                raise ConfigError([document.problem(("components", name, "urdf"), error.message)]) from error
+            read_urdf_text(urdf)
         node = NodeContainerConfig(**section.model_dump(include=set(NodeContainerConfig.model_fields)))
         source = ContainerSpec(section.image, None if section.command is None else tuple(section.command), node)
         return Component(name, pretty_name, "container", source, section.max_instances, urdf)
     config = directory / (section.config or section.session or "")
-    try:
-        load(config)
-    except ConfigError as error:
-        key = "config" if section.session is None else "session"
-        problem = document.problem(("components", name, key), "names a file with errors")
-        raise ConfigError([problem, *error.problems], hint=error.hint) from error
+    load(config)
     kind: Kind = "collection" if section.session is None else "session"
     return Component(name, pretty_name, kind, config, section.max_instances)

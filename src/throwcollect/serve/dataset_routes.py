@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fastapi import APIRouter
-from fastapi.responses import FileResponse, StreamingResponse
-from starlette.background import BackgroundTask
+from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
 
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
@@ -60,8 +59,8 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
             _archive(directory, instance), media_type="application/x-tar", headers={"Content-Disposition": name}
         )
 
-    @router.get("/report", response_class=FileResponse)
-    async def report(instance: str) -> FileResponse:
+    @router.get("/report", response_class=HTMLResponse)
+    async def report(instance: str) -> HTMLResponse:
         """The report on a finished dataset: one page with everything inside."""
         # A report needs 100 MB and a core for seconds. Clients that wait for theirs hold no thread, as others need it.
         async with reporting:
@@ -86,18 +85,15 @@ def _find_file(directory: Path, path: str) -> Path:
     return directory / path
 
 
-def _report(directory: Path, name: str) -> FileResponse:
-    """Write the report on a dataset into a file that vanishes when it was sent."""
+def _report(directory: Path, name: str) -> HTMLResponse:
+    """Write the report on a dataset."""
     from throwcollect.publish.report.sections import write_report
 
-    scratch = tempfile.TemporaryDirectory(prefix="throwcollect-report-")
-    page = Path(scratch.name) / f"{name}.html"
-    try:
+    with tempfile.TemporaryDirectory(prefix="throwcollect-report-") as scratch:
+        page = Path(scratch) / "report.html"
         write_report(directory, page)
-    except BaseException:
-        scratch.cleanup()
-        raise
-    return FileResponse(page, filename=page.name, background=BackgroundTask(scratch.cleanup))
+        disposition = f'attachment; filename="{name}.html"'
+        return HTMLResponse(page.read_bytes(), headers={"Content-Disposition": disposition})
 
 
 def is_finished(directory: Path) -> bool:

@@ -143,10 +143,7 @@ def ensure_server() -> Address:
             return address
         time.sleep(_POLL_S)
     process.terminate()
-    last_lines = ""
-    with suppress(OSError):
-        last_lines = "\n".join(log.read_text(errors="replace").splitlines()[-5:])
-    raise WorkerError("no server starts", evidence=last_lines or None, hint="throwcollect serve shows why")
+    raise WorkerError(f"no server starts; {log} has the reason")
 
 
 def make_page_address(address: Address, run: str | None = None) -> str:

@@ -27,12 +27,6 @@ from throwcollect.serve.state import InstanceState, States, describe
 from throwcollect.wording import suggest
 
 
-class Lines(Response):
-    """An answer of lines, each in JSON."""
-
-    media_type = "application/x-ndjson"
-
-
 class InstanceRequest(BaseModel):
     """What a client asks for: an instance of a component."""
 
@@ -117,11 +111,6 @@ def make_instance_routes(instances: Instances, states: States) -> APIRouter:
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
 
-    @router.delete("/instances", status_code=202)
-    def delete_all() -> list[str]:
-        """Stop all living runs that clients have begun; returns their ids."""
-        return instances.stop_all()
-
     @router.delete("/instances/{instance}", status_code=202)
     def delete(instance: str, force: bool = False) -> None:
         """Stop a run: running trials are finished; by force, everything ends at once, and the run is forgotten."""
@@ -150,7 +139,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
         except (KeyError, OSError):
             raise NotFoundError(f"run {instance} has no log of {node!r}{suggest(node, files)}") from None
 
-    @router.get("/instances/{instance}/events", response_class=Lines)
+    @router.get("/instances/{instance}/events", response_class=PlainTextResponse)
     def events(instance: str) -> Response:
         """What has happened in a run, one event in JSON a line."""
         record = instances.get(instance).record
@@ -162,7 +151,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
         ):
             # If the run resumes a dataset, the file has the events of earlier runs, too.
             lines += (line for line in file if (event := parse(line)) and event.run == record.run)
-        return Lines("".join(lines))
+        return PlainTextResponse("".join(lines), media_type="application/x-ndjson")
 
     return router
 

@@ -113,18 +113,16 @@ class Instances:
         run = self.get(instance)
         if force or run.status == "died":
             control.down(run)
-        elif not (run.lives and run.record.stopping):
-            with _ONE_AT_A_TIME:
-                _stop_once(run)
-
-    def stop_all(self) -> list[str]:
-        """Ask all living runs that clients have begun to finish their running trials and end; returns their ids."""
-        living = [run.id for run in Records().all() if run.record.origin is not None and run.status == "running"]
-        for run in living:
-            # A run may have ended since its record was read.
-            with suppress(ConflictError):
-                self.stop(run)
-        return living
+            return
+        with _ONE_AT_A_TIME:
+            now = run.now()
+            if not (now.lives and now.record.stopping):
+                control.stop(now, keep_on=lambda: False)
+            # A second signal would hurry the run, so this waits until its launcher has written that it is stopping.
+            deadline = time.monotonic() + _LONGEST_STOP_S
+            while now.lives and not now.record.stopping and time.monotonic() < deadline:
+                time.sleep(_LOOK_S)
+                now = run.now()
 
     def scale(self, instance: str, simulations: int) -> Run:
         """Ask an instance for another number of simulations."""
@@ -159,20 +157,6 @@ def _conflicts(hint: str | None = None) -> Iterator[None]:
         yield
     except (ConfigError, WorkerError) as error:
         raise ConflictError(error.message, hint=hint or error.hint) from error
-
-
-def _stop_once(run: Run) -> None:
-    """Ask a run to stop, unless it was just asked: a second signal would hurry it.
-
-    The launcher writes into its record that it is stopping when it sees the signal; this waits for that, for a while.
-    """
-    now = run.now()
-    if not (now.lives and now.record.stopping):
-        control.stop(now, keep_on=lambda: False)
-    deadline = time.monotonic() + _LONGEST_STOP_S
-    while now.lives and not now.record.stopping and time.monotonic() < deadline:
-        time.sleep(_LOOK_S)
-        now = run.now()
 
 
 def _check_request(origin: Origin, component: Component) -> None:

@@ -12,7 +12,6 @@ import fcntl
 import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.collect.runs.control import set_parameter
@@ -30,59 +29,37 @@ _SWEEP_S = 10.0
 _DIRECTORY = "live"
 
 
-@dataclass(frozen=True)
-class Hold:
-    """One watcher of one simulation.
-
-    Attributes:
-        run: The run.
-        simulation: Name of the simulation.
-        lock: Descriptor of the file whose lock is shared.
-    """
-
-    run: Run
-    simulation: str
-    lock: int
-
-    def restore_speed(self) -> None:
-        """Stop watching; the last watcher gives the simulation the speed of its configuration again."""
-        try:
-            # This turns the shared lock into an exclusive one, which fails if there is another watcher.
-            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            # Another watcher still watches the simulation.
-            return
-        else:
-            try:
-                run = self.run.now()
-                if _runs(run, self.simulation):
-                    _set_speed(run, self.simulation, None)
-            except (ConfigError, DatasetError):
-                # The run was forgotten, or its configuration was removed, so it has no slow simulation.
-                pass
-            except WorkerError:
-                # The simulation may be busy: the file stays, so that `restore_abandoned` tries again.
-                return
-            os.ftruncate(self.lock, 0)
-        finally:
-            os.close(self.lock)
-
-
-def slow_down(run: Run, simulation: str) -> Hold:
-    """Slow a simulation down to real time."""
+def slow_down(run: Run, simulation: str) -> int:
+    """Slow a simulation down to real time, and return the descriptor of its file, for `restore_speed`."""
     if not _runs(run, simulation):
         raise NotFoundError(f"run {run.id}: no simulation {simulation!r} runs")
-    try:
-        lock = _share(_find_lock_path(run, simulation))
-    except OSError as error:
-        raise WorkerError(f"run {run.id}: {simulation} cannot be slowed down: {error}") from error
+    path = _find_lock_path(run, simulation)
+    path.parent.mkdir(exist_ok=True)
+    lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    fcntl.flock(lock, fcntl.LOCK_SH)
+    os.pwrite(lock, b"slow", 0)
     try:
         _set_speed(run, simulation, _REAL_TIME)
     except ThrowcollectError:
         # The simulation may have slowed down nevertheless. The file stays, so `restore_abandoned` restores the speed.
         os.close(lock)
         raise
-    return Hold(run, simulation, lock)
+    return lock
+
+
+def restore_speed(run: Run, simulation: str, lock: int) -> None:
+    """Stop watching; the last watcher gives the simulation the speed of its configuration again."""
+    # An error closes the file and leaves it as it is: another watcher has its lock, or the simulation may be busy, so
+    # that `restore_abandoned` tries again.
+    with suppress(BlockingIOError, WorkerError), os.fdopen(lock, "r+b") as file:
+        # This turns the shared lock into an exclusive one, which fails if there is another watcher.
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # A run that was forgotten, or whose configuration was removed, has no slow simulation.
+        with suppress(ConfigError, DatasetError):
+            run = run.now()
+            if _runs(run, simulation):
+                _set_speed(run, simulation, None)
+        file.truncate(0)
 
 
 @asynccontextmanager
@@ -106,21 +83,12 @@ def restore_abandoned() -> None:
         for run in Records().all():
             for note in sorted(_find_lock_path(run, "").glob("*")) if run.status == "running" else ():
                 if note.stat().st_size:
-                    Hold(run, note.name, os.open(note, os.O_RDWR)).restore_speed()
+                    restore_speed(run, note.name, os.open(note, os.O_RDWR))
 
 
 def _find_lock_path(run: Run, simulation: str) -> Path:
     """Path of the file whose lock the watchers of a simulation share."""
     return run.key.directory.parent / _DIRECTORY / simulation
-
-
-def _share(path: Path) -> int:
-    """Share the lock of a file from now on, note in it that the simulation is slow, and return its descriptor."""
-    path.parent.mkdir(exist_ok=True)
-    lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-    fcntl.flock(lock, fcntl.LOCK_SH)
-    os.pwrite(lock, b"slow", 0)
-    return lock
 
 
 def _runs(run: Run, simulation: str) -> bool:

@@ -57,7 +57,7 @@ class ProblemResponse(JSONResponse):
     media_type = "application/problem+json"
 
 
-def problem(status: int, title: str, headers: dict[str, str] | None = None, **facts: Any) -> ProblemResponse:
+def make_problem(status: int, title: str, headers: dict[str, str] | None = None, **facts: Any) -> ProblemResponse:
     """Make the answer that describes a problem: status, title, and those of the further ``facts`` that are not None."""
     content = ProblemFacts(title=title, status=status, **facts).model_dump(exclude_none=True)
     return ProblemResponse(content, status_code=status, headers=headers)
@@ -66,12 +66,12 @@ def problem(status: int, title: str, headers: dict[str, str] | None = None, **fa
 def answer(error: ThrowcollectError) -> ProblemResponse:
     """Make the answer that describes one of our own errors."""
     status = next((status for kind, status in _STATUS if isinstance(error, kind)), 500)
-    problems = None
-    if isinstance(error, ConfigError):
-        problems = [{"message": each.message, "key": each.key, "line": each.line} for each in error.problems]
-    return problem(
-        status, error.message, expected=error.expected, evidence=error.evidence, hint=error.hint, problems=problems
-    )
+    problems = getattr(error, "problems", None)
+    facts = {
+        "problems": problems and [{"message": each.message, "key": each.key, "line": each.line} for each in problems],
+        **{name: getattr(error, name) for name in ("expected", "evidence", "hint")},
+    }
+    return make_problem(status, error.message, **facts)
 
 
 async def answer_any(connection: HTTPConnection, error: Exception) -> ProblemResponse | None:
@@ -85,9 +85,9 @@ async def answer_any(connection: HTTPConnection, error: Exception) -> ProblemRes
         case RequestValidationError():
             return answer(ConfigError([_describe(each) for each in error.errors()]))
         case HTTPException():
-            return problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
+            return make_problem(error.status_code, str(error.detail), headers=dict(error.headers or {}))
     # Starlette raises the error again after this answer, so that it gets into the log.
-    return problem(500, "internal error", hint="the log of the server has the place; please report it")
+    return make_problem(500, "internal error", hint="the log of the server has the place; please report it")
 
 
 DESCRIPTION: dict[int | str, dict[str, Any]] = {

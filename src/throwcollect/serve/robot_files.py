@@ -16,8 +16,8 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.config.loader import load
 from throwcollect.dataset.carried_robot import list_carried
 from throwcollect.dataset.directory import config_path
-from throwcollect.errors import ConfigError, MemberError, NotFoundError
-from throwcollect.members import is_own, load_member, usable_names
+from throwcollect.errors import NotFoundError
+from throwcollect.members import load_member, usable_names
 from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
@@ -37,8 +37,7 @@ def description_of(run: Run) -> str:
         if not path.is_file():
             raise NotFoundError(f"run {run.id}: its component has no urdf")
         return read_urdf_text(path)
-    path = _find_config(run)
-    return _describe(path, path.stat().st_mtime_ns)
+    return full_description(load(_find_config(run)))
 
 
 @dataclass(frozen=True)
@@ -81,12 +80,6 @@ def _find_config(run: Run) -> Path:
     if not path.is_file():
         raise NotFoundError(f"run {run.id} has no configuration yet")
     return path
-
-
-# The time of the last change is part of the cache's key, so a file that has changed is read again.
-@lru_cache(maxsize=16)
-def _describe(path: Path, _changed_ns: int) -> str:
-    return full_description(load(path))
 
 
 def find_mesh(package: str, path: str) -> Path:
@@ -176,16 +169,6 @@ def _find_packages() -> Mapping[str, Path]:
 
 @lru_cache(maxsize=1)
 def _read_descriptions() -> Sequence[tuple[str, Robot]]:
-    """Read the installed descriptions that need no import; robots of other packages may lack theirs."""
-    descriptions = []
-    for name in usable_names("robots"):
-        robot = load_member("robots", name)
-        if not isinstance(robot, Robot):
-            continue
-        try:
-            descriptions.append((read_urdf_text(robot.urdf_path), robot))
-        except (ConfigError, MemberError):
-            # A run with a broken robot reports that, and the meshes of all other robots must still be found.
-            if is_own("robots", name):
-                raise
-    return descriptions
+    """Read the installed descriptions that need no import."""
+    robots = (load_member("robots", name) for name in usable_names("robots"))
+    return [(read_urdf_text(robot.urdf_path), robot) for robot in robots if isinstance(robot, Robot)]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections import Counter
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from functools import partial
 
 from fastapi import APIRouter, WebSocket
 
@@ -14,43 +15,34 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.errors import ConflictError, NotFoundError, UnreachableError
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import Bridge, attend
-from throwcollect.serve.throws import ThrowWatch
 
 _LOOK_S = 1.0
-
-
-@dataclass
-class SharedBridge:
-    """The bridge of a run, what it hears of throws, and the number of its clients."""
-
-    bridge: Bridge
-    throws: ThrowWatch
-    clients: int = 0
 
 
 class Bridges:
     """Makes the bridge of a run for its first client, and closes it after its last."""
 
     def __init__(self) -> None:
-        self._shared: dict[str, SharedBridge] = {}
+        self._bridges: dict[str, Bridge] = {}
+        self._clients: Counter[Bridge] = Counter()
         self._one_at_a_time = asyncio.Lock()
 
     @asynccontextmanager
-    async def share(self, run: Run) -> AsyncIterator[SharedBridge]:
+    async def share(self, run: Run) -> AsyncIterator[Bridge]:
         """The bridge of a run, for one more client; a bridge that has lost its router is no longer used."""
         async with self._one_at_a_time:
-            if (shared := self._shared.get(run.id)) is None or shared.bridge.is_over:
-                bridge = await asyncio.to_thread(_join, run)
-                shared = self._shared[run.id] = SharedBridge(bridge, ThrowWatch(run, bridge))
-        shared.clients += 1
+            if (bridge := self._bridges.get(run.id)) is None or bridge.is_over:
+                bridge = self._bridges[run.id] = await asyncio.to_thread(_join, run)
+        self._clients[bridge] += 1
         try:
-            yield shared
+            yield bridge
         finally:
-            shared.clients -= 1
-            if not shared.clients:
-                if self._shared.get(run.id) is shared:
-                    del self._shared[run.id]
-                await asyncio.to_thread(shared.bridge.close)
+            self._clients[bridge] -= 1
+            if not self._clients[bridge]:
+                del self._clients[bridge]
+                if self._bridges.get(run.id) is bridge:
+                    del self._bridges[run.id]
+                await asyncio.to_thread(bridge.close)
 
 
 def _join(run: Run) -> Bridge:
@@ -65,22 +57,16 @@ def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
     router = APIRouter()
 
     @router.websocket("/rosbridge/{instance}")
-    async def one(socket: WebSocket, instance: str) -> None:
-        await _attend(socket, bridges, lambda: _find(instances, instance))
-
     @router.websocket("/")
-    async def only(socket: WebSocket) -> None:
-        await _attend(socket, bridges, _find_only_run)
+    async def connect(socket: WebSocket, instance: str | None = None) -> None:
+        run = await asyncio.to_thread(_find_only_run if instance is None else partial(instances.get, instance))
+        _refuse_ended(run)
+        async with bridges.share(run) as bridge:
+            await socket.accept()
+            read_only = not socket.state.may_change
+            await attend(socket, bridge, wait_for_end(run, bridge), read_only=read_only)
 
     return router
-
-
-async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Run]) -> None:
-    run = await asyncio.to_thread(find_run)
-    async with bridges.share(run) as shared:
-        await socket.accept()
-        read_only = not socket.state.may_change
-        await attend(socket, shared.bridge, wait_for_end(run, shared.bridge), read_only=read_only)
 
 
 async def wait_for_end(run: Run, bridge: Bridge | None = None) -> None:
@@ -95,13 +81,6 @@ def _refuse_ended(run: Run) -> None:
     """Refuse a run that has ended, which has no node that could answer."""
     if run.status == "ended":
         raise NotFoundError(f"run {run.id} has ended")
-
-
-def _find(instances: Instances, instance: str) -> Run:
-    """The run of an id."""
-    run = instances.get(instance)
-    _refuse_ended(run)
-    return run
 
 
 def _find_only_run() -> Run:

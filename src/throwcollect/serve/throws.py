@@ -1,12 +1,12 @@
-"""The newest throws of a run, as the page draws them: received by the bridge of the run while there are watchers."""
+"""Throws as the page draws them, and the newest ones of a run, received by its bridge."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import struct
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncGenerator, Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from functools import lru_cache, partial
 from pathlib import Path
@@ -91,77 +91,52 @@ def describe_trial(directory: Path, trial: int) -> tuple[Mapping[str, float], tu
         return {}, None
 
 
-class ThrowWatch:
-    """Receives the newest throws of one run by its bridge, while there are listeners."""
+async def hear_throws(run: Run, bridge: Bridge) -> AsyncGenerator[bytes]:
+    """Encode the newest throws of a run as they come; who takes them slowly misses some."""
+    loop = asyncio.get_running_loop()
+    waiting: asyncio.Queue[tuple[str, bytes]] = asyncio.Queue(maxsize=1)
+    feeds: dict[str, Callable[[], None]] = {}
+    ends = False
 
-    def __init__(self, run: Run, bridge: Bridge) -> None:
-        self._run = run
-        self._bridge = bridge
-        self._loop = asyncio.get_running_loop()
-        self._queues: list[asyncio.Queue[bytes]] = []
-        self._newest: bytes | None = None
-        self._feeds: dict[str, Callable[[], None]] = {}
-        """What ends the subscription to each simulation."""
-        self._is_on = False
+    def put(simulation: str, message: bytes) -> None:
+        if waiting.full():
+            waiting.get_nowait()
+        waiting.put_nowait((simulation, message))
 
-    @asynccontextmanager
-    async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
-        """Listen as long as the block lasts.
+    def hear(simulation: str, sample: Sample) -> None:
+        # The loop may have ended, and with it the connection.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(put, simulation, sample.data)
 
-        Yields:
-            A function that returns the newest throw since its last call, and waits for one if none has come.
-        """
-        queue: asyncio.Queue[bytes] = asyncio.Queue(maxsize=1)
-        self._queues.append(queue)
-        self._bridge.submit(self._begin)
-        if self._newest is not None:
-            queue.put_nowait(self._newest)
-        try:
-            yield queue.get
-        finally:
-            self._queues.remove(queue)
-
-    def _begin(self) -> None:
-        if not self._is_on:
-            self._is_on = True
-            self._listen()
-
-    def _listen(self) -> None:
-        """Subscribe to all simulations of the run, now and again, because some may be started later."""
-        if not self._queues:
-            for stop in self._feeds.values():
+    def listen() -> None:
+        """Subscribe to all simulations, now and again, because some may be started later; the bridge calls this."""
+        if ends:
+            for stop in feeds.values():
                 stop()
-            self._feeds, self._newest, self._is_on = {}, None, False
             return
         # A run that was forgotten has no simulations; clients see that in the state.
         with suppress(ThrowcollectError):
-            for name in set(simulations_of(self._run.now().record.nodes)) - self._feeds.keys():
-                self._feeds[name] = self._bridge.listen(
-                    make_shown_topic(name), "std_msgs/msg/UInt8MultiArray", partial(self._hear, name)
-                )
-        self._bridge.later(_LOOK_S, self._listen)
+            for name in set(simulations_of(run.now().record.nodes)) - feeds.keys():
+                topic = make_shown_topic(name)
+                feeds[name] = bridge.listen(topic, "std_msgs/msg/UInt8MultiArray", partial(hear, name))
+        bridge.later(_LOOK_S, listen)
 
-    def _hear(self, simulation: str, sample: Sample) -> None:
-        asyncio.run_coroutine_threadsafe(self._pass_on(simulation, sample.data), self._loop)
+    bridge.submit(listen)
+    try:
+        while True:
+            if (frame := await asyncio.to_thread(_encode, run, *await waiting.get())) is not None:
+                yield frame
+    finally:
+        ends = True
 
-    async def _pass_on(self, simulation: str, message: bytes) -> None:
-        """Put a throw into all queues, in the place of one that was not taken yet."""
-        frame = await asyncio.to_thread(self._encode, simulation, message)
-        if frame is None:
-            return
-        self._newest = frame
-        for queue in self._queues:
-            while not queue.empty():
-                queue.get_nowait()
-            queue.put_nowait(frame)
 
-    def _encode(self, simulation: str, message: bytes) -> bytes | None:
-        try:
-            episode = unpack(message, Signer.of_key(self._run.key))
-            if not isinstance(episode, Episode) or not episode.result:
-                return None
-            planned = describe_trial(self._run.record.directory, episode.header.trial)
-            return encode_throw(episode, simulation, *planned)
-        except ThrowcollectError:
-            # Another node has published something else on this topic.
+def _encode(run: Run, simulation: str, message: bytes) -> bytes | None:
+    try:
+        episode = unpack(message, Signer.of_key(run.key))
+        if not isinstance(episode, Episode) or not episode.result:
             return None
+        planned = describe_trial(run.record.directory, episode.header.trial)
+        return encode_throw(episode, simulation, *planned)
+    except ThrowcollectError:
+        # Another node has published something else on this topic.
+        return None

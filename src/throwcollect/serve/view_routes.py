@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator
+from contextlib import aclosing
 
 from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.live import slow_down
+from throwcollect.serve.live import restore_speed, slow_down
 from throwcollect.serve.robot_files import (
     MeshFile,
     SceneFacts,
@@ -22,6 +23,7 @@ from throwcollect.serve.robot_files import (
 )
 from throwcollect.serve.rosbridge_routes import Bridges, wait_for_end
 from throwcollect.serve.sockets import MAY_NOT, keep_sending
+from throwcollect.serve.throws import hear_throws
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
 
@@ -76,9 +78,9 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
     @router.websocket("/instances/{instance}/shown")
     async def stream_throws(socket: WebSocket, instance: str) -> None:
         run = await asyncio.to_thread(instances.get, instance)
-        async with bridges.share(run) as shared, shared.throws.throws() as next_throw:
+        async with bridges.share(run) as bridge, aclosing(hear_throws(run, bridge)) as throws:
             await socket.accept()
-            await keep_sending(socket, _send_throws(socket, next_throw), wait_for_end(run, shared.bridge))
+            await keep_sending(socket, _send_throws(socket, throws), wait_for_end(run, bridge))
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
@@ -94,14 +96,14 @@ async def _keep_slow(socket: WebSocket, instances: Instances, instance: str, sim
         await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
         return
     run = await asyncio.to_thread(instances.get, instance)
-    hold = await asyncio.to_thread(slow_down, run, simulation)
+    lock = await asyncio.to_thread(slow_down, run, simulation)
     try:
         await socket.accept()
         await keep_sending(socket, wait_for_end(run))
     finally:
-        await asyncio.to_thread(hold.restore_speed)
+        await asyncio.to_thread(restore_speed, run, simulation, lock)
 
 
-async def _send_throws(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:
-    while True:
-        await socket.send_bytes(await next_throw())
+async def _send_throws(socket: WebSocket, throws: AsyncIterator[bytes]) -> None:
+    async for throw in throws:
+        await socket.send_bytes(throw)

@@ -1,6 +1,6 @@
 import pytest
 
-from throwcollect.cli.printing import display
+from throwcollect.cli.printing import Display
 from throwcollect.collect.coordinator.progress import Progress
 
 
@@ -16,7 +16,7 @@ def test_the_progress_counts_failed_and_lost_trials() -> None:
 
 
 def test_progress_lines_are_printed_at_intervals_and_once_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
-    with display(quiet=False) as shown:
+    with Display(quiet=False) as shown:
         for ended in (1, 2, 3, 10, 10, 10):
             shown.update(progress(ended, landed=ended))
     lines = capsys.readouterr().err.splitlines()
@@ -24,7 +24,7 @@ def test_progress_lines_are_printed_at_intervals_and_once_at_the_end(capsys: pyt
 
 
 def test_quiet_shows_only_warnings(capsys: pytest.CaptureFixture[str]) -> None:
-    with display(quiet=True) as shown:
+    with Display(quiet=True) as shown:
         shown.say("plan: 10 trials")
         shown.update(progress(10, landed=10))
         shown.warn("sim_0 was lost")

@@ -184,6 +184,8 @@ def test_a_container_can_join_a_run(
         ("cluster", {}),
         ("sweep.file", "/etc/passwd"),
         ("sweep", {"sampler": "list", "file": "/etc/passwd"}),
+        ("scene.bodies.crate.file", "/etc/passwd"),
+        ("scene", {"bodies": {"crate": {"shape": "mesh", "file": "/etc/passwd"}}}),
         ("", 1),
     ],
 )

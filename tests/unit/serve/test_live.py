@@ -15,7 +15,7 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runtimes.run_record import NodeState
 from throwcollect.errors import NotFoundError, WorkerError
 from throwcollect.serve import live
-from throwcollect.serve.live import restore_abandoned, slow_down
+from throwcollect.serve.live import restore_abandoned, restore_speed, slow_down
 
 SIM = NodeState("sim_0", "running", 0, "7", "")
 
@@ -64,16 +64,16 @@ def test_the_last_watcher_restores_the_speed(
 ) -> None:
     run = make(remember, tmp_path)
     one, other = slow_down(run, "sim_0"), slow_down(run, "sim_0")
-    one.restore_speed()
+    restore_speed(run, "sim_0", one)
     assert simulation.asked == [SLOW, SLOW]
     # Another server that starts meanwhile does not restore the speed of a watched simulation.
     restore_abandoned()
     assert simulation.asked == [SLOW, SLOW]
     assert notes(state) == ["sim_0"]
-    other.restore_speed()
+    restore_speed(run, "sim_0", other)
     assert simulation.asked == [SLOW, SLOW, FAST]
     assert notes(state) == []
-    slow_down(run, "sim_0").restore_speed()
+    restore_speed(run, "sim_0", slow_down(run, "sim_0"))
     assert simulation.asked[3:] == [SLOW, FAST]
 
 
@@ -81,7 +81,7 @@ def test_the_next_server_restores_speeds_after_a_killed_one(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     # Closing the lock stands for the death of the server that held it.
-    os.close(slow_down(make(remember, tmp_path), "sim_0").lock)
+    os.close(slow_down(make(remember, tmp_path), "sim_0"))
     restore_abandoned()
     assert simulation.asked == [SLOW, FAST]
     assert notes(state) == []
@@ -90,9 +90,10 @@ def test_the_next_server_restores_speeds_after_a_killed_one(
 def test_restoring_the_speed_is_tried_again_if_a_simulation_does_not_answer(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
-    hold = slow_down(make(remember, tmp_path), "sim_0")
+    run = make(remember, tmp_path)
+    lock = slow_down(run, "sim_0")
     simulation.answers = False
-    hold.restore_speed()
+    restore_speed(run, "sim_0", lock)
     assert notes(state) == ["sim_0"]
     restore_abandoned()
     assert notes(state) == ["sim_0"]

@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
@@ -40,22 +39,3 @@ def test_a_mesh_of_a_body_is_served_from_the_dataset_that_carries_it(
     look, _ = client.get(f"{URL}/a/scene").json()["bodies"]
     name = Path(look["mesh"]).name
     assert client.get(f"/api/v1/meshes/bodies/{name}").content == (directory / "bodies" / name).read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "status"),
-    [
-        ("scene.bodies.crate.file", "/etc/passwd", 422),
-        ("scene.bodies.crate", {"shape": "mesh", "file": "/etc/passwd"}, 422),
-        ("scene.bodies", {"crate": {"shape": "mesh", "file": "/etc/passwd"}}, 422),
-        ("scene", {"bodies": {"crate": {"shape": "mesh", "file": "/etc/passwd"}}}, 422),
-        ("scene.bodies", {"crate": {"shape": "sphere", "radius_m": 0.1}}, 202),
-    ],
-)
-def test_a_client_names_no_files_of_bodies(
-    client: TestClient, begun: list[dict[str, Any]], key: str, value: Any, status: int
-) -> None:
-    answer = client.put(f"{URL}/a", json={"component": "throws", "set": {"trials": 2, key: value}})
-    assert answer.status_code == status, answer.text
-    if status == 422:
-        assert "may be set only by the operator" in answer.text

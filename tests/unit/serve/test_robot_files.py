@@ -1,45 +1,21 @@
-import re
-from collections.abc import Iterator
-from dataclasses import replace
-from importlib.metadata import EntryPoint, EntryPoints
-from unittest.mock import Mock
+"""Files of the meshes of installed robots."""
+
+from pathlib import Path
 
 import pytest
 
-from throwcollect import members
-from throwcollect.robots.talos import TALOS
+from throwcollect.errors import NotFoundError
 from throwcollect.serve import robot_files
+from throwcollect.serve.robot_files import find_mesh
 
 
-def forget() -> None:
-    for cached in (
-        members._find_members,
-        members.find_broken,
-        robot_files._read_descriptions,
-        robot_files._find_packages,
-    ):
-        cached.cache_clear()
-
-
-WITHOUT_FILES = replace(TALOS, name="without_files", urdf="/nowhere/robot.urdf")
-
-
-@pytest.fixture
-def _broken_robots(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Another package has a robot that cannot be loaded, and one whose description is missing."""
-    entries = [("broken", "not_there:ROBOT"), ("without_files", f"{__name__}:WITHOUT_FILES")]
-    points = {"throwcollect.robots": EntryPoints([EntryPoint(*entry, "") for entry in entries])}
-    installed = Mock(select=lambda group: points.get(group, EntryPoints()))
-    monkeypatch.setattr(members, "entry_points", lambda group=None: installed.select(group) if group else installed)
-    forget()
-    yield
-    monkeypatch.undo()
-    forget()
-
-
-@pytest.mark.usefixtures("_broken_robots")
-def test_meshes_of_a_robot_are_found_although_others_are_broken() -> None:
-    assert set(members.find_broken("robots")) == {"broken"}
-    assert members.usable_names("robots") == (*members._OWN["robots"], "without_files")
-    package, path = re.findall(r"package://([^/\"]+)/([^\"]+)", TALOS.urdf_path.read_text())[0]
-    assert robot_files.find_mesh(package, path) == (TALOS.directory / package / path).resolve()
+def test_links_that_lead_out_of_a_package_are_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "robot"
+    package.mkdir()
+    (tmp_path / "secret").write_text("key")
+    (package / "mesh.stl").symlink_to(tmp_path / "secret")
+    (package / "own.stl").write_text("own")
+    monkeypatch.setattr(robot_files, "_find_packages", lambda: {"robot": package})
+    assert find_mesh("robot", "own.stl") == package / "own.stl"
+    with pytest.raises(NotFoundError, match="no mesh"):
+        find_mesh("robot", "mesh.stl")

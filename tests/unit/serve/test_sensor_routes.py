@@ -16,6 +16,7 @@ from tests.unit.serve.conftest import Remember, Served, make_end_fields
 import throwcollect
 from throwcollect import Dataset
 from throwcollect.serve import sensor_routes
+from throwcollect.state_directory import STATE_VARIABLE
 
 URL = "/api/v1/collections/a/throws"
 SENSORS = """
@@ -27,15 +28,24 @@ sensors:
 """
 
 
-@pytest.fixture
-def dataset(tmp_path: Path, remember: Remember) -> Dataset:
-    """A dataset with sensors, of a run that has ended."""
-    directory = tmp_path / "datasets" / "a"
-    config = write_config(tmp_path, trials=2, sim=FAST)
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with a configuration that has sensors, and the dataset that it gives."""
+    directory = tmp_path_factory.mktemp("seen")
+    config = write_config(directory, trials=2, sim=FAST)
     config.write_text(config.read_text() + SENSORS)
-    collect_here(config, directory)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(directory / "state"))
+        collect_here(config, directory / "data")
+    return directory
+
+
+@pytest.fixture
+def dataset(seen: Path, tmp_path: Path, remember: Remember) -> Dataset:
+    """A dataset with sensors, of a run that has ended."""
+    shutil.copytree(seen / "data", tmp_path / "datasets" / "a")
     remember("a", **make_end_fields())
-    return throwcollect.load(directory)
+    return throwcollect.load(tmp_path / "datasets" / "a")
 
 
 def test_frames_are_given_as_they_were_recorded(client: TestClient, dataset: Dataset) -> None:
@@ -95,11 +105,11 @@ def test_another_camera_renders_the_picture_that_it_would_have_recorded(
 
 
 def test_a_dataset_that_is_collected_anew_is_not_shown_as_it_was(
-    client: TestClient, dataset: Dataset, tmp_path: Path
+    client: TestClient, dataset: Dataset, seen: Path, tmp_path: Path
 ) -> None:
     assert client.get(f"{URL}/0/sensors").json()[0]["section"]["rate_hz"] == 2
     config = tmp_path / "small.yaml"
-    config.write_text(config.read_text().replace("rate_hz: 2", "rate_hz: 5"))
+    config.write_text((seen / "small.yaml").read_text().replace("rate_hz: 2", "rate_hz: 5"))
     shutil.rmtree(dataset.directory)
     collect_here(config, dataset.directory)
     assert client.get(f"{URL}/0/sensors").json()[0]["section"]["rate_hz"] == 5

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.serve.conftest import Remember
 
-from throwcollect.collect.runs.records import Records
+from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runtimes.run_record import NodeState
 from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
@@ -23,15 +23,16 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import looks_of
-from throwcollect.serve.rosbridge.bridge import Listener
-from throwcollect.serve.throws import ThrowWatch, describe_trial, encode_throw
+from throwcollect.serve import throws
+from throwcollect.serve.rosbridge.bridge import Listener, Sample
+from throwcollect.serve.throws import describe_trial, encode_throw, hear_throws
 
 
 class Graph:
     """Takes the place of a bridge: ``hear`` has the listeners by their topics, and ``look`` lets its timers run out."""
 
     def __init__(self) -> None:
-        self.hear: dict[str, Listener] = {}
+        self.hear: dict[str, list[Listener]] = {}
         self._timers: list[Callable[[], None]] = []
 
     def submit(self, action: Callable[[], None]) -> None:
@@ -41,9 +42,12 @@ class Graph:
         self._timers.append(action)
 
     def listen(self, topic: str, _type: str, listener: Listener) -> Callable[[], object]:
-        assert topic not in self.hear
-        self.hear[topic] = listener
-        return lambda: self.hear.pop(topic)
+        self.hear.setdefault(topic, []).append(listener)
+        return lambda: self.hear[topic].remove(listener)
+
+    def publish(self, topic: str, data: bytes) -> None:
+        for listener in self.hear[topic]:
+            listener(Sample(data, None, 0))
 
     def look(self) -> None:
         timers, self._timers = self._timers, []
@@ -51,10 +55,12 @@ class Graph:
             each()
 
 
-def watch(scenario: Callable[[ThrowWatch, Graph], Awaitable[None]]) -> None:
+def watch(run: Run, scenario: Callable[[Graph, list[AsyncGenerator[bytes]]], Awaitable[None]]) -> None:
+    """Let two watchers wait for throws of a run that a stand-in publishes."""
+
     async def whole() -> None:
         graph: Any = Graph()
-        await asyncio.wait_for(scenario(ThrowWatch(Records().get("a"), graph), graph), 10)
+        await asyncio.wait_for(scenario(graph, [hear_throws(run, graph) for _ in range(2)]), 10)
 
     asyncio.run(whole())
 
@@ -129,51 +135,36 @@ def make_nodes(*names: str) -> tuple[NodeState, ...]:
     return tuple(NodeState(name, "running", 0, "1", "") for name in names)
 
 
-def test_listeners_share_subscriptions_to_all_simulations_until_the_last_leaves(remember: Remember) -> None:
+def test_watchers_hear_all_simulations_until_they_leave(remember: Remember, monkeypatch: pytest.MonkeyPatch) -> None:
     run = remember("a", nodes=make_nodes("router", "sim_0"))
-    both = {"/coordinator/shown/sim_0", "/coordinator/shown/sim_1"}
+    monkeypatch.setattr(throws, "_encode", lambda _run, simulation, message: simulation.encode() + message)
 
-    async def scenario(watch: ThrowWatch, graph: Graph) -> None:
-        async with watch.throws(), watch.throws():
-            assert set(graph.hear) == {"/coordinator/shown/sim_0"}
-            run.update(nodes=make_nodes("sim_0", "sim_1"))
-            graph.look()
-            assert set(graph.hear) == both
-        async with watch.throws():
-            graph.look()
-            assert set(graph.hear) == both
+    async def scenario(graph: Graph, watchers: list[AsyncGenerator[bytes]]) -> None:
+        heard = [asyncio.ensure_future(anext(each)) for each in watchers]
+        await asyncio.sleep(0)
+        assert {name: len(each) for name, each in graph.hear.items()} == {"/coordinator/shown/sim_0": 2}
+        run.update(nodes=make_nodes("sim_0", "sim_1"))
         graph.look()
-        assert not graph.hear
-        async with watch.throws():
-            assert set(graph.hear) == both
+        assert {name: len(each) for name, each in graph.hear.items()} == {
+            "/coordinator/shown/sim_0": 2,
+            "/coordinator/shown/sim_1": 2,
+        }
+        graph.publish("/coordinator/shown/sim_1", b"1")
+        assert [await each for each in heard] == [b"sim_11"] * 2
+        # A slow watcher gets only the newest throw.
+        for data in (b"2", b"3", b"4"):
+            graph.publish("/coordinator/shown/sim_0", data)
+        await asyncio.sleep(0)
+        assert await anext(watchers[0]) == b"sim_04"
+        for each in watchers:
+            await each.aclose()
+        graph.look()
+        assert not any(graph.hear.values())
 
-    watch(scenario)
-
-
-def test_a_slow_listener_gets_the_newest_throw_and_a_late_one_the_last(
-    remember: Remember, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    remember("a", nodes=make_nodes("sim_0"))
-    monkeypatch.setattr(ThrowWatch, "_encode", lambda _self, _simulation, message: message)
-
-    async def scenario(watch: ThrowWatch, graph: Graph) -> None:
-        async with watch.throws() as next_throw:
-            for data in (b"1", b"2", b"3"):
-                await watch._pass_on("sim_0", data)
-            assert await next_throw() == b"3"
-            with pytest.raises(TimeoutError):
-                await asyncio.wait_for(next_throw(), 0.05)
-            async with watch.throws() as late:
-                assert await late() == b"3"
-
-    watch(scenario)
+    watch(run, scenario)
 
 
 def test_messages_that_are_no_signed_episodes_are_ignored(remember: Remember) -> None:
-    remember("a")
-
-    async def scenario(watch: ThrowWatch, _: Graph) -> None:
-        for message in (b"", b"nonsense", bytes(10_000)):
-            assert watch._encode("sim_0", message) is None
-
-    watch(scenario)
+    run = remember("a")
+    for message in (b"", b"nonsense", bytes(10_000)):
+        assert throws._encode(run, "sim_0", message) is None

@@ -12,13 +12,12 @@ from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.printing import show
 from throwcollect.cli.streams import ensure_written
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.extras import MissingExtraError, install_command, require, require_engine
+from throwcollect.extras import install_command
 from throwcollect.side_by_side import count_cores
 from throwcollect.units import unit_of_name
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.summary import Info, MissSummary
 
 
@@ -42,37 +41,19 @@ def verify(
     """
     from throwcollect.dataset.reader import Dataset
     from throwcollect.dataset.verify import find_unchecked
-    from throwcollect.replay import verify_dataset
+    from throwcollect.replay import count_replayed, verify_dataset
 
     findings = verify_dataset(directory, replay=replay, render=render, processes=count_cores())
     if findings:
         show(findings, *map(str, findings), json=json)
         raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")
     dataset = Dataset.open(directory)
-    show([], f"{directory}: nothing wrong", _describe_replay(dataset, replay), json=json)
+    count = count_replayed(dataset, replay)
+    replayed = f"replayed: {count} of {format_count(len(dataset.recorded), 'throw')}"
+    show([], f"{directory}: nothing wrong", replayed + ", the same bit for bit" * bool(count), json=json)
     if left_out := find_unchecked(dataset.config):
         typer.echo(f"not checked without the extra collect: {', '.join(left_out)}", err=json)
         typer.echo(f"  try: {install_command('collect')}", err=json)
-
-
-def _describe_replay(dataset: Dataset, replay: int | None) -> str:
-    """Say how many throws were simulated again in a dataset in which nothing is wrong, and how to simulate more."""
-    from throwcollect.config.motion import SESSION
-    from throwcollect.replay import count_replayed
-
-    if (policy := dataset.config.task.policy) is not None and policy.use == SESSION:
-        return "replayed: none, as clients of a session commanded the joints, which cannot be simulated again"
-    count, recorded = count_replayed(dataset, replay), len(dataset.recorded)
-    text = f"replayed: {count} of {format_count(recorded, 'throw')}"
-    if count == recorded:
-        return f"{text}, the same bit for bit"
-    text += ", the same bit for bit" if count else ""
-    try:
-        require("pinocchio")
-        require_engine(dataset.config.sim.engine)
-    except MissingExtraError as error:
-        return f"{text} ({error.message})"
-    return f"{text} (all: {command('dataset', 'verify', dataset.directory, '--replay', recorded)})"
 
 
 def replay(

@@ -20,7 +20,7 @@ from throwcollect.cli.ros.graph_session import (
     require_name,
 )
 from throwcollect.cli.streams import has_reader
-from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.files import write_file
 from throwcollect.ros.graph_names import absolute_name, find_interface, find_offered_qos, is_hidden
 from throwcollect.wording import command
@@ -41,8 +41,6 @@ _PROFILE = "fast_dds.xml"
 _DEPTH = 100
 """Messages that wait for `hz` to count them."""
 _PERIOD_S = 1.0
-_SHORT = 128
-"""Length at which strings and arrays are cut off, unless the user asks for all of them."""
 _SERVICE_S = 5.0
 """Longest wait for the parameter services of a node."""
 _STATUSES = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
@@ -69,15 +67,12 @@ def env(run: ShellRunOption = None) -> None:
 @topic_app.command("list")
 def list_topics(
     types: Annotated[bool, typer.Option("-t", "--show-types", help="Show the types, too.")] = False,
-    hidden: Annotated[
-        bool, typer.Option("-a", "--all", help="Show what is hidden, too: names that begin with '_'.")
-    ] = False,
     run: RunOption = None,
 ) -> None:
     """List the topics."""
     with join_graph(run) as session:
         for name, kinds in sorted(session.node.get_topic_names_and_types()):
-            if hidden or not is_hidden(name):
+            if not is_hidden(name):
                 print(f"{name} [{', '.join(kinds)}]" if types else name)
 
 
@@ -88,9 +83,6 @@ def echo(
     field: Annotated[
         str | None, typer.Option("--field", metavar="FIELD", help="Print this field alone, such as pose.pose.position.")
     ] = None,
-    full: Annotated[
-        bool, typer.Option("-f", "--full-length", help="Print strings and arrays of more than 128 elements in full.")
-    ] = False,
     run: RunOption = None,
 ) -> None:
     """Print the messages of a topic as YAML."""
@@ -110,7 +102,7 @@ def echo(
                 value = plain(attrgetter(field)(message) if field else message)
             except AttributeError as error:
                 raise ConfigError(f"--field {field}: {error}") from error
-            print(_write_yaml(value if full else _shorten(value)), end="---\n", flush=True)
+            print(_write_yaml(value), end="---\n", flush=True)
 
         qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(message_type, name, show, qos)
@@ -168,7 +160,7 @@ def send_goal(
         try:
             handle = session.answer(sent, alive=client.server_is_ready, who=name)
             if not handle.accepted:
-                echo = command("ros", "topic", "echo", "-f", "/rosout", *(("--run", run) if run is not None else ()))
+                echo = command("ros", "topic", "echo", "/rosout", *(("--run", run) if run is not None else ()))
                 raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node has the reason: {echo}")
             print(f"Goal accepted with ID: {bytes(bytearray(handle.goal_id.uuid)).hex()}\n", flush=True)
             response = session.answer(handle.get_result_async(), alive=client.server_is_ready, who=name)
@@ -205,11 +197,10 @@ def _indent(message: Any) -> str:
 def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
     """Print the value of a parameter as YAML."""
     with join_graph(run) as session:
-        owner = _find_node(session, node)
-        values = _ask(session, owner, "get_parameters", names=[name]).values
+        values = _ask(session, node, "get_parameters", names=[name]).values
         if not values:
-            require_name("parameter", name, _ask(session, owner, "list_parameters").result.names, of=owner)
-        print(_write_yaml(ros.parameter_value_to_python(values[0]) if values else None), end="")
+            raise ConfigError(f"{node} has no parameter {name}")
+        print(_write_yaml(ros.parameter_value_to_python(values[0])), end="")
 
 
 # A value may be a negative number, which would otherwise be taken for an option.
@@ -227,25 +218,17 @@ def set_parameter(
     except (TypeError, ConfigError):
         parameter = ros.Parameter(name, value=value)
     with join_graph(run) as session:
-        owner = _find_node(session, node)
-        (result,) = _ask(session, owner, "set_parameters", parameters=[parameter.to_parameter_msg()]).results
+        (result,) = _ask(session, node, "set_parameters", parameters=[parameter.to_parameter_msg()]).results
         if not result.successful:
-            raise ConfigError(f"setting {name} of {owner} failed: {result.reason}")
+            raise ConfigError(f"setting {name} of {node} failed: {result.reason}")
         print("Set parameter successful")
-
-
-def _find_node(session: GraphSession, name: str) -> str:
-    owner = absolute_name(name)
-    nodes = session.node.get_node_names_and_namespaces()
-    require_name("node", owner, [f"{namespace.removesuffix('/')}/{each}" for each, namespace in nodes])
-    return owner
 
 
 def _ask(session: GraphSession, node: str, service: str, **fields: Any) -> Any:
     kind: Any = ros.get_service(f"rcl_interfaces/srv/{service.title().replace('_', '')}")
-    client = session.node.create_client(kind, f"{node}/{service}")
+    client = session.node.create_client(kind, f"{absolute_name(node)}/{service}")
     if not client.wait_for_service(timeout_sec=_SERVICE_S):
-        raise WorkerError(f"{node} offers no {service}")
+        raise ConfigError(f"no node {node} offers {service}")
     return session.answer(client.call_async(kind.Request(**fields)), alive=client.service_is_ready, who=node)
 
 
@@ -259,16 +242,6 @@ def _parse(text: str, what: str) -> Any:
         return YAML(typ="safe", pure=True).load(text)
     except (YAMLError, ValueError) as error:
         raise ConfigError(f"{what}: not YAML: {str(error).splitlines()[0]}, got {text!r:.80}") from error
-
-
-def _shorten(value: Any) -> Any:
-    """Cut off the strings and lists in a value that are longer than 128."""
-    if isinstance(value, dict):
-        return {name: _shorten(each) for name, each in value.items()}
-    if isinstance(value, list):
-        items = [_shorten(each) for each in value[:_SHORT]]
-        return items if len(items) == len(value) else [*items, "..."]
-    return f"{value[:_SHORT]}..." if isinstance(value, str) and len(value) > _SHORT else value
 
 
 def _write_yaml(value: Any) -> str:

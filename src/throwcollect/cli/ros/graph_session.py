@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -66,15 +67,14 @@ class GraphSession:
 
 def find_run_and_connection(run: str | None) -> tuple[Run, Connection]:
     """Find a run, or the only one that lives, and the connection by which our own processes join it."""
-    # These load Zenoh, and every command of throwcollect loads this module.
+    # This loads Zenoh, and every command of throwcollect loads this module.
     from throwcollect.collect.runs.run_selection import find_run_to_change, require_living
-    from throwcollect.ros.connection import Connection
 
     found = find_run_to_change(run)
-    record = require_living(found)
-    if record.endpoint is None:
-        raise WorkerError(f"run {record.run} has no router yet", hint="try once more")
-    return found, Connection(record.endpoint, found.key, record.domain_id, record.middleware.joining)
+    require_living(found)
+    if (connection := found.connection) is None:
+        raise WorkerError(f"run {found.id} has no router yet", hint="try once more")
+    return found, replace(connection, middleware=connection.middleware.joining)
 
 
 def _settle_middleware(run: str | None) -> str | None:
@@ -126,13 +126,8 @@ def join_graph(run: str | None) -> Iterator[GraphSession]:
         raise Interrupted("") from None
 
 
-def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
-    """Refuse the name of a thing, such as a ``topic``, that does not exist, and propose those that are like it.
-
-    `of` is the node that would have it; empty if the graph would.
-    """
+def require_name(what: str, name: str, names: Iterable[str]) -> None:
+    """Refuse the name of a thing, such as a ``topic``, that the graph does not have, and propose similar names."""
     existing = sorted(set(names))
-    if name in existing:
-        return
-    owner = f" of {of}" if of else ""
-    raise ConfigError(f"no {what} {name}{owner}{suggest(name, existing)}")
+    if name not in existing:
+        raise ConfigError(f"no {what} {name}{suggest(name, existing)}")

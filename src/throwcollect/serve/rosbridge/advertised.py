@@ -43,11 +43,9 @@ class AdvertisedService:
             raise ConfigError(f"service_response: no request {answer.id} to {answer.name} waits for an answer")
         future, response = self._pending[answer.id]
         # With `result: false`, the values may be a string with the reason, instead of fields.
+        # ROS cannot report to a node that a service has failed, so such a request is answered with defaults.
         if isinstance(answer.values, Mapping) or answer.result:
             fill(response, {} if answer.values is None else answer.values)
-        else:
-            # ROS cannot report to a node that a service has failed, and without an answer the node would wait for ever.
-            self._client.report("warning", f"{answer.name}: a failed request is answered with defaults", answer.id)
         # The request is removed last: if values of a wrong type raise an error above, the client can answer again.
         del self._pending[answer.id]
         future.set_result(response)
@@ -145,41 +143,31 @@ class Advertised:
         self._client = client
         self._kind: Kind = kind
         self._make = AdvertisedService if kind == "srv" else AdvertisedAction
-        # Every node that offers an action has this service.
-        self._probe = "" if kind == "srv" else "/_action/send_goal"
         self._by_name: dict[str, AdvertisedService | AdvertisedAction] = {}
 
     def advertise(self, asked: Offer) -> None:
         """Offer a service or an action; it replaces an earlier one of this client with the same name."""
-        name = absolute_name(asked.name)
         # A request with an unknown type must not withdraw the earlier one.
         find_interface(self._kind, asked.type)
-        if name in self._by_name:
-            self._withdraw(name)
-        elif self._client.bridge.offers(name + self._probe):
-            raise ConfigError(f"{asked.op}: {name} is offered already", expected="another name")
-        self._by_name[name] = self._make(self._client, asked)
-        self._client.bridge.advertised.add(name + self._probe)
+        self._withdraw(asked.name)
+        self._by_name[absolute_name(asked.name)] = self._make(self._client, asked)
 
     def unadvertise(self, asked: Offer) -> None:
         """Withdraw a service or an action."""
-        self._check_known(asked)
-        self._withdraw(absolute_name(asked.name))
+        self._withdraw(asked.name)
 
     def take(self, answer: Answer) -> None:
         """Take what the client answers to a node."""
-        self._check_known(answer)
-        self._by_name[absolute_name(answer.name)].take(answer)
+        offered = self._by_name.get(absolute_name(answer.name))
+        if offered is None:
+            raise ConfigError(f"{answer.op}: {answer.name} is not advertised by this client")
+        offered.take(answer)
 
     def close(self) -> None:
         """Withdraw everything."""
-        for name in list(self._by_name):
-            self._withdraw(name)
+        for offered in self._by_name.values():
+            offered.close()
 
     def _withdraw(self, name: str) -> None:
-        self._client.bridge.advertised.discard(name + self._probe)
-        self._by_name.pop(name).close()
-
-    def _check_known(self, asked: Offer | Answer) -> None:
-        if absolute_name(asked.name) not in self._by_name:
-            raise ConfigError(f"{asked.op}: {asked.name} is not advertised by this client")
+        if (offered := self._by_name.pop(absolute_name(name), None)) is not None:
+            offered.close()

@@ -8,6 +8,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -30,91 +31,65 @@ _MISSES = 2
 """After this many looks without an answer, the router counts as gone; on a busy machine, one answer may be late."""
 
 
+@dataclass
 class Sample:
-    """One message of a topic, as it came: ``data`` in CDR, with the time of receipt on the node's clock [ns]."""
+    """One message of a topic, as it came.
 
-    def __init__(self, data: bytes, message_type: Any, received_ns: int) -> None:
-        self.data = data
-        self._type = message_type
-        self._received_ns = received_ns
-        self._frames: dict[tuple[str, str], Frame] = {}
+    Attributes:
+        data: The message in CDR.
+        message_type: Its class.
+        received_ns: Time of receipt on the node's clock [ns].
+    """
+
+    data: bytes
+    message_type: Any
+    received_ns: int
 
     def frame(self, topic: str, compression: str) -> Frame:
         """Encode the message for a client that knows the topic by this name."""
-        # All clients with the same name and compression get the same frame, which is encoded once.
-        key = topic, compression
-        if key not in self._frames:
-            if compression == "cbor-raw":
-                secs, nsecs = divmod(self._received_ns, NS_PER_S)
-                content: Any = {"secs": secs, "nsecs": nsecs, "bytes": self.data}
-            else:
-                content = plain_values(ros.deserialize_message(self.data, self._type), compression)
-            self._frames[key] = encode({"op": "publish", "topic": topic, "msg": content}, compression)
-        return self._frames[key]
+        if compression == "cbor-raw":
+            secs, nsecs = divmod(self.received_ns, NS_PER_S)
+            content: Any = {"secs": secs, "nsecs": nsecs, "bytes": self.data}
+        else:
+            content = plain_values(ros.deserialize_message(self.data, self.message_type), compression)
+        return encode({"op": "publish", "topic": topic, "msg": content}, compression)
 
 
 Listener = Callable[[Sample], None]
 
 
 class Feed:
-    """Subscribes to a topic for all clients that listen to it; ``on_end`` is called when there is no listener left.
+    """A subscription of one listener to a topic, in the quality of service that its publishers offer."""
 
-    ``topic`` is the absolute name of the topic, and ``type_name`` the full name of its type.
-    """
-
-    def __init__(self, node: ros.Node, topic: str, type_name: str, on_end: Callable[[], object]) -> None:
+    def __init__(self, node: ros.Node, topic: str, type_name: str, listener: Listener) -> None:
         self._node = node
         self._topic = topic
         self._type = ros.get_message(type_name)
-        self._on_end = on_end
-        self._listeners: list[Listener] = []
-        self._offered = self._find_offered()
-        self._subscription: Any = None
-
-    @property
-    def is_latched(self) -> bool:
-        """Whether a subscription that joins late gets earlier messages."""
-        return self._offered.durability == ros.DurabilityPolicy.TRANSIENT_LOCAL
-
-    def add(self, listener: Listener) -> None:
-        """Give the samples to one more listener."""
-        self._listeners.append(listener)
-        if self._subscription is None:
-            self._subscribe()
-
-    def remove(self, listener: Listener) -> None:
-        """Stop giving the samples to a listener."""
-        self._listeners.remove(listener)
-        if not self._listeners:
-            self._node.destroy_subscription(self._subscription)
-            self._on_end()
+        self._listener = listener
+        self._subscribe(self._find_offered())
 
     def renew(self) -> None:
         """Subscribe again if publishers offer another quality of service by now."""
         offered = self._find_offered()
-        if _read_terms(offered) != _read_terms(self._offered):
-            self._node.destroy_subscription(self._subscription)
-            self._offered = offered
-            self._subscribe()
+        if (offered.reliability, offered.durability) != (self._offered.reliability, self._offered.durability):
+            self.close()
+            self._subscribe(offered)
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._node.destroy_subscription(self._subscription)
 
     def _find_offered(self) -> ros.QoSProfile:
         # Without publishers, this assumes reliable ones, as most are: if one comes, the subscription need not be
         # renewed, and misses nothing.
         return find_offered_qos(self._node, self._topic, ros.ReliabilityPolicy.RELIABLE)
 
-    def _subscribe(self) -> None:
-        self._subscription = self._node.create_subscription(
-            self._type, self._topic, self._hear, self._offered, raw=True
-        )
+    def _subscribe(self, offered: ros.QoSProfile) -> None:
+        self._offered = offered
+        self._subscription = self._node.create_subscription(self._type, self._topic, self._hear, offered, raw=True)
 
     def _hear(self, data: bytes) -> None:
-        sample = Sample(bytes(data), self._type, self._node.get_clock().now().nanoseconds)
-        for listener in list(self._listeners):
-            listener(sample)
-
-
-def _read_terms(qos: ros.QoSProfile) -> tuple[object, object]:
-    return qos.reliability, qos.durability
+        self._listener(Sample(bytes(data), self._type, self._node.get_clock().now().nanoseconds))
 
 
 class Bridge:
@@ -129,7 +104,6 @@ class Bridge:
 
     Attributes:
         node: The node of the bridge.
-        advertised: The services by which one knows what clients offer; all clients of the bridge share this set.
         is_over: Whether the bridge has left the graph; clients then connect again.
     """
 
@@ -145,9 +119,8 @@ class Bridge:
         ros.let_callbacks_wait(self.node)
         self._executor = ros.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self.advertised: set[str] = set()
         self.is_over = False
-        self._feeds: dict[tuple[str, str, object], Feed] = {}
+        self._feeds: list[Feed] = []
         self._clients: dict[tuple[str, str], Any] = {}
         self._work: SimpleQueue[Callable[[], None]] = SimpleQueue()
         # The number orders timers of equal time, because functions cannot be compared.
@@ -197,17 +170,17 @@ class Bridge:
     def listen(self, topic: str, type_name: str, listener: Listener) -> Callable[[], None]:
         """Give the messages of a topic to a listener, until the function that is returned is called.
 
-        A latched topic begins with its earlier messages.
+        ``topic`` is the absolute name of the topic, and ``type_name`` the full name of its type. A latched topic begins
+        with its earlier messages.
         """
-        # Earlier messages of a latched topic come only with a new subscription, so a later listener gets its own.
-        alone = (topic, type_name, listener)
-        shared = (topic, type_name, None)
-        feed = self._feeds.get(shared)
-        if feed is None or feed.is_latched:
-            key = shared if feed is None else alone
-            feed = self._feeds[key] = Feed(self.node, topic, type_name, lambda: self._feeds.pop(key, None))
-        feed.add(listener)
-        return partial(feed.remove, listener)
+        feed = Feed(self.node, topic, type_name, listener)
+        self._feeds.append(feed)
+
+        def stop() -> None:
+            self._feeds.remove(feed)
+            feed.close()
+
+        return stop
 
     def service_client(self, service: str, type_name: str) -> Any:
         """A client of a service, given by its absolute name; all clients of the bridge share it."""
@@ -215,15 +188,6 @@ class Bridge:
         if key not in self._clients:
             self._clients[key] = self.node.create_client(find_interface("srv", type_name), service)
         return self._clients[key]
-
-    def offers(self, service: str) -> bool:
-        """Whether a client of the bridge or a node offers a service, given by its absolute name."""
-        # All clients offer through the one node of the bridge, so the graph does not separate their offers.
-        return service in self.advertised or any(
-            service in dict(self.node.get_service_names_and_types_by_node(*other))
-            for other in self.node.get_node_names_and_namespaces()
-            if other[0] != self.node.get_name()
-        )
 
     def _run(self) -> None:
         self.later(_LOOK_S, self._look)
@@ -259,7 +223,7 @@ class Bridge:
         changes = ros.graph_changes(self.node)
         if changes != self._changes:
             self._changes = changes
-            for feed in list(self._feeds.values()):
+            for feed in self._feeds:
                 feed.renew()
 
     def _leave(self) -> None:

@@ -1,4 +1,4 @@
-"""Frames of the protocol: JSON in text frames, CBOR in binary ones, and messages in either.
+"""Frames of the protocol: JSON, and for clients that ask for it, CBOR.
 
 Numbers are written as rosbridge_suite writes them. In JSON, octets are Base64, and NaN and infinities are null. In
 CBOR, octets are bytes and other arrays of numbers are typed arrays (RFC 8746), little endian.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import cbor2
@@ -19,43 +19,27 @@ from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import plain
-from throwcollect.serve.rosbridge.operations import Fragment, RequestId
 
 LONGEST_FRAME = 10 * 2**20
-"""Largest number of bytes of a frame that a client may send, whole or in fragments."""
-_OF_A_PART = 64
-"""Each part counts as this many characters more than its text, because even an empty part takes memory."""
-
+"""Largest number of bytes of a frame that a client may send."""
 
 Frame = str | bytes
 """A text frame or a binary one."""
 
-_TAGS = {64: "u1", 69: "<u2", 70: "<u4", 71: "<u8", 72: "i1", 77: "<i2", 78: "<i4", 79: "<i8", 85: "<f4", 86: "<f8"}
-_TAG_OF = {np.dtype(kind): tag for tag, kind in _TAGS.items()}
+_TAGS = {"u1": 64, "<u2": 69, "<u4": 70, "<u8": 71, "i1": 72, "<i2": 77, "<i4": 78, "<i8": 79, "<f4": 85, "<f8": 86}
+_TAG_OF = {np.dtype(kind): tag for kind, tag in _TAGS.items()}
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
 
 
 def read_frame(frame: Frame) -> Mapping[str, Any]:
-    """Read the fields of a frame of a client, which is JSON, or CBOR in a binary frame."""
+    """Read the fields of a frame of a client, which is JSON; ROS# sends it in binary frames."""
     try:
-        # The first byte decides: no CBOR map begins with a byte that can begin a JSON object.
-        if isinstance(frame, str) or frame[:1].isspace() or frame[:1] == b"{":
-            fields = orjson.loads(frame)
-        else:
-            fields = cbor2.loads(frame, tag_hook=_read_array)
-    except (ValueError, EOFError, cbor2.CBORDecodeError, RecursionError) as error:
-        raise ConfigError(f"a frame is neither JSON nor CBOR: {error}") from error
+        fields = orjson.loads(frame)
+    except ValueError as error:
+        raise ConfigError(f"a frame is no JSON: {error}") from error
     if not isinstance(fields, Mapping):
         raise ConfigError(f"a frame should be an object with an op, got {fields!r:.80}")
     return fields
-
-
-def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
-    """Turn the tag of a typed array into the array; other tags stay as they are."""
-    kind = _TAGS.get(tag.tag)
-    if kind is None or not isinstance(tag.value, bytes) or len(tag.value) % np.dtype(kind).itemsize:
-        return tag
-    return np.frombuffer(tag.value, kind)
 
 
 def plain_values(message: Any, compression: str = "none") -> Any:
@@ -70,23 +54,19 @@ def encode(fields: object, compression: str = "none") -> Frame:
 
 def json_text(fields: object) -> str:
     """Write JSON in one line, in ASCII, because ROS# treats every byte of a frame as a character."""
-    text = orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    text = orjson.dumps(fields, _encode_bytes, orjson.OPT_SERIALIZE_NUMPY).decode()
     # orjson cannot escape characters beyond ASCII; `json` does, in the form that JSON demands.
     return text if text.isascii() else _NOT_ASCII.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
 
-def fragments(text: str, size: int, number: str) -> Iterator[str]:
-    """Split a text frame into fragments of at most ``size`` characters, which have the frame's ``number`` in common."""
-    total = -(-len(text) // size)
-    for index in range(total):
-        part = text[index * size : (index + 1) * size]
-        yield json_text({"op": "fragment", "id": number, "data": part, "num": index, "total": total})
+def _encode_bytes(value: Any) -> str:
+    if not isinstance(value, bytes):
+        raise TypeError
+    return base64.b64encode(value).decode()
 
 
 def _encode_for_json(values: NDArray[Any], kind: str) -> Any:
-    if kind == "uint8":
-        return base64.b64encode(values.tobytes()).decode()
-    return np.ascontiguousarray(values)
+    return values.tobytes() if kind == "uint8" else np.ascontiguousarray(values)
 
 
 def _encode_for_cbor(values: NDArray[Any], kind: str) -> Any:
@@ -94,29 +74,3 @@ def _encode_for_cbor(values: NDArray[Any], kind: str) -> Any:
         return values.tobytes()
     little = values.astype(values.dtype.newbyteorder("<"), copy=False)
     return cbor2.CBORTag(_TAG_OF[little.dtype], little.tobytes())
-
-
-class Reassembly:
-    """Collects the parts of frames of one client."""
-
-    def __init__(self) -> None:
-        self._frames: dict[RequestId, dict[int, str]] = {}
-        self._size = 0
-
-    def add(self, part: Fragment) -> str | None:
-        """Take a part.
-
-        Returns:
-            The frame, if this was its last part.
-        """
-        parts = self._frames.setdefault(part.id, {})
-        if part.num not in parts:
-            parts[part.num] = part.data
-            self._size += len(part.data) + _OF_A_PART
-        is_whole = len(parts) >= part.total
-        if is_whole or self._size > LONGEST_FRAME:
-            del self._frames[part.id]
-            self._size -= sum(len(each) + _OF_A_PART for each in parts.values())
-            if not is_whole:
-                raise ConfigError(f"fragment: should have at most {LONGEST_FRAME} characters in all parts together")
-        return "".join(parts[number] for number in sorted(parts)) if is_whole else None

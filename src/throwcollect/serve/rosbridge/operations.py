@@ -23,12 +23,9 @@ _T = TypeVar("_T")
 Compression = Literal["none", "cbor", "cbor-raw"]
 """``none`` is JSON. If the subscriptions of a client to a topic differ, the one that comes last here is used."""
 COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
-Level = Literal["none", "error", "warning", "info"]
-"""Status messages that a client wants; each level includes those before it."""
-LEVELS: tuple[Level, ...] = get_args(Level)
 RequestId = str | int | None
 """The id that a client has given an operation; None if it has given none."""
-MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service", "fragment", "set_level", "status"))
+MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service", "status"))
 """Operations that clients may use that may only look; a call is decided on by its service."""
 Natural = Annotated[int, Field(ge=0, lt=1 << 53)]
 """A number from 0 on that JavaScript can represent."""
@@ -46,21 +43,14 @@ class Operation(BaseModel):
         return {name: value for name, value in fields.items() if value is not None}
 
 
-class Form(Operation):
-    """How the answers to an operation are sent; text frames are cut into parts of ``fragment_size`` characters."""
-
-    compression: Compression = "none"
-    fragment_size: Natural = 0
-
-
-class Subscribe(Form):
+class Subscribe(Operation):
     """Subscribe to a topic, with at least ``throttle_rate`` [ms] between two messages."""
 
     op: Literal["subscribe"]
     topic: str
     type: str = ""
     throttle_rate: NonNegativeFloat = 0
-    queue_length: Natural = 0
+    compression: Compression = "none"
 
 
 class Withdraw(Operation):
@@ -81,17 +71,18 @@ class Publish(Operation):
     queue_size: Natural = 0
 
 
-class CallService(Form):
-    """Call a service, with arguments by name or in their order, and wait for at most ``timeout`` [s]."""
+class CallService(Operation):
+    """Call a service, and wait for at most ``timeout`` [s]."""
 
     op: Literal["call_service"]
     name: str = Field(alias="service")
     type: str = ""
     args: Any = None
     timeout: PositiveFloat = math.inf
+    compression: Compression = "none"
 
 
-class SendGoal(Form):
+class SendGoal(Operation):
     """Send a goal to an action."""
 
     op: Literal["send_action_goal"]
@@ -99,6 +90,7 @@ class SendGoal(Form):
     action_type: str
     args: Any = None
     feedback: bool = False
+    compression: Compression = "none"
 
 
 class CancelGoal(Operation):
@@ -125,32 +117,27 @@ class Answer(Operation):
     status: int | None = None
 
 
-class Fragment(Operation):
-    """One part of a frame."""
-
-    op: Literal["fragment"]
-    id: str | int
-    data: str
-    num: Natural
-    total: int = Field(le=100_000)
-
-    @model_validator(mode="after")
-    def _is_one_of_all(self) -> Fragment:
-        if self.num >= self.total:
-            raise ValueError("num should be below total")
-        return self
-
-
 class Status(Operation):
-    """A status message of the client, or which status messages it wants."""
+    """A status message of the client."""
 
-    op: Literal["status", "set_level"]
-    level: Level = "error"
+    op: Literal["status"]
     msg: str = ""
 
 
-AnyOperation = Subscribe | Withdraw | Publish | CallService | SendGoal | CancelGoal | Offer | Answer | Fragment | Status
+AnyOperation = Subscribe | Withdraw | Publish | CallService | SendGoal | CancelGoal | Offer | Answer | Status
 _OPERATIONS: TypeAdapter[AnyOperation] = TypeAdapter(Annotated[AnyOperation, Field(discriminator="op")])
+
+
+class Arguments(Operation):
+    """Arguments of the services that the bridge answers; each service has some of them."""
+
+    type: str = ""
+    topic: str = ""
+    service: str = ""
+    node: str = ""
+    name: str = ""
+    value: str = ""
+    default_value: str = ""
 
 
 def read_operation(fields: Mapping[str, Any]) -> AnyOperation:

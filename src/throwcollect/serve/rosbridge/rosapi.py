@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 from rclzenoh.interfaces import message_definition
-from rclzenoh.interfaces.catalog import structure
 from rclzenoh.names import join
 from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.robots.urdf import PACKAGE
-from throwcollect.ros.graph_names import absolute_name, find_interface, full_name, is_hidden
-from throwcollect.ros.message_values import array_parts
+from throwcollect.ros.graph_names import absolute_name, full_name, is_hidden
 from throwcollect.serve.robot_files import find_mesh
-from throwcollect.serve.rosbridge.calls import Arguments, Call
-from throwcollect.serve.rosbridge.client import Client, is_guarded
+from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.guarded import is_guarded
+from throwcollect.serve.rosbridge.operations import Arguments
 from throwcollect.serve.rosbridge.parameters import get_parameter, has_parameter, list_parameters, set_parameter
 from throwcollect.units import NS_PER_S
 
-Answer = Callable[[Call], None]
+Service = Callable[[Arguments], Any]
+"""Makes the fields of the response from the arguments, now or when it is awaited."""
 Values = Mapping[str, object]
 Found = Iterable[tuple[str, list[str]]]
 
@@ -29,23 +28,17 @@ SET_PARAMETER = "rosapi/set_param"
 """The only service here that changes something."""
 
 
-def make_services(client: Client) -> Mapping[str, Answer]:
-    """Functions that answer the calls of a client, by the names of the services without a slash at the beginning."""
-    graph = _Graph(client.bridge.node)
-    later: Mapping[str, Answer] = {
-        "get_param": get_parameter,
-        "set_param": set_parameter,
-        "has_param": has_parameter,
-        "get_param_names": list_parameters,
-        "delete_param": lambda call: call.fail(f"{call.asked.name}: parameters of nodes cannot be deleted"),
+def make_services(client: Client) -> Mapping[str, Service]:
+    """Services that the bridge answers for a client, by their names without a slash at the beginning."""
+    graph = {f"rosapi/{name}": service for name, service in _Graph(client.bridge.node).services().items()}
+    return {
+        **graph,
+        "rosapi/get_param": partial(get_parameter, client),
+        "rosapi/has_param": partial(has_parameter, client),
+        "rosapi/get_param_names": partial(list_parameters, client),
+        SET_PARAMETER: partial(set_parameter, client),
+        "file_server/get_file": _give_file,
     }
-    at_once: Mapping[str, Answer] = {name: partial(_reply, values) for name, values in graph.services().items()}
-    services = {f"rosapi/{name}": answer for name, answer in {**at_once, **later}.items()}
-    return {**services, "file_server/get_file": _give_file}
-
-
-def _reply(values: Callable[[Arguments], Values], call: Call) -> None:
-    call.reply(values(call.arguments))
 
 
 class _Graph:
@@ -54,9 +47,8 @@ class _Graph:
     def __init__(self, node: ros.Node) -> None:
         self._node = node
 
-    def services(self) -> Mapping[str, Callable[[Arguments], Values]]:
-        """Functions from arguments to fields of the response, by the names of the services."""
-        node = self._node
+    def services(self) -> Mapping[str, Service]:
+        """Services by their names."""
         return {
             "topics": lambda _: self._list_topics(),
             "topics_and_raw_types": lambda _: {
@@ -65,26 +57,12 @@ class _Graph:
             },
             "topics_for_type": lambda asked: {"topics": _names_of(self._topics(), full_name("msg", asked.type))},
             "topic_type": lambda asked: {"type": self._topics().get(absolute_name(asked.topic), "")},
-            "publishers": lambda asked: {
-                "publishers": _list_nodes(node.get_publishers_info_by_topic(absolute_name(asked.topic)))
-            },
-            "subscribers": lambda asked: {
-                "subscribers": _list_nodes(node.get_subscriptions_info_by_topic(absolute_name(asked.topic)))
-            },
             "services": lambda _: {"services": list(self._services())},
             "services_for_type": lambda asked: {"services": _names_of(self._services(), full_name("srv", asked.type))},
             "service_type": lambda asked: {"type": self._services().get(absolute_name(asked.service), "")},
-            # The rosapi of ROS 2 takes a type here, although the field is called service; earlier ones take a name.
-            "service_providers": lambda asked: {
-                "providers": self._find_providers(absolute_name(asked.service), full_name("srv", asked.service))
-            },
-            "service_node": lambda asked: {"node": next(iter(self._find_providers(absolute_name(asked.service))), "")},
             "action_servers": lambda _: self._list_actions(),
             "nodes": lambda _: {"nodes": [join(namespace, name) for name, namespace in self._nodes()]},
             "node_details": lambda asked: self._describe_node(asked.node),
-            "message_details": lambda asked: _describe_message(asked.type),
-            "service_request_details": lambda asked: _describe_service(asked.type, "Request"),
-            "service_response_details": lambda asked: _describe_service(asked.type, "Response"),
             "get_time": lambda _: self._get_time(),
             "get_ros_version": lambda _: {"version": 2, "distro": "jazzy"},
         }
@@ -105,17 +83,6 @@ class _Graph:
     def _list_topics(self) -> Values:
         topics = self._topics()
         return {"topics": list(topics), "types": list(topics.values())}
-
-    def _find_providers(self, name: str, type_name: str | None = None) -> list[str]:
-        """Nodes that offer a service of this name, or one of this type."""
-        return [
-            join(namespace, node)
-            for node, namespace in self._nodes()
-            if any(
-                service == name or type_name in types
-                for service, types in self._node.get_service_names_and_types_by_node(node, namespace)
-            )
-        ]
 
     def _list_actions(self) -> Values:
         actions = [name for name, _ in _list_visible(ros.get_action_names_and_types(self._node))]
@@ -152,11 +119,6 @@ def _names_of(types: Mapping[str, str], wanted: str) -> list[str]:
     return [name for name, type_name in types.items() if type_name == wanted]
 
 
-def _list_nodes(infos: Iterable[Any]) -> list[str]:
-    names = {join(info.node_namespace, info.node_name) for info in infos}
-    return sorted(name for name in names if not is_hidden(name))
-
-
 def _find_definition(type_name: str) -> str:
     """Definition of a message as rosbag2 stores it; empty for a message that only an installed ROS has."""
     try:
@@ -165,62 +127,9 @@ def _find_definition(type_name: str) -> str:
         return ""
 
 
-def _give_file(call: Call) -> None:
-    """Answer a call with the bytes of a mesh that it names as ``package://NAME/PATH``."""
-    url = call.arguments.name
-    name, _, rest = url.removeprefix(PACKAGE).partition("/")
-    if not url.startswith(PACKAGE):
-        raise ConfigError(f"{url}: not a file of a robot's description", expected=f"{PACKAGE}NAME/PATH")
-    data = find_mesh(name, rest).read_bytes()
-    call.reply({"value": base64.b64encode(data).decode() if call.asked.compression == "none" else data})
-
-
-Definition = Mapping[str, object]
-"""Fields of rosapi_msgs/msg/TypeDef."""
-
-
-def _describe_message(name: str) -> Values:
-    """Describe a message, named in full or as ``pkg/Type``."""
-    return {"typedefs": _describe(full_name("msg", name), find_interface("msg", name), [])}
-
-
-def _describe_service(name: str, part: Literal["Request", "Response"]) -> Values:
-    """Describe the request or the response of a service, named in full or as ``pkg/Type``."""
-    service = find_interface("srv", name)
-    return {"typedefs": _describe(f"{full_name('srv', name)}_{part}", getattr(service, part), [])}
-
-
-def _describe(name: str, message_class: Any, seen: list[str]) -> list[Definition]:
-    seen.append(name)
-    message, kinds, lengths, examples = message_class(), [], [], []
-    types = message_class.get_fields_and_field_types()
-    for field, kind in types.items():
-        parts = array_parts(kind)
-        kinds.append(parts[0] if parts else kind)
-        # In rosapi, -1 stands for no array, and 0 for an array of any length.
-        lengths.append(-1 if parts is None else parts[2] or 0)
-        examples.append("[]" if parts else "{}" if "/" in kind else str(getattr(message, field)))
-    constants = _find_constants(name)
-    package, _, short = name.replace("/", " ").split()
-    definition = {
-        "type": f"{package}/{short}",
-        "fieldnames": list(types),
-        "fieldtypes": kinds,
-        "fieldarraylen": lengths,
-        "examples": examples,
-        "constnames": list(constants),
-        "constvalues": [str(value) for value in constants.values()],
-    }
-    found: list[Definition] = [definition]
-    for kind in kinds:
-        inner = full_name("msg", kind)
-        if "/" in kind and inner not in seen:
-            found += _describe(inner, ros.get_message(inner), seen)
-    return found
-
-
-def _find_constants(name: str) -> Mapping[str, object]:
-    try:
-        return structure(name).constants
-    except ValueError:
-        return {}
+def _give_file(asked: Arguments) -> Values:
+    """The bytes of a mesh, named as ``package://NAME/PATH``."""
+    if not asked.name.startswith(PACKAGE):
+        raise ConfigError(f"{asked.name}: not a file of a robot's description", expected=f"{PACKAGE}NAME/PATH")
+    package, _, path = asked.name.removeprefix(PACKAGE).partition("/")
+    return {"value": find_mesh(package, path).read_bytes()}

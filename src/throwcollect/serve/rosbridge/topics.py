@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,69 +10,61 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.bridge import Sample
-from throwcollect.serve.rosbridge.client import Client, open_topic
-from throwcollect.serve.rosbridge.operations import (
-    COMPRESSIONS,
-    Publish,
-    RequestId,
-    Subscribe,
-    Withdraw,
-)
+from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.guarded import open_topic
+from throwcollect.serve.rosbridge.operations import COMPRESSIONS, Publish, RequestId, Subscribe, Withdraw
 
 _DEPTH = 100
+_EARLY_S = 1e-4
 _HEADER = "std_msgs/Header"
 
 
 class RateLimit:
-    """Lets samples through to `send` at the rate that a client asks for; `later` calls an action after a time [s]."""
+    """Lets samples through to `send` at intervals: of those that come meanwhile, the newest, when its time has come.
+
+    `later` calls an action after a time [s].
+    """
 
     def __init__(self, send: Callable[[Sample], None], later: Callable[[float, Callable[[], None]], None]) -> None:
         self._send = send
         self._later = later
-        self._queue: deque[Sample] = deque(maxlen=0)
-        self._throttle_s = 0.0
+        self._newest: Sample | None = None
+        self._interval_s = 0.0
         self._due = 0.0
-        self._waits = False
 
-    def change(self, throttle_s: float, queue_length: int) -> None:
-        """Use another interval and queue from now on: when the queue is full, the oldest samples are left out."""
-        self._throttle_s = throttle_s
-        self._queue = deque(self._queue, maxlen=queue_length)
-        # A shorter interval takes effect at once, and not only after the next sample.
-        self._due = min(self._due, time.monotonic() + throttle_s)
+    def change(self, interval_s: float) -> None:
+        """Use another interval from now on; a shorter one takes effect at once."""
+        now = time.monotonic()
+        self._interval_s = interval_s
+        self._due = min(self._due, now + interval_s)
+        self._later(max(self._due - now, 0.0), self._continue)
 
     def offer(self, sample: Sample) -> None:
-        """Send a sample, keep it until it is due, or leave it out."""
+        """Send a sample, or keep it until it is due."""
         now = time.monotonic()
-        if now >= self._due and not self._queue:
+        if self._newest is None and now >= self._due:
             self._let_through(sample, now)
-        elif self._queue.maxlen:
-            self._queue.append(sample)
-            self._wait(now)
+            return
+        if self._newest is None:
+            self._later(self._due - now, self._continue)
+        self._newest = sample
 
     def clear(self) -> None:
-        """Forget the samples that wait; a timer that still runs then finds none."""
-        self._queue.clear()
+        """Forget the sample that waits; a timer that still runs then finds none."""
+        self._newest = None
 
     def _let_through(self, sample: Sample, now: float) -> None:
-        # Waiting samples are sent at even intervals, so the next interval begins when this sample was due, and not at
-        # `now`, as the timer may be late.
-        is_late = now - self._due < self._throttle_s and self._queue.maxlen
-        self._due = (self._due if is_late else now) + self._throttle_s
+        # Samples are sent at even intervals, so the next interval begins when this sample was due, and not at `now`, as
+        # the timer may be late.
+        self._due = (self._due if now - self._due < self._interval_s else now) + self._interval_s
         self._send(sample)
 
-    def _wait(self, now: float) -> None:
-        if not self._waits:
-            self._waits = True
-            self._later(max(self._due - now, 0.0), self._continue)
-
     def _continue(self) -> None:
-        self._waits = False
-        if self._queue:
-            now = time.monotonic()
-            self._let_through(self._queue.popleft(), now)
-            if self._queue:
-                self._wait(now)
+        now = time.monotonic()
+        # A timer of an earlier interval may come too soon; the sample then has a later timer.
+        if self._newest is not None and now >= self._due - _EARLY_S:
+            sample, self._newest = self._newest, None
+            self._let_through(sample, now)
 
 
 class SubscribedTopic:
@@ -113,16 +104,10 @@ class SubscribedTopic:
     def _merge(self) -> None:
         asked = self._asked.values()
         self._compression = max((each.compression for each in asked), key=COMPRESSIONS.index)
-        self._fragment_size = min((each.fragment_size for each in asked if each.fragment_size), default=0)
-        self._pace.change(min(each.throttle_rate for each in asked) / 1000, max(each.queue_length for each in asked))
+        self._pace.change(min(each.throttle_rate for each in asked) / 1000)
 
     def _send(self, sample: Sample) -> None:
-        try:
-            frame = sample.frame(self._given, self._compression)
-        except ValueError as error:
-            self._client.report("error", f"{self._given}: a message cannot be read: {error}")
-            return
-        self._client.send(frame, self._fragment_size)
+        self._client.send(sample.frame(self._given, self._compression))
 
 
 class Subscriptions:
@@ -184,8 +169,6 @@ class Publishers:
         if topic in self._publishers:
             _, publisher = self._publishers.pop(topic)
             self._client.bridge.node.destroy_publisher(publisher)
-        else:
-            self._client.report("warning", f"unadvertise: {topic} is not advertised", asked.id)
 
     def publish(self, asked: Publish) -> None:
         """Publish a message; a topic that the client has not announced, but others have, is announced first."""
@@ -198,10 +181,7 @@ class Publishers:
             # The stamp is the present time, unless the client has one.
             message.header.stamp = self._client.bridge.node.get_clock().now().to_msg()
         fill(message, {} if asked.msg is None else asked.msg)
-        try:
-            publisher.publish(message)
-        except ValueError as error:
-            raise ConfigError(f"publish: {error}") from error
+        publisher.publish(message)
 
     def close(self) -> None:
         """Withdraw all topics."""

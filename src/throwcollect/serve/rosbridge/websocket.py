@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections import deque
 from collections.abc import Coroutine
 from contextlib import suppress
@@ -33,11 +32,10 @@ _DROPPED = json_text(
 
 
 class Outbox:
-    """Frames that wait to be sent; any thread may add frames, only the thread of the event loop takes them."""
+    """Frames that wait to be sent; any thread may add frames, the rest belongs to the thread of the event loop."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self._lock = threading.Lock()
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
         self._frames: deque[Frame] = deque()
         self._bytes = 0
         self._is_reported = False
@@ -45,53 +43,47 @@ class Outbox:
 
     def put(self, frame: Frame) -> None:
         """Add a frame; the oldest frames are dropped if too much waits."""
-        with self._lock:
-            was_empty = not self._frames
-            self._append(frame)
-            # A single frame is kept however long it is.
-            while len(self._frames) > MOST_FRAMES or (self._bytes > MOST_BYTES and len(self._frames) > 1):
-                self._bytes -= len(self._frames.popleft())
-                if not self._is_reported:
-                    self._is_reported = True
-                    self._append(_DROPPED)
-        # `take` waits only if there is no frame, so only the first frame has to wake it.
-        if was_empty:
-            # The loop may have ended, and with it the connection.
-            with suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._filled.set)
+        # The loop may have ended, and with it the connection.
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._append, frame)
 
     async def take(self) -> Frame:
         """Take the oldest frame, as soon as there is one."""
-        while True:
-            with self._lock:
-                if self._frames:
-                    frame = self._frames.popleft()
-                    self._bytes -= len(frame)
-                    return frame
-                self._filled.clear()
-            await self._filled.wait()
+        await self._filled.wait()
+        frame = self._frames.popleft()
+        self._bytes -= len(frame)
+        if not self._frames:
+            self._filled.clear()
+        return frame
 
     def _append(self, frame: Frame) -> None:
         self._frames.append(frame)
         self._bytes += len(frame)
+        self._filled.set()
+        # A single frame is kept however long it is.
+        while len(self._frames) > MOST_FRAMES or (self._bytes > MOST_BYTES and len(self._frames) > 1):
+            self._bytes -= len(self._frames.popleft())
+            if not self._is_reported:
+                self._is_reported = True
+                self._append(_DROPPED)
 
 
 async def attend(websocket: WebSocket, bridge: Bridge, *until: Coroutine[Any, Any, object], read_only: bool) -> None:
     """Connect the accepted WebSocket of a client to a bridge until it leaves, or one of the coroutines ends."""
-    outbox = Outbox(asyncio.get_running_loop())
-    requests = Requests(bridge, outbox.put, read_only=read_only)
+    outbox = Outbox()
+    client = Requests(bridge, outbox.put, read_only=read_only)
 
     async def hear(message: Message) -> None:
         text: str | None = message.get("text")
-        requests.receive(message["bytes"] if text is None else text)
+        client.receive(message["bytes"] if text is None else text)
         # If a client sends faster than the bridge works, its frames are not read for a while, so TCP makes it wait.
-        while requests.waiting > _MOST_WAITING and not bridge.is_over:
+        while client.waiting > _MOST_WAITING and not bridge.is_over:
             await asyncio.sleep(_POLL_S)
 
     try:
         await keep_sending(websocket, _send_all(websocket, outbox), *until, hear=hear)
     finally:
-        requests.close()
+        client.close()
 
 
 async def _send_all(websocket: WebSocket, outbox: Outbox) -> None:

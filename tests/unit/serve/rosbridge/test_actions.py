@@ -136,8 +136,3 @@ def test_goals_are_aborted_when_the_action_is_withdrawn_and_when_the_client_leav
     assert sent.end == (ABORTED, "")
     # On DDS, the names also include services that have only clients.
     wait_for(lambda: "/swing" not in party.call("rosapi/action_servers")["action_servers"])
-
-
-def test_a_client_cannot_offer_an_action_that_a_node_has(party: Party, arm: Arm) -> None:
-    party.ask(op="advertise_action", action="/follow", type=KIND)
-    assert "/follow is offered already" in party.next(op="status")["msg"]

@@ -22,16 +22,8 @@ from rclzenoh.interfaces.catalog import INTERFACES
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.bridge import Sample
-from throwcollect.serve.rosbridge.codec import (
-    LONGEST_FRAME,
-    Reassembly,
-    encode,
-    fragments,
-    json_text,
-    plain_values,
-    read_frame,
-)
-from throwcollect.serve.rosbridge.operations import Fragment, read_operation
+from throwcollect.serve.rosbridge.codec import encode, json_text, plain_values, read_frame
+from throwcollect.serve.rosbridge.operations import read_operation
 
 
 @cache
@@ -41,9 +33,14 @@ def message_names() -> list[str]:
     return sorted(name for name in INTERFACES if "/msg/" in name or name.rpartition("_")[2] in parts)
 
 
+def read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
+    kinds = {64: "u1", 69: "<u2", 70: "<u4", 71: "<u8", 72: "i1", 77: "<i2", 78: "<i4", 79: "<i8", 85: "<f4", 86: "<f8"}
+    return np.frombuffer(tag.value, kinds[tag.tag])
+
+
 def content(frame: str | bytes) -> Any:
     """The message in a frame, as a client would fill it in: typed arrays, bytes and Base64 as they are."""
-    return read_frame(frame)["msg"]
+    return (read_frame(frame) if isinstance(frame, str) else cbor2.loads(frame, tag_hook=read_array))["msg"]
 
 
 def test_json_cbor_and_raw_bytes_of_every_message_are_equivalent() -> None:
@@ -92,10 +89,10 @@ def test_truth_values_are_no_numbers(kind: str, value: Any) -> None:
 @pytest.mark.parametrize(
     ("frame", "said"),
     [
-        ("", "neither JSON nor CBOR"),
+        ("", "a frame is no JSON"),
         ('{"op": "png"}', "Input tag 'png' found using 'op' does not match any of the expected tags"),
-        ("[" * 100_000, "neither JSON nor CBOR"),
-        (bytes.fromhex("a2626f70677075626c697368636d7367d81c81d81d00"), "publish.topic: Field required"),
+        ("[" * 100_000, "a frame is no JSON"),
+        (b'{"op": "publish", "msg": {}}', "publish.topic: Field required"),
     ],
 )
 def test_a_malformed_frame_gets_an_error_status(party: Party, frame: str | bytes, said: str) -> None:
@@ -105,7 +102,7 @@ def test_a_malformed_frame_gets_an_error_status(party: Party, frame: str | bytes
     assert said in told["msg"]
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(
     frame=st.one_of(st.binary(max_size=60), st.text(max_size=60), st.dictionaries(st.text(), st.none()).map(json.dumps))
 )
@@ -114,35 +111,3 @@ def test_any_frame_is_read_or_refused(frame: str | bytes) -> None:
         read_operation(read_frame(frame))
     except ConfigError:
         return
-
-
-def test_status_messages_come_from_the_requested_level_on(party: Party) -> None:
-    for level in ("none", "error"):
-        party.ask(op="set_level", level=level)
-        party.ask(op="nothing")
-    party.ask(op="unadvertise", topic="/x")
-    party.call("rosapi/get_time")
-    assert [each["level"] for each in party.got() if each["op"] == "status"] == ["error"]
-
-
-def test_fragments_in_any_order_become_a_frame(party: Party) -> None:
-    frame = json_text({"op": "call_service", "id": "whole", "service": "/rosapi/get_ros_version"})
-    parts = list(fragments(frame, 7, "1"))
-    for each in [*parts[::-2], *parts[::2], parts[1]]:
-        party.client.receive(each)
-    for each in parts[1::2]:
-        party.client.receive(each)
-    assert party.next(id="whole")["values"]["version"] == 2
-
-
-def test_parts_of_a_frame_that_are_too_long_together_are_rejected() -> None:
-    whole, half = Reassembly(), "x" * (LONGEST_FRAME // 2)
-
-    def add(number: int, total: int, data: str, name: str = "a") -> str | None:
-        return whole.add(Fragment(op="fragment", id=name, num=number, total=total, data=data))
-
-    assert add(0, 2, half) is None
-    with pytest.raises(ConfigError, match=f"should have at most {LONGEST_FRAME} characters"):
-        add(0, 2, half, name="b")
-    assert add(1, 2, "y") == f"{half}y"
-    assert add(0, 1, "x" * (LONGEST_FRAME - 100)) is not None

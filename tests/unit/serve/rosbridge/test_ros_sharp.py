@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from tests.unit.serve.rosbridge.conftest import Party, wait_for
 
-from throwcollect.ros import ActionClient, ActionServer, Node, get_action, get_message, get_service
+from throwcollect.ros import ActionServer, Node, get_action, get_message, get_service
 
 String: Any = get_message("std_msgs/msg/String")
 Scan: Any = get_message("sensor_msgs/msg/LaserScan")
@@ -50,32 +50,6 @@ SEND_GOAL = (
     b'"fragment_size":2147483647,"compression":"none","op":"send_action_goal","id":"/partner/follow:0"}'
 )
 CANCEL_GOAL = b'{"action":"/partner/follow","op":"cancel_action_goal","id":"/partner/follow:0"}'
-OFFER_ACTION = (
-    b'{"type":"control_msgs/action/FollowJointTrajectory","action":"/sharp/follow","op":"advertise_action","id":null}'
-)
-_POINT = b'{"positions":[],"velocities":[],"accelerations":[],"effort":[],"time_from_start":{"sec":0,"nanosec":0}}'
-_MOVES = b'{"transforms":[],"velocities":[],"accelerations":[],"time_from_start":{"sec":0,"nanosec":0}}'
-FEEDBACK = (
-    b'{"action":"/sharp/follow","values":{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},'
-    b'"joint_names":["step 0"],"desired":'
-    + _POINT
-    + b',"actual":'
-    + _POINT
-    + b',"error":'
-    + _POINT
-    + b',"multi_dof_joint_names":[],'
-    b'"multi_dof_desired":' + _MOVES + b',"multi_dof_actual":' + _MOVES + b',"multi_dof_error":' + _MOVES + b"},"
-    b'"op":"action_feedback","id":"ID"}'
-)
-RESULT = (
-    b'{"action":"/sharp/follow","values":{"error_code":0,"error_string":"followed"},"status":4,"result":true,'
-    b'"op":"action_result","id":"ID"}'
-)
-CANCELLED = (
-    b'{"action":"/sharp/follow","values":{"error_code":0,"error_string":"stopped"},"status":5,"result":true,'
-    b'"op":"action_result","id":"ID"}'
-)
-WITHDRAW_ACTION = b'{"action":"/sharp/follow","op":"unadvertise_action","id":null}'
 GET_NAME = (
     b'{"service":"/rosapi/get_param","args":{"name":"talos:file_server2","default_value":"file_server2"},'
     b'"fragment_size":2147483647,"compression":"none","op":"call_service","id":"/rosapi/get_param:0"}'
@@ -166,33 +140,6 @@ def test_ros_sharp_sends_a_goal_and_gets_feedback_and_result(party: Party, node:
     assert (result["id"], result["status"], result["result"]) == ("/partner/follow:0", 4, True)
     party.client.receive(CANCEL_GOAL)
     assert "no goal with the id /partner/follow:0 is under way" in party.next(op="status")["msg"]
-
-
-@pytest.mark.parametrize(("end", "status", "text"), [(RESULT, 4, "followed"), (CANCELLED, 5, "stopped")])
-def test_ros_sharp_offers_an_action_whose_goals_succeed_or_are_cancelled(
-    party: Party, node: Node, end: bytes, status: int, text: str
-) -> None:
-    party.client.receive(OFFER_ACTION)
-    client = ActionClient(node, FJT, "/sharp/follow")
-    assert client.wait_for_server(30)
-    feedback: list[Any] = []
-    sent = client.send_goal_async(FJT.Goal(), feedback_callback=feedback.append)
-    goal = hear(party, "send_action_goal")
-    assert goal["args"]["trajectory"]["points"] == []
-    number = goal["id"].encode()
-    wait_for(sent.done)
-    party.client.receive(FEEDBACK.replace(b"ID", number))
-    wait_for(lambda: feedback)
-    assert feedback[0].feedback.joint_names == ["step 0"]
-    if end is CANCELLED:
-        sent.result().cancel_goal_async()
-        assert hear(party, "cancel_action_goal")["id"] == goal["id"]
-    result = sent.result().get_result_async()
-    party.client.receive(end.replace(b"ID", number))
-    wait_for(result.done)
-    assert (result.result().status, result.result().result.error_string) == (status, text)
-    party.client.receive(WITHDRAW_ACTION)
-    wait_for(lambda: not client.server_is_ready())
 
 
 def test_ros_sharp_imports_the_description_of_a_robot(party: Party, node: Node) -> None:

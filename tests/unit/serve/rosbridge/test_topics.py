@@ -9,7 +9,6 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-import cbor2
 import numpy as np
 import pytest
 from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wait_for_listener
@@ -88,25 +87,18 @@ def test_each_subscription_of_a_client_ends_by_its_id(party: Party, node: Node) 
     assert data(party) == ["a"]
 
 
-def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Party, node: Node) -> None:
+def test_the_lowest_throttle_of_a_client_counts(party: Party, node: Node) -> None:
     say = words(node)
     party.ask(op="subscribe", id="slow", topic="/words", type="std_msgs/String", throttle_rate=60_000)
     say("a", "b", "c")
     party.next(msg={"data": "a"})
-    party.ask(op="subscribe", id="fast", topic="/words", throttle_rate=1, queue_length=2)
-    party.call("rosapi/get_time")
-    time.sleep(0.01)
-    say(*"defgh")
-    # A full queue drops its oldest messages.
-    party.next(msg={"data": "h"})
-    assert data(party)[0] == "a"
-    assert data(party)[-2:] == ["g", "h"]
+    party.ask(op="subscribe", id="fast", topic="/words", throttle_rate=1)
+    # The newest message that waits comes when the shorter interval is over.
+    party.next(msg={"data": "c"})
     party.ask(op="unsubscribe", id="fast", topic="/words")
-    party.call("rosapi/get_time")
-    before = len(data(party))
     say("i", "j")
     party.call("rosapi/get_time")
-    assert data(party)[before:] in ([], ["i"])
+    assert data(party)[-1] in "ci"
 
 
 def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +107,7 @@ def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pyte
     waiting: list[tuple[float, Callable[[], None]]] = []
     sent: list[float] = []
     pace = RateLimit(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
-    pace.change(0.033, 1)
+    pace.change(0.033)
     sample: Any = "sample"
     for number in range(60 * 50):
         arrives = 100.0 + number * 0.02
@@ -152,18 +144,16 @@ def listen_by(node: Node, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
     return heard
 
 
-def test_published_json_and_cbor_get_defaults_for_missing_fields(party: Party, node: Node) -> None:
+def test_a_published_message_gets_defaults_for_missing_fields(party: Party, node: Node) -> None:
     heard = listen_by(node, Image, "/image")
     wait_for(lambda: "/image" in party.call("rosapi/topics")["topics"])
     party.ask(op="advertise", topic="image", type="sensor_msgs/Image")
     party.ask(op="publish", topic="image", msg={"data": "AQID", "header": {"stamp": {"secs": 7, "nsecs": 8}}})
-    array = cbor2.CBORTag(64, b"\4\5")
-    for content in (b"\1\2", array):
-        party.client.receive(cbor2.dumps({"op": "publish", "topic": "/image", "msg": {"data": content, "width": 3}}))
-    wait_for(lambda: len(heard) == 3)
-    first, second, third = heard
+    party.ask(op="publish", topic="/image", msg={"data": [1, 2], "width": 3})
+    wait_for(lambda: len(heard) == 2)
+    first, second = heard
     assert (bytes(first.data), first.header.stamp.sec, first.header.stamp.nanosec, first.width) == (b"\1\2\3", 7, 8, 0)
-    assert (bytes(second.data), bytes(third.data), second.width) == (b"\1\2", b"\4\5", 3)
+    assert (bytes(second.data), second.width) == (b"\1\2", 3)
     assert second.header.stamp.sec == pytest.approx(time.time(), abs=60)
 
 
@@ -184,9 +174,6 @@ def test_a_latched_message_reaches_late_subscribers_until_it_is_withdrawn(party:
     assert node.count_publishers("/map") == 1
     party.ask(op="unadvertise", topic="/map")
     wait_for(lambda: not node.count_publishers("/map"))
-    party.ask(op="set_level", level="warning")
-    party.ask(op="unadvertise", topic="/map")
-    assert party.next(op="status") == {"op": "status", "level": "warning", "msg": "unadvertise: /map is not advertised"}
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,8 @@ class Stepping:
         try:
             await self._take(request.steps, None)
         except RequestError as error:
-            return refusal(StepSimulation.Response, error)
+            refused: StepSimulation.Response = refusal(StepSimulation.Response, error)
+            return refused
         response.result.result = Result.RESULT_OK
         return response
 
@@ -67,7 +68,8 @@ class Stepping:
                 handle.canceled()
             else:
                 handle.abort()
-            return refusal(SimulateSteps.Result, error)
+            refused: SimulateSteps.Result = refusal(SimulateSteps.Result, error)
+            return refused
         handle.succeed()
         result = SimulateSteps.Result()
         result.result.result = Result.RESULT_OK
