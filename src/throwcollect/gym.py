@@ -256,10 +256,6 @@ def _bound_picture(shape: tuple[int, int, int]) -> spaces.Box:
     return spaces.Box(0, 255, shape, np.uint8) if shape[2] > 1 else spaces.Box(0, np.inf, shape, np.float32)
 
 
-def _register() -> None:
-    for name in names_of("tasks"):
-        words = "".join(word.capitalize() for word in name.split("_"))
-        gymnasium.register(f"throwcollect/{words}-v0", entry_point="throwcollect.gym:ThrowEnv", kwargs={"task": name})
-
-
-_register()
+for _task in names_of("tasks"):
+    _words = "".join(word.capitalize() for word in _task.split("_"))
+    gymnasium.register(f"throwcollect/{_words}-v0", entry_point="throwcollect.gym:ThrowEnv", kwargs={"task": _task})

@@ -148,7 +148,6 @@ def verify_dataset(
         MissingExtraError: If throws are to be simulated, and the extra ``collect`` is not installed.
         WorkerError: If the physics engine does not start.
     """
-    check_bounds("processes", processes, least=1)
     directory = Path(directory)
     if replay is not None:
         check_bounds("replay", replay, least=0)

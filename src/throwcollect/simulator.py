@@ -195,11 +195,10 @@ class Simulator:
             ConflictError: If the simulator is closed.
             WorkerError: If the physics engine of a process does not start, or a process is killed.
         """
-        check_bounds("processes", processes, least=1)
         self._require_open()
         aimed = iter(targets)
         numbered = ((trial, point, next(aimed, {})) for trial, point in enumerate(points))
-        if processes == 1:
+        if processes <= 1:
             yield from map(self._throw_numbered, numbered)
             return
         yield from work_side_by_side(

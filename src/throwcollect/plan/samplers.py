@@ -65,11 +65,6 @@ def _draw_uniform(count: int, dimensions: int, randomness: np.random.Generator) 
 
 
 def _draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    if dimensions > MOST_DIMENSIONS:
-        raise PlanError(
-            [Problem(f"{dimensions} keys are swept", key="sweep.parameters")],
-            expected=f"at most {MOST_DIMENSIONS} with the sampler sobol; uniform takes any number",
-        )
     (own,) = randomness.spawn(1)
     return draw_sobol(count, dimensions, own)
 
@@ -130,8 +125,6 @@ def _check_count(trials: int | None, available: int) -> int:
     return available if trials is None else trials
 
 
-MOST_DIMENSIONS = 1024
-"""Size of the table of direction numbers."""
 BITS = 30
 """Bits of a coordinate; a sequence has ``2**BITS`` points."""
 
@@ -143,7 +136,7 @@ def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> 
 
     Args:
         count: Number of points, from 1 to ``2**BITS``.
-        dimensions: Number of coordinates, from 1 to `MOST_DIMENSIONS`.
+        dimensions: Number of coordinates, from 1 to the 1024 of the table of direction numbers.
         randomness: Source of the scrambling.
 
     Returns:

@@ -121,11 +121,6 @@ def test_the_first_points_of_a_grid_beyond_64_bits_can_be_drawn():
         draw(endless, sampler="grid", trials=None)
 
 
-def test_more_keys_than_a_sobol_sequence_has_dimensions_are_refused():
-    with pytest.raises(PlanError, match=r"^sweep.parameters: 1025 keys are swept"):
-        UNIT_SAMPLERS["sobol"](4, 1025, np.random.default_rng(0))
-
-
 def test_until_without_trials_draws_ten_times_as_many_points_as_should_land():
     sweep = SweepConfig(parameters=SPREAD)
     assert len(draw_points(Config(until={"landed": 30}, sweep=sweep), directory=HERE).values) == 300

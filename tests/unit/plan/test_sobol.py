@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from throwcollect.plan.samplers import MOST_DIMENSIONS, draw_sobol
+from throwcollect.plan.samplers import draw_sobol
 
 
-@pytest.mark.parametrize(("dimensions", "count"), [(1, 1), (1, 2), (2, 3), (5, 200), (40, 4096), (MOST_DIMENSIONS, 64)])
+@pytest.mark.parametrize(("dimensions", "count"), [(1, 1), (1, 2), (2, 3), (5, 200), (40, 4096), (1024, 64)])
 @pytest.mark.parametrize("seed", [0, 7])
 def test_points_equal_those_of_scipy_bit_for_bit(dimensions, count, seed):
     randomness = np.random.default_rng(seed)

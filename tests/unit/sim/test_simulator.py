@@ -114,7 +114,7 @@ def test_a_trial_in_which_the_engine_fails_is_an_error_and_the_next_one_begins(
     foreign.begin(0, {})
     with monkeypatch.context() as patch:
         patch.setattr(BallisticEngine, "run", fail)
-        with pytest.raises(MemberError, match=r"the engine ballistic of .* cannot take steps: ValueError: boom"):
+        with pytest.raises(MemberError, match=r"the engine ballistic cannot take steps: ValueError: boom"):
             foreign.step(500)
     # The reset that drops the trial needs no step, as the start state is known.
     foreign.drop()
