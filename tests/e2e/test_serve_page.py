@@ -180,9 +180,8 @@ def test_a_landing_of_a_run_that_has_ended_is_clicked_and_its_throw_is_replayed(
         tab.ask("Page.reload")
         load(tab)
         tab.wait_for(f"{replayed} === 3 && throwcollect.view.stations.get('replay').trails.count === 2")
-        assert tab.evaluate("document.querySelector('#time').value").endswith(
-            "trial 3, landed; transparent: trial 2, landed"
-        )
+        # The words come with the next picture.
+        tab.wait_for("document.querySelector('#time').value.endsWith('trial 3, landed; transparent: trial 2, landed')")
         assert tab.evaluate("document.documentElement.scrollWidth") == 390
         assert find_own_errors(tab) == []
 
