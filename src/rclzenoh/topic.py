@@ -79,17 +79,14 @@ def _declare(endpoint: Endpoint) -> Any:
         endpoint.session,
         endpoint.key,
         **options,
-        cache=CacheConfig(max_samples=qos.queue_length or _ENDLESS),
+        # The number stands for no limit.
+        cache=CacheConfig(max_samples=qos.queue_length or 2**31),
         # With this, subscribers that existed before notice the publisher, and ask for its earlier messages.
         publisher_detection=True,
         sample_miss_detection=MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S)
         if qos.is_reliable
         else None,
     )
-
-
-_ENDLESS = 2**31
-"""Cache size that stands for no limit."""
 
 
 class Subscription(Endpoint, Receiver):
