@@ -49,7 +49,3 @@ class ParameterAlreadyDeclaredException(ParameterException):
 
 class InvalidParameterValueException(ParameterException):
     """The value of a parameter was refused by its range or by a callback."""
-
-
-class ParameterUninitializedException(ParameterException):
-    """A parameter was read that has a type but no value yet."""

@@ -32,7 +32,9 @@ class Executor:
         self.context.executors.add(self)
 
     def add_node(self, node: NodeBase) -> bool:
-        """Take care of a node's callbacks until the node or the executor ends; returns True."""
+        """Take care of a node's callbacks; returns True."""
+        if node.executor is not None:
+            node.executor.remove_node(node)
         self._nodes.append(node)
         node.executor = self
         node.mailbox.attach(self._queue)
@@ -40,10 +42,11 @@ class Executor:
         return True
 
     def remove_node(self, node: NodeBase) -> None:
-        """Stop taking care of a node's callbacks."""
+        """Stop taking care of a node's callbacks, but for those of what has arrived."""
         if node in self._nodes:
             self._nodes.remove(node)
             node.executor = None
+            node.mailbox.detach()
 
     def wake(self) -> None:
         """Let a waiting executor look for work and at its context again."""

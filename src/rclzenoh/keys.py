@@ -17,8 +17,6 @@ from rclzenoh.qos import QoSProfile, decode
 PREFIX = "@ros2_lv"
 """First chunk of all tokens."""
 
-_NODE_CHUNKS, _ENDPOINT_CHUNKS = 9, 13
-
 
 class EntityKind(str, Enum):
     """Kind of the node or endpoint that a token announces."""
@@ -109,9 +107,9 @@ def parse_token(key: str) -> Token | None:
     if chunks[0] != PREFIX or not all(chunks):
         return None
     try:
-        domain, session, node_id, entity_id, kind, enclave, namespace, node = chunks[1:_NODE_CHUNKS]
+        domain, session, node_id, entity_id, kind, enclave, namespace, node = chunks[1:9]
         is_node = EntityKind(kind) is EntityKind.NODE
-        name, dds, type_hash, qos = [""] * 4 if is_node else chunks[_NODE_CHUNKS:_ENDPOINT_CHUNKS]
+        name, dds, type_hash, qos = [""] * 4 if is_node else chunks[9:13]
         if not is_node:
             decode(qos)  # Genuine nodes, too, ignore an endpoint whose quality of service is malformed.
         return Token(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections.abc import Callable
 from enum import IntEnum
@@ -20,9 +19,6 @@ class LoggingSeverity(IntEnum):
     WARN = 30
     ERROR = 40
     FATAL = 50
-
-
-_writing = threading.Lock()
 
 
 class Logger:
@@ -54,9 +50,9 @@ class Logger:
             self._seen[text] = now
         stamp = time.time_ns()
         line = f"[{severity.name}] [{stamp // S_TO_NS}.{stamp % S_TO_NS:09d}] [{self.name}]: {text}\n"
-        with _writing:
-            sys.stderr.write(line)
-            sys.stderr.flush()
+        # One call writes the whole line, also while other threads log.
+        sys.stderr.write(line)
+        sys.stderr.flush()
         if self.sink is not None:
             self.sink(Log(stamp=Time(nanoseconds=stamp).to_msg(), level=int(severity), name=self.name, msg=text))
         return True

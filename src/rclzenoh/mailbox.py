@@ -19,7 +19,7 @@ WorkQueue = SimpleQueue[Callable[[], bool] | None]
 
 
 class Mailbox:
-    """The queue of a node's work; once the node is in an executor, it is the queue of that executor."""
+    """The queue of a node's work; while the node is in an executor, it is the queue of that executor."""
 
     def __init__(self) -> None:
         # The lock is reentrant, because the garbage collector may close a query while the lock is held, which delivers.
@@ -38,6 +38,11 @@ class Mailbox:
             while not self.queue.empty():
                 queue.put(self.queue.get())
             self.queue = queue
+
+    def detach(self) -> None:
+        """Deliver to a queue of its own again; the executor still does the work that it has."""
+        with self.lock:
+            self.queue = SimpleQueue()
 
 
 class Receiver(ABC):

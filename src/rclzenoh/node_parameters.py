@@ -12,7 +12,6 @@ from rclzenoh.exceptions import (
     ParameterAlreadyDeclaredException,
     ParameterException,
     ParameterNotDeclaredException,
-    ParameterUninitializedException,
 )
 from rclzenoh.interfaces import AnyMessage, Service
 from rclzenoh.interfaces.msg import (
@@ -38,11 +37,6 @@ from rclzenoh.parameter import Parameter, ParameterKind
 _RELATIVE_TOLERANCE = 1e-6
 """A value this close to a bound or a step of its range counts as equal to it; rclpy has the same tolerance."""
 
-OnSet = Callable[[list[Parameter]], SetParametersResult]
-"""Callback that accepts or refuses parameters before they are set."""
-PostSet = Callable[[list[Parameter]], None]
-"""Callback that runs after parameters were set."""
-
 
 class NodeParameters:
     """Parameters that were declared, and the rules for setting them.
@@ -55,13 +49,13 @@ class NodeParameters:
         self._announce = announce
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, ParameterDescriptor] = {}
-        self._on_set: list[OnSet] = []
-        self._post_set: list[PostSet] = []
+        self._on_set: list[Callable[[list[Parameter]], SetParametersResult]] = []
+        self._post_set: list[Callable[[list[Parameter]], None]] = []
 
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: ParameterDescriptor | None = None
     ) -> Parameter:
-        """Declare a parameter with a default value, or only with a type.
+        """Declare a parameter with a default value; rclpy also takes a type in its place.
 
         Without a descriptor, the parameter keeps the type that it is declared with.
         """
@@ -70,12 +64,9 @@ class NodeParameters:
         # The descriptor is copied, because name and type are set here, and the caller may use it for other parameters.
         described = ParameterDescriptor() if descriptor is None else copy.copy(descriptor)
         described.name = name
-        if isinstance(value, ParameterKind):
-            described.type, value = value.value, None
-        else:
-            described.type = ParameterKind.from_parameter_value(value).value
+        described.type = ParameterKind.from_parameter_value(value).value
         if described.type == ParameterKind.NOT_SET.value and not described.dynamic_typing:
-            raise ValueError(f"parameter {name!r}: give a default value, a type, or a descriptor with dynamic_typing")
+            raise ValueError(f"parameter {name!r}: give a default value, or a descriptor with dynamic_typing")
         result = self._set([Parameter(name, value=value)], {name: described})
         if not result.successful:
             raise InvalidParameterValueException(f"parameter {name!r} cannot be {value!r}: {result.reason}")
@@ -87,11 +78,8 @@ class NodeParameters:
 
     def get_parameter(self, name: str) -> Parameter:
         """A parameter with its value."""
-        descriptor = self.describe_parameter(name)
-        parameter = self._parameters[name]
-        if parameter.type_ is ParameterKind.NOT_SET and not descriptor.dynamic_typing:
-            raise ParameterUninitializedException(f"parameter {name!r} has no value yet")
-        return parameter
+        self.describe_parameter(name)
+        return self._parameters[name]
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Descriptor of a parameter."""
@@ -109,11 +97,11 @@ class NodeParameters:
             self.describe_parameter(parameter.name)
         return self._set(list(parameter_list), None)
 
-    def add_on_set_parameters_callback(self, callback: OnSet) -> None:
+    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], SetParametersResult]) -> None:
         """Add a callback to be called before parameters are set; the last one added is called first."""
         self._on_set.insert(0, callback)
 
-    def add_post_set_parameters_callback(self, callback: PostSet) -> None:
+    def add_post_set_parameters_callback(self, callback: Callable[[list[Parameter]], None]) -> None:
         """Add a callback to be called after parameters were set; the last one added is called first."""
         self._post_set.insert(0, callback)
 

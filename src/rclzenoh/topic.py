@@ -51,12 +51,13 @@ class Publisher(Endpoint):
         else:
             raise TypeError(f"{self.topic_name}: expected {self.msg_type.TYPE} or bytes, got {type(msg).__name__}")
         with self._lock:
-            if self.declared is None:
+            # Another thread may destroy the publisher meanwhile; Zenoh then refuses to send.
+            if (publisher := self.declared) is None:
                 raise InvalidHandle(f"{self.topic_name}: the publisher was destroyed")
             self._sequence += 1
             attachment = Attachment(self._sequence, time.time_ns(), self.gid).pack()
             try:
-                self.declared.put(data, attachment=attachment)
+                publisher.put(data, attachment=attachment)
             except zenoh.ZError as error:
                 raise self.invalid(error) from error
 
@@ -71,27 +72,21 @@ def _declare(endpoint: Endpoint) -> Any:
     keeps_all = qos.is_reliable and qos.history is HistoryPolicy.KEEP_ALL
     congestion = zenoh.CongestionControl.BLOCK if keeps_all else zenoh.CongestionControl.DROP
     reliability = zenoh.Reliability.RELIABLE if qos.is_reliable else zenoh.Reliability.BEST_EFFORT
+    options: Any = {"encoding": endpoint.encoding, "congestion_control": congestion, "reliability": reliability}
     if not qos.is_transient_local:
-        return endpoint.session.declare_publisher(
-            endpoint.key, encoding=endpoint.encoding, congestion_control=congestion, reliability=reliability
-        )
+        return endpoint.session.declare_publisher(endpoint.key, **options)
     return declare_advanced_publisher(
         endpoint.session,
         endpoint.key,
-        encoding=endpoint.encoding,
-        congestion_control=congestion,
-        reliability=reliability,
-        cache=CacheConfig(max_samples=qos.queue_length or _ENDLESS),
+        **options,
+        # The number stands for no limit.
+        cache=CacheConfig(max_samples=qos.queue_length or 2**31),
         # With this, subscribers that existed before notice the publisher, and ask for its earlier messages.
         publisher_detection=True,
         sample_miss_detection=MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S)
         if qos.is_reliable
         else None,
     )
-
-
-_ENDLESS = 2**31
-"""Cache size that stands for no limit."""
 
 
 class Subscription(Endpoint, Receiver):

@@ -48,14 +48,6 @@ def test_a_parameter_has_a_type_or_is_typed_dynamically(node):
         node.declare_parameter("no_type")
     node.declare_parameter("a", descriptor=ParameterDescriptor(dynamic_typing=True))
     assert node.set_parameters([Parameter("a", value=1), Parameter("a", value="x")])[1].successful
-    node.declare_parameter("b", Parameter.Type.INTEGER)
-    with pytest.raises(
-        ex.ParameterUninitializedException,
-        match=choose_words(embedded="no value yet", rclpy="'b' is not initialized"),
-    ):
-        node.get_parameter("b")
-    assert node.set_parameters([Parameter("b", value=3)])[0].successful
-    assert node.get_parameter("b").value == 3
 
 
 def plain(value):

@@ -46,7 +46,6 @@ def test_a_goal_succeeds_with_the_joint_at_its_position(robot: Robot) -> None:
     assert handle.accepted
     assert robot.outcome(handle) == REACHED
     assert robot.joint(ELBOW) == pytest.approx(-0.9, abs=0.005)
-    robot.wait_until(lambda: handle.status == SUCCEEDED, "the status of the goal")
 
 
 def test_the_goals_of_all_eight_limbs_are_carried_out_at_once(robot: Robot) -> None:

@@ -19,9 +19,6 @@ from rclzenoh.topic import Subscription
 _TOPIC, _TYPE = "/_action/feedback", "_FeedbackMessage"
 
 
-FeedbackCallback = Callable[[Any], Any]
-
-
 class ClientGoalHandle:
     """A goal, as its client sees it."""
 
@@ -50,7 +47,7 @@ class ActionClient:
     def __init__(self, node: Node, action_type: type[Action], action_name: str) -> None:
         self._node = node
         self._action_type = action_type
-        self._feedback_callbacks: dict[bytes, FeedbackCallback] = {}
+        self._feedback_callbacks: dict[bytes, Callable[[Any], Any]] = {}
         protocol, self._prefix = action_type.Impl, f"{action_name}/_action"
         self._goal_client = node.create_client(protocol.SendGoalService, f"{self._prefix}/send_goal")
         self.cancel_client = node.create_client(CancelGoal, f"{self._prefix}/cancel_goal")
@@ -70,7 +67,7 @@ class ActionClient:
         context = self._node.context
         return context.graph.wait_for(self.server_is_ready, timeout_sec, context.ok)
 
-    def send_goal_async(self, goal: Message, feedback_callback: FeedbackCallback | None = None) -> Future:
+    def send_goal_async(self, goal: Message, feedback_callback: Callable[[Any], Any] | None = None) -> Future:
         """Send a goal; the future has a `ClientGoalHandle` once the goal is accepted or rejected.
 
         Args:

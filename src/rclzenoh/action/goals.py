@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any
 
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus
 from rclzenoh.interfaces.srv import CancelGoal
@@ -18,8 +18,6 @@ _NEXT = {
     CANCELING: (SUCCEEDED, ABORTED, CANCELED),
 }
 """States that follow each state in the state machine of rcl_action (Jazzy)."""
-
-_NAMES = ("unknown", "accepted", "executing", "canceling", "succeeded", "canceled", "aborted")
 
 
 class TrackedGoal:
@@ -48,17 +46,13 @@ class TrackedGoal:
     def become(self, status: int, now_ns: int) -> None:
         """Change the state."""
         if not self.can_become(status):
-            key = key_of(self.info.goal_id).hex()
-            raise RuntimeError(f"goal {key} is {_NAMES[self.status]} and cannot become {_NAMES[status]}")
+            raise RuntimeError(f"a goal cannot go from status {self.status} to {status}")
         self.status = status
         if not self.is_active:
             self.ended_ns = now_ns
 
 
-AGoal = TypeVar("AGoal", bound=TrackedGoal)
-
-
-class GoalTable(dict[bytes, AGoal]):
+class GoalTable(dict[bytes, Any]):
     """Goals by identifier, in order of acceptance.
 
     Args:
@@ -69,7 +63,7 @@ class GoalTable(dict[bytes, AGoal]):
         super().__init__()
         self._result_timeout_ns = result_timeout_ns
 
-    def select(self, asked: GoalInfo) -> tuple[int, list[AGoal]]:
+    def select(self, asked: GoalInfo) -> tuple[int, list[Any]]:
         """Select the goals that a request to cancel names; the first value is a code of action_msgs/srv/CancelGoal."""
         # action_msgs/srv/CancelGoal has four cases: one goal, all goals, all goals up to a time, and all goals up to a
         # time together with one goal.

@@ -7,17 +7,8 @@ from enum import Enum
 from functools import partial
 from typing import Any
 
-from rclzenoh.action.goals import (
-    ABORTED,
-    ACCEPTED,
-    CANCELED,
-    CANCELING,
-    EXECUTING,
-    SUCCEEDED,
-    GoalTable,
-    TrackedGoal,
-    key_of,
-)
+from rclzenoh.action import goals
+from rclzenoh.action.goals import GoalTable, TrackedGoal, key_of
 from rclzenoh.interfaces import Action, AnyMessage, Message
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray
 from rclzenoh.interfaces.srv import CancelGoal
@@ -60,12 +51,12 @@ class ServerGoalHandle(TrackedGoal):
     @property
     def is_cancel_requested(self) -> bool:
         """Whether the goal is to be cancelled."""
-        return self.status == CANCELING
+        return self.status == goals.CANCELING
 
     def execute(self) -> None:
         """Let the executor call the execute callback."""
         if not self.is_cancel_requested:
-            self._server.change(self, EXECUTING)
+            self._server.change(self, goals.EXECUTING)
         submit(self._server.node.mailbox, partial(self._server.carry_out, self))
 
     def publish_feedback(self, feedback: Message) -> None:
@@ -74,15 +65,15 @@ class ServerGoalHandle(TrackedGoal):
 
     def succeed(self) -> None:
         """End the goal as reached; the execute callback returns the result."""
-        self._server.change(self, SUCCEEDED)
+        self._server.change(self, goals.SUCCEEDED)
 
     def abort(self) -> None:
         """End the goal as failed."""
-        self._server.change(self, ABORTED)
+        self._server.change(self, goals.ABORTED)
 
     def canceled(self) -> None:
         """End the goal as cancelled."""
-        self._server.change(self, CANCELED)
+        self._server.change(self, goals.CANCELED)
 
 
 class ActionServer:
@@ -120,7 +111,7 @@ class ActionServer:
         self._handle_accepted_callback = handle_accepted_callback
         self._cancel_callback = cancel_callback
         self._logger = node.get_logger()
-        self._goals: GoalTable[ServerGoalHandle] = GoalTable(int(result_timeout * S_TO_NS))
+        self._goals = GoalTable(int(result_timeout * S_TO_NS))
         protocol, prefix = action_type.Impl, f"{action_name}/_action"
         self._services = [
             node.create_service(protocol.SendGoalService, f"{prefix}/send_goal", self._on_goal),
@@ -171,8 +162,8 @@ class ActionServer:
                 f"the execute callback {how} without ending goal {key_of(handle.goal_id).hex()}: aborted"
             )
             # The state machine has no transition from accepted to aborted, so the goal is executed in between.
-            if handle.status == ACCEPTED:
-                self.change(handle, EXECUTING)
+            if handle.status == goals.ACCEPTED:
+                self.change(handle, goals.EXECUTING)
             handle.abort()
 
     async def _on_goal(self, request: AnyMessage, response: AnyMessage) -> Message:
@@ -203,8 +194,8 @@ class ActionServer:
         for handle in handles:
             answer = await _await_outcome(self._cancel_callback(handle))
             # The goal may have ended while the callback was waiting.
-            if answer is CancelResponse.ACCEPT and handle.can_become(CANCELING):
-                handle.become(CANCELING, self._read_clock_ns())
+            if answer is CancelResponse.ACCEPT and handle.can_become(goals.CANCELING):
+                handle.become(goals.CANCELING, self._read_clock_ns())
                 canceling.append(handle.info)
         if canceling:
             self._publish_status()

@@ -60,21 +60,14 @@ def fill(message: Any, values: object, where: str = "") -> None:
             raise ConfigError(f"{path}: should be {types[name]}, got {value!r:.80}") from error
 
 
-def plain(value: Any, numbers: Numbers = lambda values, _: values.tolist()) -> Any:
+def plain(value: Any, numbers: Numbers = lambda values, _: values.tolist(), kind: str = "") -> Any:
     """Message or value of a field as mappings, lists and scalars.
 
     Args:
         value: The message or value.
         numbers: Makes something else of arrays of numbers than lists.
+        kind: IDL type of the field; empty for a message.
     """
-    if hasattr(value, "get_fields_and_field_types"):
-        return {
-            name: _plain(getattr(value, name), kind, numbers) for name, kind in _field_types(value.__class__).items()
-        }
-    return _plain(value, "", numbers)
-
-
-def _plain(value: Any, kind: str, numbers: Numbers) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist() if value.dtype == np.bool_ else numbers(value, _element(kind))
     if isinstance(value, array.array):
@@ -86,10 +79,11 @@ def _plain(value: Any, kind: str, numbers: Numbers) -> Any:
         element = _element(kind)
         if element == "octet":
             return numbers(np.frombuffer(b"".join(value), np.uint8), "octet")
-        if element and "/" not in element:
-            return list(value)
-        return [plain(item, numbers) for item in value]
-    return plain(value, numbers) if "/" in kind else value
+        return list(value) if element and "/" not in element else [plain(item, numbers) for item in value]
+    if hasattr(value, "get_fields_and_field_types"):
+        types = _field_types(value.__class__)
+        return {name: plain(getattr(value, name), numbers, field) for name, field in types.items()}
+    return value
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, MemberError, RequestError
@@ -208,13 +208,17 @@ def offer(node: Node, service: Any, name: str, fill: Fill) -> None:
     node.create_service(service, name, answer)
 
 
-def refusal(response_type: Any, error: RequestError) -> Any:
+_R = TypeVar("_R")
+
+
+def refusal(response_type: type[_R], error: RequestError) -> _R:
     """Make a response, or any other message with a ``result``, that gives the reason of an error.
 
     If the type of the message and all services have a result code of the same name, the code of the type is taken.
     """
     constants = response_type if hasattr(response_type, error.reason) else Result
-    response = response_type()
+    response: Any = response_type()
     response.result.result = getattr(constants, error.reason)
     response.result.error_message = str(error)
-    return response
+    refused: _R = response
+    return refused

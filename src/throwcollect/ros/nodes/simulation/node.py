@@ -321,18 +321,12 @@ class SimulationNode(Node):
             trial.set_up_nothing()
         elif trial.leased and changed:
             raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
-        number, controllers = self._check_trial(values)
-        config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
-        if changed:
-            trial.setup = TrialSetup(number, controllers, config)
-
-    def _check_trial(self, values: Mapping[str, Any]) -> tuple[int, tuple[str, ...]]:
-        setup = self._simulation.trial.setup
-        number = int(values.get(NUMBER, setup.number))
-        controllers = tuple(filter(None, values.get(CONTROLLERS, setup.controllers)))
+        controllers = tuple(filter(None, values.get(CONTROLLERS, trial.setup.controllers)))
         if unknown := [name for name in controllers if name not in self._simulation.limbs]:
             raise ConfigError(f"no controller {unknown[0]!r}")
-        return number, controllers
+        config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
+        if changed:
+            trial.setup = TrialSetup(int(values.get(NUMBER, trial.setup.number)), controllers, config)
 
     def _check_factor(self, factor: float) -> None:
         if factor != _NO_LIMIT and not SLOWEST <= factor <= FASTEST:

@@ -25,13 +25,14 @@ class SpawningServices:
 
     def __init__(self, node: Node, simulation: LiveSimulator) -> None:
         self._simulation = simulation
+        self._bodies = {body.link.name: body for body in bodies_of(simulation.config)}
         offer(node, GetSpawnables, "get_spawnables", self._list)
         offer(node, SpawnEntity, "spawn_entity", self._spawn)
         offer(node, DeleteEntity, "delete_entity", self._delete)
 
     def _list(self, _request: GetSpawnables.Request, response: GetSpawnables.Response) -> None:
         about = "a copy of this body of the scene"
-        response.spawnables = [Spawnable(uri=body.link.name, description=about) for body in self._bodies]
+        response.spawnables = [Spawnable(uri=name, description=about) for name in self._bodies]
 
     def _spawn(self, request: SpawnEntity.Request, response: SpawnEntity.Response) -> None:
         self._simulation.trial.require_free()
@@ -50,17 +51,12 @@ class SpawningServices:
         else:
             raise RequestError("RESULT_NOT_FOUND", f"no entity {request.entity!r:.80}")
 
-    @property
-    def _bodies(self) -> tuple[SceneBody, ...]:
-        return bodies_of(self._simulation.config)
-
     def _read_resource(self, request: SpawnEntity.Request) -> SceneBody:
         if request.uri:
-            found = next((body for body in self._bodies if body.link.name == request.uri), None)
-            if found is None:
-                known = ", ".join(body.link.name for body in self._bodies) or "none"
+            if request.uri not in self._bodies:
+                known = ", ".join(self._bodies) or "none"
                 raise RequestError("NO_RESOURCE", f"no body {request.uri!r:.80} in the scene; known: {known}")
-            return found
+            return self._bodies[request.uri]
         if not request.resource_string:
             raise RequestError("NO_RESOURCE", "neither uri nor resource_string", expected="a URDF as resource_string")
         try:
