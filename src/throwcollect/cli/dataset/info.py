@@ -114,7 +114,7 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
 
 
 def describe(found: Info) -> str:
-    """Put the summary of a dataset into words, one fact a line; a run's summary also has whether it was open."""
+    """Put the summary of a dataset into words, one fact a line."""
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     lines = {
         "trials": f"{found.trials}: {outcomes}{_describe_shortage(found)}",
@@ -132,8 +132,6 @@ def describe(found: Info) -> str:
         lines["took"] = (
             f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, {factor:.1f} x real time, start of the nodes included"
         )
-    if getattr(found, "open", False):  # only the summary of a run has it
-        lines["open"] = "any process that reached the router could join, read and disturb the run"
     width = max(map(len, lines))
     return "\n".join(f"{key:{width}}  {text}" for key, text in lines.items())
 

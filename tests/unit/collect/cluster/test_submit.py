@@ -11,25 +11,7 @@ from throwcollect.collect.cluster import slurm
 from throwcollect.collect.cluster import submit as module
 from throwcollect.collect.cluster.submit import submit
 from throwcollect.collect.coordinator.reporter import SILENT
-from throwcollect.errors import DatasetError, WorkerError
-
-
-def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = CONFIG + "record: {{trials_per_shard: 2}}\n"
-    config = write_config(tmp_path, trials=4, text=text, sim=FAST)
-    cancelled: list[str] = []
-
-    def answer(script: Path, *options: str) -> str:
-        if options:
-            raise WorkerError("sbatch refuses: too many jobs")
-        return "12"
-
-    monkeypatch.setattr(slurm, "submit", answer)
-    monkeypatch.setattr(slurm, "cancel", cancelled.extend)
-    with pytest.raises(WorkerError, match="too many jobs"):
-        submit(config, tmp_path / "data", 2, reporter=SILENT)
-    assert cancelled == ["12"]
-    assert not (tmp_path / "data").exists()
+from throwcollect.errors import DatasetError
 
 
 def test_jobs_are_cancelled_if_they_cannot_be_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
