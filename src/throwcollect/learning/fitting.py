@@ -154,7 +154,6 @@ def read_ends(directory: Path) -> Array:
 
     Raises:
         ConfigError: If no throw succeeded, or its task has nothing to aim at.
-        DatasetError: If there is neither, or it is damaged.
     """
     if (directory / MODEL).exists():
         return load_model(directory).outputs

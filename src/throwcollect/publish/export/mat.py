@@ -38,7 +38,7 @@ def describe(source: ExportSource) -> Layout:
     return Layout(
         files={
             "throws.mat": "`throws` has one field a column of the table of all trials, with NaN, -1 or an empty string "
-            "where there is nothing; dots in names are underscores. `units` has the unit of each of these fields.",
+            "where there is nothing. `units` has the unit of each of these fields.",
             "trajectories/": "one file a recording, with the structure `robot_throws`; its k-th throw is trial "
             "`robot_throws.trial(k)`.",
         },
