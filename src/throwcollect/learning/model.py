@@ -90,7 +90,7 @@ class Model(ModelCard):
 
         Args:
             targets: Values of `targets` and then of `given` for each, such as ``[(1.4, -0.2)]``.
-            choose: Which of several parameters are taken: ``nearest``, ``least-effort`` or ``least-sensitive``.
+            choose: Which of several parameters are taken: ``nearest`` or ``least-effort``.
 
         Raises:
             ConfigError: If a target has another number of values, is no number or beyond 1e6, or the choice is unknown.
