@@ -173,19 +173,14 @@ class Robot:
             raise ConfigError(f"{path}: joint {missing[0]} is missing")
         if self.hand not in urdf.links:
             raise ConfigError(f"{path}: link {self.hand} is missing")
-        moving = [joint.name for joint in urdf.model.joints if joint.moves]
-        kinds = {name: f"mimics {joint.mimics}" if joint.mimics else joint.kind for name, joint in urdf.joints.items()}
-        if more := [f"{name} ({kinds[name]})" for name in moving if name not in self.joints]:
-            raise ConfigError(
-                f"{path}: joints that move, but have no controller of {self.title}: {', '.join(more)}",
-                hint='make them type="fixed" in a copy of the URDF, or add them to a controller if they are revolute',
-            )
         wanted = {name: "prismatic" if name in self.sliding else "revolute" for name in self.joints}
-        if others := [name for name in self.joints if kinds[name] != wanted[name]]:
+        found = {joint.name: f"mimics {joint.mimics}" if joint.mimics else joint.kind for joint in urdf.model.joints}
+        moving = [joint.name for joint in urdf.model.moving]
+        if wrong := [name for name in (*moving, *self.joints) if found[name] != wanted.get(name)]:
             raise ConfigError(
-                f"{path}: joints of controllers should be {wanted[others[0]]}; "
-                + ", ".join(name + (" " if urdf.joints[name].mimics else " is ") + kinds[name] for name in others),
-                hint='a continuous joint becomes type="revolute" with a <limit> that has lower and upper',
+                f"{path}: joints that move should be those of controllers of {self.title}, and revolute, or "
+                f"prismatic if they slide: {', '.join(f'{name} ({found[name]})' for name in dict.fromkeys(wrong))}",
+                hint='make others type="fixed" in a copy of the URDF, and give a continuous joint a <limit> with ends',
             )
         return urdf
 
@@ -205,8 +200,8 @@ class Robot:
             posture = {name: float(angles.get(name, "0")) for name in self.joints}
         except ValueError as error:
             raise ConfigError(f"{path}: group_state {self.rest} is not readable: {error}") from error
-        if wrong := [name for name, angle in posture.items() if not math.isfinite(angle)]:
-            raise ConfigError(f"{path}: group_state {self.rest}: the angle of {wrong[0]} is not finite")
+        if not all(map(math.isfinite, posture.values())):
+            raise ConfigError(f"{path}: group_state {self.rest} has an angle that is not finite")
         return MappingProxyType(posture)
 
 

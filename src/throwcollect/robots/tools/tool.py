@@ -6,11 +6,10 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from throwcollect.config.schema import Config
 from throwcollect.config.tool_config import ToolConfig
@@ -18,9 +17,6 @@ from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.members import explain_failure, load_part
 from throwcollect.reproducible_math import add_up
-
-Positive = Annotated[float, Field(gt=0)]
-_Numbers = tuple[float, ...]
 
 
 @dataclass(frozen=True)
