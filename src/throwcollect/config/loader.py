@@ -70,23 +70,13 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
         yield config
 
 
-@contextmanager
-def load_sensors(path: Path) -> Iterator[Mapping[str, AnySensor]]:
-    """Read a file with the section `sensors` alone, and add its lines to a `ConfigError` of the block.
+def load_sensors(path: Path) -> Mapping[str, AnySensor]:
+    """Read a file with the section `sensors` alone.
 
     Raises:
-        ConfigError: If the file cannot be read or anything in it is wrong, or the block raises one.
+        ConfigError: If the file cannot be read or anything in it is wrong.
     """
-    document = Document(path)
-    sensors = document.validate(_SensorsOnly).sensors
-    try:
-        yield sensors
-    except ConfigError as error:
-        # Other arguments of the block are not in the file.
-        if not all(problem.key.startswith("sensors.") for problem in error.problems):
-            raise
-        with _placing(document):
-            raise
+    return Document(path).validate(_SensorsOnly).sensors
 
 
 @contextmanager

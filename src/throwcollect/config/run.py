@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import ConfigDict, Field, PositiveFloat, PositiveInt
 from typing_extensions import TypedDict
 
-from throwcollect.config.section import NUMBER_AS_STRING, Section
+from throwcollect.config.section import Section
 from throwcollect.members import names_of
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class RunConfig(Section):
 
 
 Size = Annotated[str, Field(pattern=r"^[1-9][0-9]{0,17}[bkmg]?$")]
-Cores = Annotated[str, NUMBER_AS_STRING, Field(pattern=r"^[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*$")]
+Cores = Annotated[str, Field(pattern=r"^[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*$")]
 # Which directories and devices of the host may be used is checked when a run begins, after links have been followed.
 Mount = Annotated[str, Field(pattern=r"^/[^/:][^:]*:/[^:]*(:(ro|(ro,)?[zZ]))?$")]
 Device = Annotated[str, Field(pattern=r"^/dev/[^:]+:/dev/[^:]+:(r|w|rw)$")]
@@ -170,7 +170,7 @@ class ContainersConfig(Section):
 
 
 _TIME = r"^([0-9]+|[0-9]+:[0-9]{1,2}(:[0-9]{1,2})?|[0-9]+-[0-9]{1,2}(:[0-9]{1,2}){0,2})$"
-Time = Annotated[str, NUMBER_AS_STRING, Field(pattern=_TIME)]
+Time = Annotated[str, Field(pattern=_TIME)]
 Memory = Annotated[str, Field(pattern=r"^[1-9][0-9]*[KMGT]$")]
 Word = Annotated[str, Field(pattern=r"^[!-~]+$")]
 Line = Annotated[str, Field(pattern=r"^[^\p{Cc}\p{Zl}\p{Zp}]*$")]

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 from pydantic import (
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -48,15 +47,6 @@ Joint = str
 """Name of a joint; `Config` checks that the robot has it, as any URDF may name other joints."""
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
-
-
-def _make_string(value: object) -> object:
-    # `isinstance` would also take `true`, which is an `int` in Python.
-    return str(value) if type(value) is int else value
-
-
-NUMBER_AS_STRING = BeforeValidator(_make_string)
-"""Lets a string be a single integer without quotes, which YAML reads as a number: the core 0, or 90 minutes."""
 
 
 class Section(BaseModel):

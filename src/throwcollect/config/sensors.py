@@ -192,11 +192,6 @@ class LayersConfig(LidarConfig):
         low, high = self.vertical_rad
         return tuple(low + number * (high - low) / max(self.layers - 1, 1) for number in range(self.layers))
 
-    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
-        yield from super()._find_contradictions()
-        if self.vertical_rad[0] > self.vertical_rad[1]:
-            yield "vertical_rad", "should not begin above its end"
-
 
 if TYPE_CHECKING:
     AnySensor = DepthConfig | CameraConfig | LidarConfig | LayersConfig

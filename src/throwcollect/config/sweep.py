@@ -89,11 +89,6 @@ class TargetConfig(Section):
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if not self.dimensions:
             yield "distance_m", "missing; at least one of distance_m, height_m and hit_angle_rad should be there"
-        if self.distance_m and self.distance_m.min < 0:
-            yield "distance_m.min", f"should be 0 or more, got {self.distance_m.min}"
-        if (angle := self.hit_angle_rad) and max(-angle.min, angle.max) > math.pi / 2:
-            outer = "max" if angle.max > math.pi / 2 else "min"
-            yield f"hit_angle_rad.{outer}", f"should be from -1.5708 to 1.5708 rad, got {getattr(angle, outer)}"
         cells = math.prod(each.bins for each in self.dimensions.values())
         if cells > _MOST_CELLS:
             last = list(self.dimensions)[-1]

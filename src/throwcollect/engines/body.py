@@ -114,15 +114,14 @@ class LinkInertia:
     @property
     def diagonal(self) -> list[float]:
         """The moments about the axes x, y, z [kg m²]."""
-        return [self.moments_kgm2[number] for number, (row, column) in enumerate(INERTIA.values()) if row == column]
+        xx, _, _, yy, _, zz = self.moments_kgm2
+        return [xx, yy, zz]
 
     @property
     def is_centred(self) -> bool:
         """Whether the frame of the link is that of its centre of mass and of its principal axes."""
-        off_diagonal = (
-            self.moments_kgm2[number] for number, (row, column) in enumerate(INERTIA.values()) if row != column
-        )
-        return self.placement == HERE and not any(off_diagonal)
+        _, xy, xz, _, yz, _ = self.moments_kgm2
+        return self.placement == HERE and not (xy or xz or yz)
 
 
 @dataclass(frozen=True)

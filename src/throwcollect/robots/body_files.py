@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import xml.etree.ElementTree as ElementTree
+from collections import ChainMap
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -113,9 +114,8 @@ def _read(kind: type[FileBodyConfig], file: str) -> BodyFile:
     if kind is not MeshConfig:
         return _read_body(read_xml(path), path, partial(find_mesh, urdf=path))
     mesh = Mesh(path)
-    name, sha256 = _name(content := mesh.encode(), ".stl")
     link = BodyLink(_NAME, None, (LinkShape("mesh", (1.0, 1.0, 1.0), HERE, mesh),))
-    return BodyFile(link, {name: content}, sha256)
+    return BodyFile(link, *_pack(mesh.encode(), ".stl"))
 
 
 def _read_body(root: ElementTree.Element, path: Path, find: Callable[[str], Path]) -> BodyFile:
@@ -130,17 +130,18 @@ def _read_body(root: ElementTree.Element, path: Path, find: Callable[[str], Path
     model = BodyModel(_NAME, (link,))
     robot = ElementTree.Element("robot", name=_NAME)
     robot.extend(model.to_xml())
-    meshes = [(_name(content, ".stl")[0], content) for content in model.encode_meshes().values()]
+    meshes = {name: _pack(content, ".stl")[0] for name, content in model.encode_meshes().items()}
     for mesh in robot.iter("mesh"):
-        mesh.set("filename", meshes[int(mesh.attrib["filename"].removesuffix(".stl"))][0])
-    name, sha256 = _name(content := to_text(robot).encode(), ".urdf")
-    return BodyFile(link, {name: content, **dict(meshes)}, sha256)
+        (filename,) = meshes[mesh.attrib["filename"]]
+        mesh.set("filename", filename)
+    files, sha256 = _pack(to_text(robot).encode(), ".urdf")
+    return BodyFile(link, {**files, **ChainMap(*meshes.values())}, sha256)
 
 
-def _name(content: bytes, suffix: str) -> tuple[str, str]:
-    """Name a file by its digest, which is the second of the two."""
+def _pack(content: bytes, suffix: str) -> tuple[dict[str, bytes], str]:
+    """Make a file that is named by its digest, and that digest."""
     sha256 = hashlib.sha256(content).hexdigest()
-    return f"{sha256[:16]}{suffix}", sha256
+    return {f"{sha256[:16]}{suffix}": content}, sha256
 
 
 def _merge(model: BodyModel) -> BodyLink:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations
@@ -186,8 +186,7 @@ class Clearance:
         place = pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -base_height_m])) * pose_of(body.placement)
         robot = [number for number, shape in enumerate(self.geometry.geometryObjects) if shape.parentFrame]
         for number, shape in enumerate(body.link.shapes):
-            solid = _make_solid(f"scene.bodies.{body.link.name}", shape)
-            pose = place * pose_of(shape.placement)
+            solid, pose = _make_solid(body.link.name, shape), place * pose_of(shape.placement)
             added = self.geometry.addGeometryObject(
                 pinocchio.GeometryObject(f"scene/{body.link.name}_{number}", 0, 0, pose, solid)
             )
@@ -199,7 +198,12 @@ class Clearance:
 @lru_cache(maxsize=8)
 def find_overlap(bodies: tuple[SceneBody, ...]) -> str | None:
     """Explain which two bodies, of which one moves, overlap; None if none do."""
-    solids = [(body, solid) for body in bodies for solid in _make_objects(body)]
+    solids = []
+    for body in bodies:
+        for shape in body.link.shapes:
+            pose, solid = pose_of(body.placement) * pose_of(shape.placement), _make_solid(body.link.name, shape)
+            place = pinocchio.coal.Transform3s(pose.rotation, pose.translation)
+            solids.append((body, pinocchio.coal.CollisionObject(solid, place)))
     request, result = pinocchio.coal.DistanceRequest(), pinocchio.coal.DistanceResult()
     for (one, solid), (other, second) in combinations(solids, 2):
         if one is not other and (one.moves or other.moves):
@@ -207,13 +211,6 @@ def find_overlap(bodies: tuple[SceneBody, ...]) -> str | None:
             if (depth_m := -pinocchio.coal.distance(solid, second, request, result)) > _TOUCHING_M:
                 return f"{one.link.name} and {other.link.name} overlap by {depth_m * 1000:.3g} mm at the start"
     return None
-
-
-def _make_objects(body: SceneBody) -> Iterator[pinocchio.coal.CollisionObject]:
-    for shape in body.link.shapes:
-        pose = pose_of(body.placement) * pose_of(shape.placement)
-        solid = _make_solid(f"scene.bodies.{body.link.name}", shape)
-        yield pinocchio.coal.CollisionObject(solid, pinocchio.coal.Transform3s(pose.rotation, pose.translation))
 
 
 @lru_cache(maxsize=4)

@@ -28,18 +28,13 @@ def joint_model(robot: Robot) -> pinocchio.Model:
         model = build_model(robot.description.model)
     except (ValueError, RuntimeError) as error:
         raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
-    _check_inertias(robot, model)
-    return model
-
-
-def _check_inertias(robot: Robot, model: pinocchio.Model) -> None:
-    """Make sure that there can be the bodies that joints move: engines would change others, or drop them."""
-    # Pinocchio's first joint is the universe.
+    # Engines would change a body that cannot be, or drop it. Pinocchio's first joint is the universe.
     for joint, body in zip(model.names[1:], model.inertias[1:], strict=True):
         where = f"{robot.urdf_path}: link {robot.description.joints[joint].child}, which {joint} moves,"
         if body.mass <= 0:
             raise ConfigError(f"{where} has no mass", hint="give it an <inertial> with <mass> and <inertia> in a copy")
         check_moments(where, body)
+    return model
 
 
 def check_moments(where: str, body: pinocchio.Inertia) -> None:

@@ -49,12 +49,6 @@ def test_every_container_key_reads_back_equal_after_it_is_written(tmp_path: Path
     assert load(again) == config
 
 
-def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
-    path = tmp_path / "run.yaml"
-    path.write_text("containers: {sim: {cpuset: 0}}")
-    assert load(path).containers.sim.cpuset == "0"
-
-
 @pytest.mark.parametrize(
     ("section", "message"),
     [

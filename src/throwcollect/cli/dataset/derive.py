@@ -104,8 +104,7 @@ def render_sensors(
     from throwcollect.config.loader import load_sensors
     from throwcollect.dataset.derive.derivation import render_sensors as render
 
-    with load_sensors(sensors) as sections:
-        derived = render(directory, output, sections, where=where)
+    derived = render(directory, output, load_sensors(sensors), where=where)
     _show(output, derived, json=json)
 
 

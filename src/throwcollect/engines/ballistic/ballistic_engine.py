@@ -51,9 +51,6 @@ class BallisticEngine(Engine):
         self._orientation = (0.0, 0.0, 0.0, 1.0)
         self._seat = np.zeros((3, 1))
 
-    def close(self) -> None:
-        """Do nothing: this world holds no resources."""
-
     def load(self, scene: Scene) -> None:
         """Make the world of a scene."""
         if scene.bodies:

@@ -95,7 +95,7 @@ class MujocoEngine(Engine):
         place_bodies(self._model, scene.bodies)
         self._data = mujoco.MjData(self._model)
         self._seat = None if scene.tool.seat is None else self._model.body(HELD_LINK).id
-        self._grip = [surface.name == scene.tool.name for surface in self._surfaces]
+        self._grip = [name == scene.tool.name for name in self._surfaces]
         # Joints of the robot come first in the model, but not in the order of the scene.
         names = [self._model.joint(number).name for number in range(len(scene.moving))]
         self._columns = np.array([scene.moving.index(name) for name in names])
@@ -263,7 +263,7 @@ class MujocoEngine(Engine):
 
     def _report_touch(self, step: int, presses: Sequence[int], observer: Observer) -> None:
         """Tell the observer which bodies press on the object now, if others did before; one number says so of each."""
-        touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
+        touching = frozenset(compress(self._surfaces, presses))
         if touching != self._touching:
             self._touching = touching
             observer.on_touch(step, touching)

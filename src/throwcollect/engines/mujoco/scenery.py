@@ -6,7 +6,6 @@ As in Bullet, only the object and bodies that move collide with other things.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -48,19 +47,6 @@ _WORLD_LINK, _STAND_IN = "world", "world of the robot"
 """MuJoCo takes a root link of this name for the world itself, which is at height 0; so that link has another name."""
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A body that can press on the object.
-
-    Attributes:
-        body: Name of the body in the model; all its shapes count.
-        name: Its name in contacts of the object.
-    """
-
-    body: str
-    name: str
-
-
 def _read_robot(model: BodyModel) -> mujoco.MjSpec:
     """Read the robot, whose links all become bodies of MuJoCo."""
     text = model.write_urdf()
@@ -73,11 +59,11 @@ def _read_robot(model: BodyModel) -> mujoco.MjSpec:
     return spec
 
 
-def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
+def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[str]]:
     """Put ground, robot, object and bodies together.
 
     Returns:
-        The world, and its surfaces that can press on the object.
+        The world, and names in contacts of what can press on the object; each is a body with all its shapes.
     """
     try:
         robot = add_held_link(scene.robot, scene.tool).rename_links({_WORLD_LINK: _STAND_IN})
@@ -86,10 +72,10 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         raise ConfigError(f"MuJoCo cannot read the robot's description: {error}") from error
     world = spec.worldbody
     world.first_body().pos = (0.0, 0.0, scene.base_height_m)
-    surfaces = [Surface(world.name, GROUND)]
+    surfaces = {world.name: GROUND}
     names = {scene.tool.link: scene.tool.name, _STAND_IN: _WORLD_LINK}
     for body in spec.bodies[1:]:
-        surfaces.append(Surface(body.name, names.get(body.name, body.name)))
+        surfaces[body.name] = names.get(body.name, body.name)
         for geom in body.geoms:
             geom.contype, geom.conaffinity = _ROBOT_BIT, 0
     world.add_geom(
@@ -106,9 +92,9 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     # Those that move are last, so that their pairs with all others can be named.
     for each in sorted(scene.bodies, key=lambda body: body.moves):
         _add_body(spec, each)
-        surfaces.append(Surface(_name_body(each), each.link.name))
-    for surface in surfaces:
-        _watch(spec, surface)
+        surfaces[_name_body(each)] = each.link.name
+    for body in surfaces:
+        _watch(spec, body)
     option = spec.option
     # `MujocoEngine.run` relies on damping that acts on the velocity after the step.
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -116,7 +102,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     # MuJoCo would reset a world that diverges. Without that, its numbers are not finite, and the trial is refused.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return spec, surfaces
+    return spec, list(surfaces.values())
 
 
 def _add_object(spec: mujoco.MjSpec, body: SceneBody) -> None:
@@ -205,8 +191,8 @@ def _size(shape: LinkShape) -> tuple[Vector, Vector]:
     raise ValueError(shape.kind)
 
 
-def _watch(spec: mujoco.MjSpec, surface: Surface) -> None:
-    """Add a sensor of the force with which a surface presses on the object; its first number is the normal force."""
+def _watch(spec: mujoco.MjSpec, body: str) -> None:
+    """Add a sensor of the force with which a body presses on the object; its first number is the normal force."""
     # The sensor reports the force of one contact: of all between the two bodies, the strongest.
     force, strongest, one = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 2, 1
     spec.add_sensor(
@@ -214,7 +200,7 @@ def _watch(spec: mujoco.MjSpec, surface: Surface) -> None:
         objtype=mujoco.mjtObj.mjOBJ_GEOM,
         objname=OBJECT,
         reftype=mujoco.mjtObj.mjOBJ_BODY,
-        refname=surface.body,
+        refname=body,
         intprm=(force, strongest, one),
     )
 
